@@ -8,11 +8,12 @@ import os
 import signal
 import subprocess
 import sys
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+
+from .fork_server import TIMEOUT_S, wait_until
 
 CONFIG = """title = "On a cluster"
 models = ["hertz", "lankarani-nikravesh-1990"]
@@ -30,7 +31,6 @@ m2 = 1.0
 K = 1e9
 """
 BLOCK_COUNT = 14
-TIMEOUT_S = 60.0  # limit of every wait
 DASK_COMMAND = (sys.executable, "-m", "dask")
 SINGLE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
@@ -162,13 +162,6 @@ def start_sweep(folder: Path, *words: str | Path, config: str = CONFIG) -> Runni
 def content(folder: Path) -> bytes:
     """The bytes of the result in a folder."""
     return (folder / "results.h5").read_bytes()
-
-
-def wait_until(condition: Callable[[], bool]) -> None:
-    start = time.monotonic()
-    while not condition():
-        assert time.monotonic() - start < TIMEOUT_S
-        time.sleep(0.02)
 
 
 def processes_of_group(group: int) -> list[int]:

@@ -7,15 +7,17 @@ import re
 import subprocess
 import sys
 from collections.abc import Callable, Hashable, Iterable, Iterator
+from contextlib import contextmanager
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 import xarray as xr
 from hypothesis import settings
 
 import impact
+from impact.errors import ConfigError
 
 from .fork_server import CompletedCommand, ForkServer, start_fork_server
 
@@ -61,6 +63,60 @@ from impact import hysteresis
 MINE = hysteresis("mine-2026", title="Mine", year=2026, equation="", reference="", chi=lambda e: {chi})
 """
 CHI = "(1 - e * e) / e"
+# a config with several points
+CONTACT = """
+models = ["hertz", "gharib-hurmuzlu-2012"]
+[sweep]
+e = [0.1, 0.5, 0.9]
+v1 = 1.0
+m1 = 1.0
+m2 = 2.0
+K = 6e9
+"""
+
+
+def new_law(key: str, force: Callable[..., Any], **fields: Any) -> impact.ForceModel:
+    """Return a law without a source."""
+    return impact.ForceModel(key, title=key, year=2026, equation="", reference="", force=force, **fields)
+
+
+def problems_of(act: Callable[..., object], *arguments: Any, **options: Any) -> list[str]:
+    """Return the lines with which a function refuses a config."""
+    with pytest.raises(ConfigError) as caught:
+        act(*arguments, **options)
+    return list(caught.value.problems)
+
+
+def one_line(words: str) -> str:
+    """Return the pattern of a message that has these words and is one line."""
+    return rf"\A[^\n]*{re.escape(words)}[^\n]*\Z"
+
+
+def assert_refused(done: CompletedCommand | subprocess.CompletedProcess[str], words: str) -> None:
+    """A command ended as after an invalid input, with one line that has these words."""
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1), done
+    assert words in done.stderr
+
+
+@contextmanager
+def full_disk() -> Iterator[None]:
+    """Limit the size of files, which stands for a full disk."""
+    import resource
+    import signal
+
+    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, limits[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+        signal.signal(signal.SIGXFSZ, handler)
+
+
+def examples_of(page: str) -> list[tuple[str, str]]:
+    """Return the commands of a page of this project, and what they print there."""
+    return re.findall(r"\$ impact (.*)\n((?:.*\n)+?)```", (ROOT / page).read_text(encoding="utf-8"))
 
 
 def code_blocks(page: str, language: str) -> list[str]:

@@ -24,7 +24,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from .fork_server import POLL_INTERVAL_S, ForkServer, serve, start_fork_server
+from .fork_server import TIMEOUT_S, ForkServer, serve, start_fork_server, wait_until
 
 # small, for many blocks and slabs in a short time
 BLOCK_TRAJECTORIES, SLAB_POINTS = 64, 128
@@ -45,7 +45,6 @@ K = 1e9
 # the same sweep, stored as a trajectory table
 FACTORED_CONFIG = CONFIG_TEXT.replace("[output]", '[output]\nlayout = "factored"')
 BLOCKS = 3  # one for the first model, which does not depend on e, and two for the second
-TIMEOUT_S = 60.0  # limit of every wait
 Log = list[list[Any]]
 
 
@@ -268,13 +267,6 @@ class RunningSweep:
         ended = self.forked.wait(self.pid, limit)
         assert not ended.timed_out, ("the process hangs", ended)
         return FinishedSweep(ended.returncode, ended.stdout, ended.stderr, self.log())
-
-
-def wait_until(condition: Callable[[], bool]) -> None:
-    start_time = time.monotonic()
-    while not condition():
-        assert time.monotonic() - start_time < TIMEOUT_S
-        time.sleep(POLL_INTERVAL_S)
 
 
 def _of_process(pid: int, name: str) -> str:

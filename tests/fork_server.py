@@ -33,6 +33,7 @@ from typing import Any, NoReturn
 
 ROOT = Path(__file__).parent.parent
 POLL_INTERVAL_S = 0.002  # between checks whether a child has ended
+TIMEOUT_S = 60.0  # limit of a wait of a test
 
 
 @dataclass(frozen=True)
@@ -154,6 +155,13 @@ def printed_on_terminal(
     reader.join()
     os.close(driver)
     return completed, printed.decode()
+
+
+def wait_until(condition: Callable[[], bool]) -> None:
+    start = time.monotonic()
+    while not condition():
+        assert time.monotonic() - start < TIMEOUT_S
+        time.sleep(POLL_INTERVAL_S)
 
 
 def serve(warm_up: Callable[[], None]) -> None:

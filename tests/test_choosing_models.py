@@ -10,10 +10,10 @@ import impact
 from impact.config.load import Config, read_config
 from impact.config.tables import expand_models
 from impact.contact.models import built_in, catalogue, find
-from impact.errors import ConfigError, ModelError
+from impact.errors import ModelError
 from impact.results.single_impact import Impact
 
-from .conftest import assert_same_bits
+from .conftest import assert_same_bits, problems_of
 
 BALLS = {"v1": 1.0, "v2": -0.5, "m1": 1.0, "m2": 2.0}
 ALIASES = {key: model.same_as for key, model in catalogue().items() if model.same_as}
@@ -161,9 +161,7 @@ def config_of(choice: object, **parameters: object) -> Config:
 
 
 def problems_of_choice(choice: object) -> list[str]:
-    with pytest.raises(ConfigError) as caught:
-        config_of(choice)
-    return list(caught.value.problems)
+    return problems_of(config_of, choice)
 
 
 NOTHING_BEFORE = "expected models to exclude from those before it"

@@ -14,21 +14,12 @@ import numpy as np
 import pytest
 import yaml
 
-from .conftest import ROOT, Run, code_blocks
+from .conftest import CONTACT, ROOT, Run, code_blocks
 
 # these tests create environments and build the package
 pytestmark = pytest.mark.slow
 
 PAGE = (ROOT / "docs" / "ci.md").read_text(encoding="utf-8")
-CONTACT = """
-models = ["hertz", "gharib-hurmuzlu-2012"]
-[sweep]
-e = [0.1, 0.5, 0.9]
-v1 = 1.0
-m1 = 1.0
-m2 = 2.0
-K = 6e9
-"""
 Shell = dict[str, str]
 
 

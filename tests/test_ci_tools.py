@@ -18,17 +18,8 @@ import yaml
 
 import impact
 
-from .conftest import ROOT
+from .conftest import CONTACT, ROOT
 
-CONTACT = """
-models = ["hertz", "gharib-hurmuzlu-2012"]
-[sweep]
-e = [0.1, 0.5, 0.9]
-v1 = 1.0
-m1 = 1.0
-m2 = 2.0
-K = 6e9
-"""
 TESTS = """
 import pytest
 import impact

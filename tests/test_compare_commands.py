@@ -5,10 +5,8 @@ from __future__ import annotations
 import json
 import os
 import re
-import resource
 import shlex
 import shutil
-import signal
 import stat
 import subprocess
 import sys
@@ -29,7 +27,7 @@ from impact.cli.main import app
 from impact.errors import ResultError, StoreError, UsageError
 from impact.results.xarray_backend import write_sealed
 
-from .conftest import CHI, PLUGIN, ROOT, WIDE
+from .conftest import CHI, PLUGIN, ROOT, WIDE, full_disk
 from .fork_server import CompletedCommand, ForkServer, abandoned_pipe, printed_on_terminal
 
 FORMATS = ("table", "json", "junit", "markdown", "github")
@@ -554,19 +552,11 @@ def test_a_refused_bless_changes_no_file(forked: ForkServer, folder: Path, tmp_p
 
 
 def test_bless_on_a_full_disk_leaves_the_old_baseline(folder: Path, tmp_path: Path) -> None:
-    # a limit of the size of files simulates the full disk
     baseline = tmp_path / "baseline.h5"
     shutil.copy(folder / "base.h5", baseline)
-    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, limits[1]))
-    try:
-        for path in (baseline, tmp_path / "fresh.h5"):
-            with pytest.raises(StoreError, match="not written"):
-                impact.bless(folder / "different.h5", path, reason="r")
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
-        signal.signal(signal.SIGXFSZ, handler)
+    for path in (baseline, tmp_path / "fresh.h5"):
+        with full_disk(), pytest.raises(StoreError, match="not written"):
+            impact.bless(folder / "different.h5", path, reason="r")
     assert [p.name for p in tmp_path.iterdir()] == ["baseline.h5"]
     assert baseline.read_bytes() == (folder / "base.h5").read_bytes()
 

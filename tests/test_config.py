@@ -19,14 +19,14 @@ import impact
 from impact.config.load import Config, parse_config, read_config
 from impact.config.tables import Output, Solver, expand_models
 from impact.contact.materials import Material
-from impact.contact.model import ForceModel, Parameter
+from impact.contact.model import Parameter
 from impact.contact.models import catalogue
 from impact.errors import ConfigError
 from impact.text import escape_controls, safe_text
 
+from .conftest import ROOT, new_law, problems_of
 from .test_schema_agrees import SCHEMA
 
-ROOT = Path(__file__).parents[1]
 FIGURE6 = ROOT / "configs" / "figure6.toml"
 STARTER = ROOT / "src" / "impact" / "config" / "starter.toml"
 
@@ -46,16 +46,12 @@ rho = 7850
 """
 
 
-def model(key: str, force: object = lambda elastic: elastic, **more: object) -> ForceModel:
-    return ForceModel(key, title=key, year=2026, equation="F", reference="", family="test", force=force, **more)
-
-
 # models that need a yield strength or a radius, with another exponent, and with parameters
-PLASTIC = model("test-plastic", lambda elastic, yield_strength1, yield_strength2: elastic + 0 * yield_strength1)
-RADIUS = model("test-radius", lambda elastic, R1: elastic * R1)
-LINEAR = model("test-linear", exponent=1.0)
-SQUARE = model("test-square", exponent=2.0)
-DRIVEN = model(
+PLASTIC = new_law("test-plastic", lambda elastic, yield_strength1, yield_strength2: elastic + 0 * yield_strength1)
+RADIUS = new_law("test-radius", lambda elastic, R1: elastic * R1)
+LINEAR = new_law("test-linear", lambda elastic: elastic, exponent=1.0)
+SQUARE = new_law("test-square", lambda elastic: elastic, exponent=2.0)
+DRIVEN = new_law(
     "test-driven",
     lambda elastic, S, c: elastic * S * c,
     parameters=(
@@ -76,9 +72,7 @@ def read(text: str, *overrides: str) -> Config:
 
 
 def problems(text: str, *overrides: str) -> list[str]:
-    with pytest.raises(ConfigError) as caught:
-        read(text, *overrides)
-    return list(caught.value.problems)
+    return problems_of(read, text, *overrides)
 
 
 E_EXPECTED = "expected a number from 0 to 1"
@@ -664,13 +658,11 @@ def test_a_mapping_is_kept_as_json_and_read_again() -> None:
     assert config.axes[1].columns == {"m2": (1.0, math.inf)}
     # the mapping itself is not touched
     assert data["sweep"]["m1"] == 1.0
-    with pytest.raises(ConfigError) as caught:
-        read_config(data | {"title": None, "models": object()}, ["sweep.m1=-3"])
-    assert caught.value.problems == (
+    assert problems_of(read_config, data | {"title": None, "models": object()}, ["sweep.m1=-3"]) == [
         "config: title: got nothing, expected text",
         'config: models: got a object, expected a model, or a list of models; "all" are all',
         f"--set sweep.m1=-3: sweep.m1: got -3, {MASS}",
-    )
+    ]
 
 
 def test_a_mapping_of_anything_is_refused() -> None:
@@ -695,16 +687,12 @@ def test_a_file_that_cannot_be_read_is_an_error_of_one_line(
     path = tmp_path / "x.toml"
     if content is not None:
         path.write_bytes(content)
-    with pytest.raises(ConfigError) as caught:
-        read_config(path)
-    assert caught.value.problems == (f"{path}{line}",)
+    assert problems_of(read_config, path) == [f"{path}{line}"]
 
 
 def test_only_regular_files_are_opened(tmp_path: Path) -> None:
     for path in (tmp_path, Path("/dev/zero"), Path("a\0b"), Path("x" * 5000)):
-        with pytest.raises(ConfigError) as caught:
-            read_config(path)
-        (line,) = caught.value.problems
+        (line,) = problems_of(read_config, path)
         assert line.startswith(escape_controls(str(path))[:1000])
         assert re.search(": (not a regular file|cannot be read)", line)
 

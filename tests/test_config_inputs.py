@@ -17,6 +17,7 @@ from impact.contact.materials import Material
 from impact.errors import ConfigError
 from impact.plots.data import read_points
 
+from .conftest import problems_of
 from .fork_server import ForkServer
 
 TEXT = """\
@@ -50,9 +51,7 @@ def read(text: str, *overrides: str) -> Config:
 
 
 def problems(text: str, *overrides: str) -> list[str]:
-    with pytest.raises(ConfigError) as caught:
-        read(text, *overrides)
-    return list(caught.value.problems)
+    return problems_of(read, text, *overrides)
 
 
 def cases(folder: Path, csv: str | bytes = CSV, *overrides: str, text: str = CASES) -> Config:
@@ -62,9 +61,8 @@ def cases(folder: Path, csv: str | bytes = CSV, *overrides: str, text: str = CAS
 
 
 def refused(folder: Path, csv: str | bytes, *overrides: str, text: str = CASES) -> list[str]:
-    with pytest.raises(ConfigError) as caught:
-        cases(folder, csv, *overrides, text=text)
-    return [line.replace(f"{folder}/", "") for line in caught.value.problems]
+    lines = problems_of(cases, folder, csv, *overrides, text=text)
+    return [line.replace(f"{folder}/", "") for line in lines]
 
 
 def test_a_property_of_a_material_is_an_axis_between_those_of_the_sweep_and_of_models() -> None:
@@ -221,9 +219,9 @@ def test_no_message_contains_a_file_without_a_known_column(
         {"sweep": {**balls, "K": {"fit": [1e5, 1e7]}}, "data": {"file": "env"}},
     ]
     for table in tables:
-        with pytest.raises(ConfigError) as error:
-            read_config({"models": "hertz", **table}, purpose="calibrate" if "data" in table else "sweep")
-        lines = [line for line in error.value.problems if line.startswith("env")]
+        purpose = "calibrate" if "data" in table else "sweep"
+        found = problems_of(read_config, {"models": "hertz", **table}, purpose=purpose)
+        lines = [line for line in found if line.startswith("env")]
         assert lines
         # the config contains the guessed name itself
         assert not re.search("SECRET[12]", "".join(lines).replace(f'got "{guessed["column"]}"', ""))

@@ -19,26 +19,18 @@ from impact.engine.run import Run
 from impact.results.estimate import estimate
 from impact.results.sweep import prepare
 
-from .conftest import ROOT, assert_same_bits
+from .conftest import ROOT, assert_same_bits, new_law
 
-DASHPOT = impact.ForceModel(
+DASHPOT = new_law(
     "dashpot",
-    "Spring and dashpot",
-    2026,
-    equation="F = K x + c v",
-    reference="",
+    lambda K, x, v, c: K * x + c * v,
     exponent=1.0,
-    force=lambda K, x, v, c: K * x + c * v,
     release="force",
     parameters=(impact.Parameter("c", "N s/m", "damping constant", default=30.0, least=0.0),),
 )
-SPEED = impact.ForceModel(
+SPEED = new_law(
     "speed",
-    "Damping with a reference speed",
-    2026,
-    equation="",
-    reference="",
-    force=lambda elastic, v, a: elastic * (1.0 + a * v),
+    lambda elastic, v, a: elastic * (1.0 + a * v),
     coefficients={"a": lambda v_y, v0: 0.3 * v_y / (v_y + v0)},
     parameters=(impact.Parameter("v_y", "m/s", "a speed", default=1.0, least=0.1),),
 )
@@ -171,13 +163,9 @@ def test_the_number_of_trajectories() -> None:
 def test_a_unit_whose_exponent_is_zero_at_the_first_values_hides_no_axis(
     unit: str, n: list[float], p: object, axes: tuple[int, ...]
 ) -> None:
-    power_law = impact.ForceModel(
+    power_law = new_law(
         "powers",
-        "Powers",
-        2026,
-        equation="",
-        reference="",
-        force=lambda elastic, v, c: elastic * (1.0 + v * c / (1.0 + c)),
+        lambda elastic, v, c: elastic * (1.0 + v * c / (1.0 + c)),
         parameters=(impact.Parameter("c", unit, "", least=0.0), impact.Parameter("p", "1", "an exponent")),
     )
     config = {

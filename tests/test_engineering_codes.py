@@ -29,24 +29,35 @@ def struck(key: str, n: float = 1.5, **inputs) -> Outputs:
     return contact
 
 
+def state_at_event(event, acceleration, start=(0.0, 1.0), *, atol=1e-15, first_step=1e-6):
+    """Indentation and rate where a function of them falls to zero after the start, by another integrator."""
+
+    def crossing(t, y):
+        return event(*y) if t > 0.0 else 1.0
+
+    crossing.terminal, crossing.direction = True, -1
+    solution = solve_ivp(
+        lambda t, y: (y[1], acceleration(*y)),
+        (0.0, 1e3),
+        start,
+        "DOP853",
+        events=crossing,
+        rtol=1e-12,
+        atol=atol,
+        first_step=first_step,
+    )
+    return solution.y_events[0][-1]
+
+
+def gap(x, v):
+    return x
+
+
 def restitution_by_scipy(force, m: float, v0: float) -> float:
     """The restitution of a force F(δ, v) in SI, to F = 0, by another integrator in other coordinates."""
-
-    def no_force(t, y):
-        return force(y[0], y[1]) if t > 0.0 else 1.0
-
-    no_force.terminal, no_force.direction = True, -1
-    solution = solve_ivp(
-        lambda t, y: (y[1], -force(y[0], y[1]) / m),
-        (0.0, 10.0),
-        (0.0, v0),
-        "DOP853",
-        events=no_force,
-        rtol=1e-12,
-        atol=(1e-18, 1e-14 * v0),
-        first_step=1e-9,
-    )
-    return float(-solution.y_events[0][-1][1] / v0)
+    atol = (1e-18, 1e-14 * v0)
+    state = state_at_event(force, lambda x, v: -force(x, v) / m, (0.0, v0), atol=atol, first_step=1e-9)
+    return float(-state[1] / v0)
 
 
 def cubic(t: float) -> float:
@@ -85,24 +96,13 @@ def test_the_spring_of_adams_pushes_again_after_the_force_was_zero(n, damping):
     def raw_force(x, v):
         return max(x, 0.0) ** n + damping * cubic(max(x, 0.0) / 0.3) * v
 
-    def state_at_event(event, start, span=30.0):
-        event.terminal, event.direction = True, -1
-        solution = solve_ivp(
-            lambda t, y: (y[1], -raw_force(*y)),
-            (0.0, span),
-            start,
-            "DOP853",
-            events=event,
-            rtol=1e-12,
-            atol=1e-15,
-            first_step=1e-6,
-        )
-        return solution.y_events[0][-1]
+    def acceleration(x, v):
+        return -raw_force(x, v)
 
-    x, v = state_at_event(lambda t, y: raw_force(*y) if t > 0.0 else 1.0, (0.0, 1.0))
+    x, v = state_at_event(raw_force, acceleration)
     x_again = brentq(lambda x: raw_force(x, v), 1e-12, x * (1 - 1e-6), xtol=1e-15)
     assert x_again > 1e-6
-    _, v_end = state_at_event(lambda t, y: y[0], (x_again, v))
+    _, v_end = state_at_event(gap, acceleration, (x_again, v))
     impacts = table1_impacts(n)
     parameters = {"c": damping * impacts.m * impacts.v0 / impacts.length, "d": 0.3 * impacts.length}
     contact = struck("adams-impact", n, parameters=parameters)
@@ -210,21 +210,10 @@ def struck_at_rates(key: str, g: np.ndarray) -> Outputs:
 def speed_at_the_gap(q: float, g: float) -> float:
     """The speed at which x'' = -x^1.5 - g x^q x' closes the gap, by an integrator of another order."""
 
-    def gap(t, y):
-        return y[0] if t > 0.0 else 1.0
+    def acceleration(x, v):
+        return -(max(x, 0.0) ** 1.5) - g * max(x, 0.0) ** q * v
 
-    gap.terminal, gap.direction = True, -1
-    solution = solve_ivp(
-        lambda t, y: (y[1], -(max(y[0], 0.0) ** 1.5) - g * max(y[0], 0.0) ** q * y[1]),
-        (0.0, 1e3),
-        (0.0, 1.0),
-        "DOP853",
-        events=gap,
-        rtol=1e-12,
-        atol=1e-14,
-        first_step=1e-9,
-    )
-    return float(-solution.y_events[0][-1][1])
+    return float(-state_at_event(gap, acceleration, atol=1e-14, first_step=1e-9)[1])
 
 
 @pytest.mark.parametrize("key", LAMMPS_RATES)
@@ -369,18 +358,11 @@ def test_recurdyn_with_exponents_where_it_has_closed_forms(n):
 @pytest.mark.parametrize("m3", [1.0, 1.5, 2.0])
 def test_recurdyn_with_exponents_agrees_with_a_second_integrator(m2, m3):
     # in the contact's own units, to the gap; the unit of c depends on the exponents
-    def gap(t, y):
-        return y[0] if t > 0.0 else 1.0
+    def acceleration(x, v):
+        x = max(x, 0.0)
+        return -(x**1.5) - 0.4 * np.sign(v) * abs(v) ** m2 * x**m3
 
-    gap.terminal, gap.direction = True, -1
-
-    def motion(t, y):
-        x, v = max(y[0], 0.0), y[1]
-        return v, -(x**1.5) - 0.4 * np.sign(v) * abs(v) ** m2 * x**m3
-
-    solution = solve_ivp(
-        motion, (0.0, 30.0), (0.0, 1.0), "DOP853", events=gap, rtol=1e-12, atol=1e-15, first_step=1e-6
-    )
+    _, v_end = state_at_event(gap, acceleration)
     impacts = table1_impacts(v1=SPEEDS)
     parameters = {
         "c": 0.4 * impacts.m * impacts.v0 ** (2 - m2) / impacts.length ** (1 + m3),
@@ -388,7 +370,7 @@ def test_recurdyn_with_exponents_agrees_with_a_second_integrator(m2, m3):
         "indentation_exponent": m3,
     }
     contact = struck("recurdyn-exponents", v1=SPEEDS, parameters=parameters)
-    assert contact["e_out"] == pytest.approx(np.full(SPEEDS.size, -solution.y_events[0][-1][1]), abs=1e-9)
+    assert contact["e_out"] == pytest.approx(np.full(SPEEDS.size, -v_end), abs=1e-9)
 
 
 def test_a_parameter_whose_unit_depends_on_exponents_is_a_number_without_unit():

@@ -11,7 +11,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -55,7 +55,19 @@ def test_all_file_operations_of_a_sweep_are_recorded(sweeps: SweepServer) -> Non
 # ---- kill -9
 
 
-def check_kills(sweeps: SweepServer, count: int | None) -> None:
+@pytest.mark.parametrize(
+    ("text", "count"),
+    [
+        (CONFIG_TEXT, 3),
+        pytest.param(FACTORED_CONFIG, 4, marks=pytest.mark.slow),
+        pytest.param(CONFIG_TEXT, None, marks=pytest.mark.faults),
+        pytest.param(FACTORED_CONFIG, None, marks=pytest.mark.faults),
+    ],
+)
+def test_a_sweep_killed_at_any_file_operation_is_resumed(
+    sweeps: SweepServer, text: str, count: int | None
+) -> None:
+    sweeps = sweeps.with_config(text)
     report = FaultReport("kill -9 at an operation on files", sweeps)
     # a kill after an operation is a kill before the next
     for operation in sweeps.choose_operations(count):
@@ -65,20 +77,8 @@ def check_kills(sweeps: SweepServer, count: int | None) -> None:
     report.check()
 
 
-@pytest.mark.parametrize(
-    ("text", "count"), [(CONFIG_TEXT, 3), pytest.param(FACTORED_CONFIG, 4, marks=pytest.mark.slow)]
-)
-def test_a_sweep_killed_at_a_file_operation_is_resumed(sweeps: SweepServer, text: str, count: int) -> None:
-    check_kills(sweeps.with_config(text), count)
-
-
-@pytest.mark.faults
-@pytest.mark.parametrize("text", [CONFIG_TEXT, FACTORED_CONFIG])
-def test_a_sweep_killed_at_any_file_operation_is_resumed(sweeps: SweepServer, text: str) -> None:
-    check_kills(sweeps.with_config(text), None)
-
-
-def check_random_kills(sweeps: SweepServer, count: int) -> None:
+@pytest.mark.parametrize("count", [2, pytest.param(60, marks=pytest.mark.faults)])
+def test_a_sweep_killed_at_a_random_time_is_resumed(sweeps: SweepServer, count: int) -> None:
     report, generator, longest = (
         FaultReport("kill -9 at a random time", sweeps),
         random.Random(9),
@@ -94,15 +94,6 @@ def check_random_kills(sweeps: SweepServer, count: int) -> None:
         report.resume(folder, finished_blocks(folder), "random")
         shutil.rmtree(folder)
     report.check()
-
-
-def test_a_sweep_killed_at_a_random_time_is_resumed(sweeps: SweepServer) -> None:
-    check_random_kills(sweeps, 2)
-
-
-@pytest.mark.faults
-def test_a_sweep_killed_at_many_random_times_is_resumed(sweeps: SweepServer) -> None:
-    check_random_kills(sweeps, 60)
 
 
 def test_a_resumed_sweep_removes_all_temporary_files(sweeps: SweepServer) -> None:
@@ -327,7 +318,19 @@ def check_storage_error(completed: FinishedSweep, folder: Path) -> set[int]:
     return finished_blocks(folder)
 
 
-def check_failures(sweeps: SweepServer, count: int | None) -> None:
+@pytest.mark.parametrize(
+    ("text", "count"),
+    [
+        (CONFIG_TEXT, 2),
+        pytest.param(FACTORED_CONFIG, 3, marks=pytest.mark.slow),
+        pytest.param(CONFIG_TEXT, 120, marks=pytest.mark.faults),
+        pytest.param(FACTORED_CONFIG, 40, marks=pytest.mark.faults),
+    ],
+)
+def test_a_sweep_is_resumed_after_a_disk_error_at_any_operation(
+    sweeps: SweepServer, text: str, count: int
+) -> None:
+    sweeps = sweeps.with_config(text)
     first, last = sweeps.find_operation("create", f"{WORK}/block.part"), sweeps.find_operation("link")
     for number, name in ((errno.ENOSPC, "full disk"), (errno.EIO, "input/output error")):
         report = FaultReport(f"{name} at an operation on files", sweeps)
@@ -341,21 +344,6 @@ def check_failures(sweeps: SweepServer, count: int | None) -> None:
             report.resume(folder, kept, operation)
             shutil.rmtree(folder)
         report.check()
-
-
-@pytest.mark.parametrize(
-    ("text", "count"), [(CONFIG_TEXT, 2), pytest.param(FACTORED_CONFIG, 3, marks=pytest.mark.slow)]
-)
-def test_a_sweep_is_resumed_after_a_disk_error(sweeps: SweepServer, text: str, count: int) -> None:
-    check_failures(sweeps.with_config(text), count)
-
-
-@pytest.mark.faults
-@pytest.mark.parametrize(("text", "count"), [(CONFIG_TEXT, 120), (FACTORED_CONFIG, 40)])
-def test_a_sweep_is_resumed_after_a_disk_error_at_any_operation(
-    sweeps: SweepServer, text: str, count: int
-) -> None:
-    check_failures(sweeps.with_config(text), count)
 
 
 def test_a_disk_error_before_the_first_block_leaves_no_trace_or_prints_how_to_continue(
@@ -387,28 +375,20 @@ def test_a_sweep_is_resumed_after_the_limit_of_file_sizes_was_reached(sweeps: Sw
     report.check()
 
 
-def check_full_disks(sweeps: SweepServer, folder: Path, sizes: Iterable[int]) -> None:
-    report = FaultReport("full file system", sweeps)
-    for size in sizes:
-        with mount_tmpfs(folder, f"size={size}k"):
-            (folder / CONFIG).write_text(CONFIG_TEXT)
-            completed = sweeps(cwd=folder)
-            kept = check_storage_error(completed, folder)
-            match = MISSING_SPACE.search(completed.stderr)
-            assert match, completed
-            needed, free = (int(size_text.replace(",", "")) for size_text in match.groups())
-            assert needed > free, (size, completed.stderr)
-            subprocess.run(["mount", "-o", "remount,size=1M", folder], check=True)
-            report.resume(folder, kept, size)
-    report.check()
-
-
-@pytest.mark.parametrize("size", [24, *(pytest.param(size, marks=pytest.mark.slow) for size in (8, 44))])
+# the last size is that of a file system that is full when the result is assembled
+@pytest.mark.parametrize("size", [24, *(pytest.param(size, marks=pytest.mark.slow) for size in (8, 44)), 52])
 def test_a_full_file_system_is_reported_with_the_missing_space(
     sweeps: SweepServer, tmp_path: Path, size: int
 ) -> None:
-    check_full_disks(sweeps, tmp_path / "small", (size,))
-
-
-def test_a_file_system_that_is_full_when_the_result_is_assembled(sweeps: SweepServer, tmp_path: Path) -> None:
-    check_full_disks(sweeps, tmp_path / "small", (52,))
+    report, folder = FaultReport("full file system", sweeps), tmp_path / "small"
+    with mount_tmpfs(folder, f"size={size}k"):
+        (folder / CONFIG).write_text(CONFIG_TEXT)
+        completed = sweeps(cwd=folder)
+        kept = check_storage_error(completed, folder)
+        match = MISSING_SPACE.search(completed.stderr)
+        assert match, completed
+        needed, free = (int(size_text.replace(",", "")) for size_text in match.groups())
+        assert needed > free, (size, completed.stderr)
+        subprocess.run(["mount", "-o", "remount,size=1M", folder], check=True)
+        report.resume(folder, kept, size)
+    report.check()

@@ -10,7 +10,7 @@ import pytest
 from impact.config.load import parse_config, read_config
 from impact.errors import ConfigError
 
-from .conftest import Run
+from .conftest import Run, assert_refused
 
 CONFIG = """
 models = "kuwabara-kono-1987"
@@ -115,10 +115,7 @@ def test_a_stored_config_needs_no_file(folder: Path) -> None:
 )
 def test_a_wrong_table_is_refused_with_its_line(folder: Path, cli: Run, csv: str, message: str) -> None:
     (folder / "drops.csv").write_text(csv, encoding="utf-8")
-    done = cli("calibrate", "fit.toml", cwd=folder)
-    assert done.returncode == 2
-    assert message in done.stderr
-    assert done.stderr.count("\n") == 1
+    assert_refused(cli("calibrate", "fit.toml", cwd=folder), message)
 
 
 @pytest.mark.parametrize(

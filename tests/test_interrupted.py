@@ -252,7 +252,8 @@ def test_a_damaged_plan_is_not_resumed(sweeps: SweepServer, change: Callable[[by
     check_refused(sweeps, folder, "--resume", message=WORK)
 
 
-def check_flips(sweeps: SweepServer, count: int) -> None:
+@pytest.mark.parametrize("count", [3, pytest.param(80, marks=pytest.mark.faults)])
+def test_a_block_with_a_flipped_bit_is_integrated_again(sweeps: SweepServer, count: int) -> None:
     report, generator = FaultReport("a flipped bit in a block", sweeps), random.Random(5)
     for number in pick_evenly(sorted(ALL_BLOCKS) * count, count):
         folder = sweeps.copy_finished()
@@ -272,15 +273,6 @@ def check_flips(sweeps: SweepServer, count: int) -> None:
         )
         shutil.rmtree(folder)
     report.check()
-
-
-def test_a_block_with_a_flipped_bit_is_integrated_again(sweeps: SweepServer) -> None:
-    check_flips(sweeps, 3)
-
-
-@pytest.mark.faults
-def test_blocks_with_many_flipped_bits_are_integrated_again(sweeps: SweepServer) -> None:
-    check_flips(sweeps, 80)
 
 
 @pytest.mark.parametrize(

@@ -18,6 +18,7 @@ from impact.contact.status import FIRST_FAILURE, Status
 from impact.contact.variables import OUTPUTS
 from impact.errors import ConfigError
 
+from .conftest import new_law
 from .problems import LAWS, table1_impacts, with_parameters
 
 RTOL, MAX_STEPS = 1e-10, 10_000
@@ -47,9 +48,7 @@ def broadcast_output(outputs: Outputs, name: str) -> np.ndarray:
 def user_law(force, *names: str, **fields_of_model) -> ForceModel:
     """A user-defined law with dimensionless parameters of these names."""
     parameters = tuple(Parameter(name, "1", name) for name in names)
-    return ForceModel(
-        "user", "User", 2026, equation="", reference="", force=force, parameters=parameters, **fields_of_model
-    )
+    return new_law("user", force, parameters=parameters, **fields_of_model)
 
 
 # ---- statuses that are known without an integration
@@ -356,13 +355,9 @@ def test_damping_with_a_quarter_power_is_accurate_in_its_smooth_coordinate(zeta)
 
 LOGS = np.array([-30.0, -12.0, 0.0, 12.0, 30.0])
 # two parameters with dimensions: a damping, and a gap that closes before the force begins
-DAMPED = ForceModel(
+DAMPED = new_law(
     "damped",
-    "Damped",
-    2026,
-    equation="",
-    reference="",
-    force=lambda K, x, v, n, c, gap: (K + c * v) * np.maximum(x - gap, 0.0) ** n,
+    lambda K, x, v, n, c, gap: (K + c * v) * np.maximum(x - gap, 0.0) ** n,
     parameters=(Parameter("c", "N s/m^(n+1)", "damping"), Parameter("gap", "m", "gap")),
 )
 
@@ -464,10 +459,7 @@ def test_overdamped_user_laws_are_reported_as_not_separated(formulas, separating
 
 def test_balls_that_separate_slowly_are_not_reported_as_not_separated():
     # below an indentation of (c/2)^-2 the spring is stronger than the damping
-    texts = {"title": "", "year": 2026, "equation": "", "reference": ""}
-    model = impact.ForceModel(
-        "slow", force=lambda elastic, x, v: elastic + 100.0 * np.sqrt(x) * v, exponent=1.0, **texts
-    )
+    model = new_law("slow", lambda elastic, x, v: elastic + 100.0 * np.sqrt(x) * v, exponent=1.0)
     config = {"models": "slow", "sweep": {"v1": 1.0, "m1": 2.0, "m2": 2.0, "n": 1.0, "K": 1.0}}
     few, many = (
         impact.sweep({**config, "solver": {"max_steps": steps}}, plugins=[model]) for steps in (100, 100_000)

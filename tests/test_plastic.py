@@ -12,6 +12,7 @@ from impact.contact.models import find
 from impact.contact.outputs import Outputs, collide
 from impact.contact.status import Status
 
+from .conftest import new_law
 from .problems import table1_impacts, with_parameters
 
 RTOL = 1e-10
@@ -47,15 +48,7 @@ def over_speed(key: str) -> tuple[Impacts, Outputs]:
 
 @pytest.mark.parametrize("n", [1.0, 1.5, 2.0])
 def test_unloading_by_a_fraction_of_the_elastic_force_returns_that_fraction_of_the_work(n):
-    law = ForceModel(
-        "softer",
-        "Softer",
-        2026,
-        equation="",
-        reference="",
-        force=lambda elastic: elastic,
-        unloading=lambda elastic: 0.25 * elastic,
-    )
+    law = new_law("softer", lambda elastic: elastic, unloading=lambda elastic: 0.25 * elastic)
     contact = struck(law, table1_impacts(n))
     assert contact["status"][0] == Status.OK
     assert contact["e_out"][0] == pytest.approx(0.5, abs=1e-9)
@@ -308,15 +301,11 @@ def test_muthukumar_at_the_indentation_of_its_design(e, e_out):
 
 def ramp(**fields) -> ForceModel:
     """A dashpot whose damping grows up to a depth, where the slope of its force jumps."""
-    return ForceModel(
+    return new_law(
         "ramp",
-        "Ramp",
-        2026,
-        equation="",
-        reference="",
+        lambda elastic, x, v, C, d: elastic + C * np.minimum(x / d, 1.0) * v,
         release="force",
         parameters=(Parameter("C", "1", "damping"), Parameter("d", "1", "depth")),
-        force=lambda elastic, x, v, C, d: elastic + C * np.minimum(x / d, 1.0) * v,
         **fields,
     )
 

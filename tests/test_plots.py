@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import hashlib
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -29,7 +30,7 @@ from impact.plots.kinds import KINDS, WIDTHS, Choice, Look, find_kind
 from impact.plots.style import save_figure
 from impact.results.single_impact import Impact
 
-from .conftest import ROOT, Run
+from .conftest import ROOT, Run, one_line
 from .fork_server import ForkServer
 
 OTHER_RESULTS = ("timestep", "calibration", "uncertainty", "sensitivity")
@@ -260,10 +261,8 @@ def test_the_impulse_diagram_ends_where_impulse_and_momentum_say(figure6: xr.Dat
 def test_a_motion_that_cannot_be_drawn_is_an_error_of_one_line(
     coarse: xr.Dataset, kind: str, choice: dict[str, object], words: str
 ) -> None:
-    with pytest.raises(UsageError) as caught:
+    with pytest.raises(UsageError, match=one_line(words)):
         get_curve_data(coarse, kind, **choice)
-    assert words in str(caught.value)
-    assert "\n" not in str(caught.value)
 
 
 def test_an_axis_label_has_one_prefix_of_its_unit(coarse: xr.Dataset) -> None:
@@ -439,9 +438,8 @@ def test_another_axis_can_be_drawn_over(wide: xr.Dataset) -> None:
 def test_an_unknown_name_or_value_is_an_error_with_the_known_ones(
     wide: xr.Dataset, choice: dict[str, object], words: str
 ) -> None:
-    with pytest.raises(UsageError) as caught:
+    with pytest.raises(UsageError, match=re.escape(words)):
         get_curve_data(wide, **choice)
-    assert words in str(caught.value)
 
 
 # PDF and EPS embed fonts, which takes seconds
@@ -572,10 +570,8 @@ def test_labels_titles_and_sizes_are_chosen(coarse: xr.Dataset) -> None:
 def test_a_wrong_option_is_an_error_of_one_line(
     coarse: xr.Dataset, options: dict[str, object], words: str
 ) -> None:
-    with pytest.raises(UsageError) as caught:
+    with pytest.raises(UsageError, match=one_line(words)):
         impact.plot(coarse, **options)  # type: ignore[arg-type]
-    assert words in str(caught.value)
-    assert "\n" not in str(caught.value)
 
 
 def test_a_plot_is_drawn_into_axes_of_the_user(coarse: xr.Dataset) -> None:
@@ -640,10 +636,8 @@ def test_wrong_points_are_an_error_of_one_line(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     Path("data.csv").write_text(text, encoding="utf-8")
-    with pytest.raises(impact.ImpactError) as caught:
+    with pytest.raises(impact.ImpactError, match=one_line(words)):
         impact.plot(speeds, kind="restitution", points="data.csv")
-    assert words in str(caught.value)
-    assert "\n" not in str(caught.value)
 
 
 # the command

@@ -69,6 +69,14 @@ def test_a_file_of_the_release_has_the_values_of_a_new_result(name: str) -> None
     assert verdict.equal, str(verdict)
 
 
+@pytest.mark.parametrize("name", [*LAYOUTS, "calibration", "sensitivity"])
+def test_a_new_result_has_the_attributes_of_the_release(name: str) -> None:
+    stored, new = impact.load(FOLDER / f"{name}.h5").attrs, new_result(name).attrs
+    assert list(new) == list(stored)
+    of_the_version = ("impact_version", "packages")
+    assert all(new[key] == stored[key] for key in stored if key not in of_the_version)
+
+
 def test_a_study_of_the_release_has_the_values_of_a_new_one() -> None:
     xr.testing.assert_allclose(impact.load(FOLDER / "sensitivity.h5"), new_result("sensitivity"), rtol=1e-9)
 

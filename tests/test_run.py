@@ -17,6 +17,7 @@ from impact.contact.status import Status
 
 from .conftest import Run
 from .problems import EACH_LAW, LAWS, table1_impacts, with_parameters
+from .test_deduplicate import DASHPOT
 
 RTOL = 1e-10
 # Table 1: radius [m], stiffness [N/m^1.5], peak indentation [m]
@@ -51,24 +52,13 @@ def test_the_three_restitutions_of_every_law_are_equal(keys: list[str]) -> None:
 def test_surfaces_separate_after_the_force_of_a_dashpot_vanishes(zeta: float) -> None:
     m, K = 0.5, 1e6
     omega, c = math.sqrt(K / m), 2.0 * zeta * math.sqrt(K * m)
-    dashpot = impact.ForceModel(
-        key="dashpot",
-        title="",
-        year=2026,
-        equation="",
-        reference="",
-        exponent=1.0,
-        release="force",
-        force=lambda K, x, v, c: K * x + c * v,
-        parameters=(impact.Parameter("c", "N s/m", "damping"),),
-    )
     config = {
         "models": "dashpot",
         "sweep": {"v1": 2.0, "m1": 1.0, "m2": 1.0, "K": K, "n": 1.0},
         "model": {"dashpot": {"c": c}},
         "output": {"variables": ["e_out", "e_energetic", "contact_time", "separation_time"]},
     }
-    result = impact.sweep(config, plugins=[dashpot])
+    result = impact.sweep(config, plugins=[DASHPOT])
     # the force of the damped sine vanishes at 2 acos(zeta), at the indentation 2 (zeta/omega) e v0 = (c/K) e v0
     phase, free = 2.0 * math.acos(zeta), math.sqrt(1.0 - zeta**2)
     e = math.exp(-zeta / free * phase)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import re
 import shlex
 from collections.abc import Callable
 
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 import impact
 from impact.errors import UsageError
 
-from .conftest import ROOT, Run
+from .conftest import Run, assert_refused, examples_of, new_law
 
 # two glass beads of 5 mm
 RADIUS = 2.5e-3
@@ -72,18 +71,8 @@ def test_a_target_at_the_end_of_the_allowed_values_is_a_bound() -> None:
 
 
 def test_several_roots_are_all_found() -> None:
-    law = impact.ForceModel(
-        key="two-minima",
-        title="Damping that vanishes twice",
-        year=2026,
-        equation="F = K δ + c(p) δ̇",
-        reference="",
-        force=lambda K, x, v, c: K * x + c * v,
-        coefficients={"c": lambda p: 0.4 * (p - 1.0) ** 2},
-        parameters=(impact.Parameter("p", "1", "a number", default=0.5, least=0.0, most=3.0),),
-        exponent=1.0,
-    )
-    result = impact.solve("two-minima", "p", {"e_out": 0.8}, plugins=[law])
+    law = law_of(lambda p: 0.4 * (p - 1.0) ** 2)
+    result = impact.solve("damped", "p", {"e_out": 0.8}, plugins=[law])
     values = [root.value for root in result.roots]
     assert result.status == "several_roots"
     assert np.subtract(1.0, values) == pytest.approx([abs(1.0 - values[0]), -abs(1.0 - values[0])], abs=1e-8)
@@ -123,13 +112,9 @@ def test_the_least_peak_force_of_a_dashpot_is_right_to_six_digits(wanted: float,
 
 def law_of(damping: Callable[[Array], Array]) -> impact.ForceModel:
     """A linear contact whose dashpot is a function of a number p from 0 to 3."""
-    return impact.ForceModel(
-        key="damped",
-        title="Damping by a function",
-        year=2026,
-        equation="F = K δ + c(p) δ̇",
-        reference="",
-        force=lambda K, x, v, c: K * x + c * v,
+    return new_law(
+        "damped",
+        lambda K, x, v, c: K * x + c * v,
         coefficients={"c": lambda p: damping(p)},
         parameters=(impact.Parameter("p", "1", "a number", default=0.5, least=0.0, most=3.0),),
         exponent=1.0,
@@ -242,8 +227,7 @@ def test_json_of_the_command(cli: Run) -> None:
 
 @pytest.mark.slow
 def test_the_page_prints_what_the_commands_print(cli: Run) -> None:
-    page = (ROOT / "docs" / "solve.md").read_text(encoding="utf-8")
-    examples = re.findall(r"\$ impact (.*)\n((?:.+\n)+?)```", page)
+    examples = examples_of("docs/solve.md")
     assert len(examples) == 5
     for command, printed in examples:
         assert cli(*shlex.split(command)).stdout == printed
@@ -261,7 +245,4 @@ def test_the_page_prints_what_the_commands_print(cli: Run) -> None:
     ],
 )
 def test_bad_input_is_one_line(cli: Run, words: tuple[str, ...], message: str) -> None:
-    done = cli("solve", "--model", "mujoco-solref", *words)
-    assert done.returncode == 2
-    assert message in done.stderr
-    assert done.stderr.count("\n") == 1
+    assert_refused(cli("solve", "--model", "mujoco-solref", *words), message)

@@ -2,29 +2,31 @@
 
 from __future__ import annotations
 
-import re
 import shlex
 from pathlib import Path
 
 import pytest
 
-from .conftest import ROOT, Run, assert_same_output, code_blocks
+from .conftest import ROOT, Run, assert_same_output, code_blocks, examples_of
 
 DOCS = ROOT / "docs"
-EXAMPLES = [
-    (page.stem, command, printed)
-    for page in (*sorted((DOCS / "tutorials").glob("*.md")), ROOT / "README.md")
-    for command, printed in re.findall(r"\$ impact (.*)\n((?:.*\n)+?)```", page.read_text(encoding="utf-8"))
+PAGES = [
+    *(str(page.relative_to(ROOT)) for page in sorted((DOCS / "tutorials").glob("*.md"))),
+    "README.md",
+    "docs/calibrate.md",
+    "docs/uncertainty.md",
 ]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
-    ("page", "command", "printed"), EXAMPLES, ids=[f"{page}: {text}" for page, text, _ in EXAMPLES]
+    ("command", "printed"),
+    [
+        pytest.param(*example, id=f"{page}: {example[0]}", marks=() if "uncertainty" in page else pytest.mark.slow)
+        for page in PAGES
+        for example in examples_of(page)
+    ],
 )
-def test_a_tutorial_prints_what_its_commands_print(
-    cli: Run, tmp_path: Path, page: str, command: str, printed: str
-) -> None:
+def test_a_page_prints_what_its_commands_print(cli: Run, tmp_path: Path, command: str, printed: str) -> None:
     """Numbers may differ in the last digit that is printed; errors of the solver are below 1e-9."""
     # an output that is not named is written into the folder
     for path in ("docs", "configs"):

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pydantic_core import PydanticCustomError
 
@@ -33,31 +33,20 @@ from .input_names import InputName, input_values
 from .library import library
 from .lines import MAX_PROBLEM_LINES, key_lines, path_text
 from .quantities import VALUE_FORMS, ConfigProblem, KeyPath
-from .tables import MATERIAL_KEYS, SWEEP_DEFAULTS, SWEEP_QUANTITIES, expand_models
+from .tables import MATERIAL_KEYS, SWEEP_DEFAULTS, SWEEP_QUANTITIES, Loss, Noise, expand_models
 
 # keys of [sweep] that arrange inputs
 NO_INPUTS = (("sweep", "zip"), ("sweep", "cases"))
 
-if TYPE_CHECKING:
-    from .measurements import Measurements
-
 
 @dataclass(frozen=True)
 class Setting:
-    """A value that replaces that of a config.
+    """A value that replaces that of a config."""
 
-    Parameters
-    ----------
-    path : of the value; empty for a text that is not PATH=VALUE
-    value : any object, which is checked with the rest of the config
-    shown : the option that sets it, for messages: "--at e=0.6"
-    text : PATH=VALUE, as it is stored with a result; empty for that of the path and the value
-    """
-
-    path: KeyPath
-    value: object
-    shown: str
-    text: str = ""
+    path: KeyPath  # empty for a text that is not PATH=VALUE
+    value: object  # any, which is checked with the rest of the config
+    shown: str  # the option that sets it, for messages: "--at e=0.6"
+    text: str = ""  # PATH=VALUE, as it is stored with a result; empty for that of the path and the value
 
     @classmethod
     def parse(cls, text: str) -> Setting:
@@ -77,37 +66,39 @@ class Setting:
 
 
 @dataclass(frozen=True)
-class Draft:
-    """A config that is being read; nothing of it has been checked but its syntax.
+class Measurements:
+    """Measured points, in SI."""
 
-    Parameters
-    ----------
-    data : dicts, lists and plain Python values
-    text : the TOML text, or a mapping as JSON, without settings
-    name : of the source, for messages
-    known_models : all models that the config may select, by key
-    folder : of the files that it names; None if no file may be read
-    settings : those applied so far, in the order in which they are stored
-    origins : the setting of each path that a setting changed, in the order in which they were applied
-    files : the CSV files whose values are in the data; None before they are read
-    cases : the path of each input that is a column of a table of cases, and where its values are in that table
-    measurements : of a config with valid measurements
-    problems : paths and messages
-    lines : complete messages about settings and files
-    """
+    file: str  # name of the CSV file as in the config; empty for values in the config
+    lines: tuple[int, ...]  # of each point in the file; its number, from 1, for values in the config
+    inputs: Mapping[str, tuple[float, ...]]  # those that vary from point to point, by config name
+    outputs: Mapping[str, tuple[float, ...]]
+    sigma: Mapping[str, tuple[float, ...]]  # standard deviations of the outputs that have some
+    # "given": sigma as it is; "scale": times a common factor, which also stands for a sigma that is missing; or
+    # "excess": with a variance between specimens added
+    noise: Noise
+    specimens: tuple[str, ...] = ()  # of each point, for the noise "excess"; empty if each point has its own
+    loss: Loss = "linear"
+
+
+@dataclass(frozen=True)
+class Draft:
+    """A config that is being read; nothing of it has been checked but its syntax."""
 
     data: dict[str, Any]
-    text: str
-    name: str
+    text: str  # TOML, or a mapping as JSON, without settings
+    name: str  # of the source, for messages
     known_models: Mapping[str, ForceModel]
-    folder: Path | None = None
-    settings: tuple[Setting, ...] = ()
+    folder: Path | None = None  # of the files that it names; None if no file may be read
+    settings: tuple[Setting, ...] = ()  # in the order in which they are stored
+    # the setting of each path that a setting changed, in the order in which they were applied
     origins: Mapping[KeyPath, Setting] = field(default_factory=dict)
-    files: tuple[Path, ...] | None = None
+    files: tuple[Path, ...] | None = None  # the CSV files whose values are in the data; None before they are read
+    # the path of each input that is a column of a table of cases, and where its values are in that table
     cases: Mapping[KeyPath, KeyPath] = field(default_factory=dict)
     measurements: Measurements | None = None
     problems: tuple[ConfigProblem, ...] = ()
-    lines: tuple[str, ...] = ()
+    lines: tuple[str, ...] = ()  # complete messages about settings and files
 
     def table(self, name: str) -> dict[str, Any]:
         """Return a table of the config, or an empty one."""

@@ -18,7 +18,7 @@ from ..contact.variables import BY_DEFAULT
 from . import measurements, quantities, tables
 from .columns import expand_cases, named_files, read_files
 from .design import design_problems, distribution_paths, draw_columns, unit_samples
-from .draft import Draft, Setting, add_library_materials, open_config, open_text
+from .draft import Draft, Measurements, Setting, add_library_materials, open_config, open_text
 from .files import as_table, override_text, set_value
 from .grid import MAX_POINTS, Axis, build_grid, chunk_problems
 from .input_names import InputName
@@ -33,44 +33,26 @@ Purpose = Literal["sweep", "calibrate"]
 
 @dataclass(frozen=True)
 class Config:
-    """A valid config of a sweep or of a calibration, in SI units.
-
-    Parameters
-    ----------
-    title : of the sweep
-    models : the contact force models, in config order
-    scalars : values that do not vary, by config name ("v1", "material1", "KEY.name" for a parameter of a model),
-        including defaults; a mass or radius that is not in the config is derived from the other and the density.
-        A parameter to fit has a value between its bounds here, and an input that is measured its first value
-    axes : the dimensions of the grid in config order: those of [sweep], of materials ("materials.steel.E"), of
-        models
-    materials : by name, including the library materials that the config uses; a property that is an axis or fitted
-        is NaN for E and nu, and None for rho and yield_strength
-    solver : tolerances and core
-    output : which variables are stored, and how
-    text : the TOML text verbatim, or a mapping as JSON, without overrides
-    settings : first the library materials that the config uses, then those of the caller, then the values of the
-        CSV files that the config names. So text and settings define the config without the library or any file
-    fits : the least and the largest value of each parameter to fit, by config name; empty for a sweep
-    data : the measurements to which they are fitted; None for a sweep
-    design : how the samples of uncertain inputs are drawn; None without any
-    distributions : of the uncertain inputs, by config name; their drawn values are an axis
-    files : the CSV files that were read
-    """
+    """A valid config of a sweep or a calibration, in SI units; text and settings define it without any file."""
 
     title: str
     models: tuple[ForceModel, ...]
+    # values that do not vary, by config name ("v1", "material1", "KEY.name" for a parameter of a model), including
+    # defaults; a mass or radius that is not in the config is derived from the other and the density. A parameter
+    # to fit has a value between its bounds here, and an input that is measured its first value
     scalars: Mapping[str, float | str]
-    axes: tuple[Axis, ...]
+    axes: tuple[Axis, ...]  # in config order: those of [sweep], of materials ("materials.steel.E"), of models
+    # including library materials; a property that is an axis or fitted is NaN for E and nu, else None
     materials: Mapping[str, Material]
     solver: tables.Solver
     output: tables.Output
-    text: str
+    text: str  # the TOML text verbatim, or a mapping as JSON, without settings
+    # first the library materials that are used, then those of the caller, then the values of CSV files
     settings: tuple[Setting, ...] = field(repr=False, compare=False)
-    fits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    data: measurements.Measurements | None = None
+    fits: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # bounds of the parameters to fit
+    data: Measurements | None = None
     design: tables.Design | None = None
-    distributions: Mapping[str, Distribution] = field(default_factory=dict)
+    distributions: Mapping[str, Distribution] = field(default_factory=dict)  # of the uncertain inputs
     files: tuple[Path, ...] = field(default=(), repr=False, compare=False)
 
     @property

@@ -7,7 +7,7 @@ import re
 import subprocess
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -153,7 +153,7 @@ def verify_scripts(problem: ExportProblem, program: str, dt: float) -> Verificat
     predicted = (
         np.full(measured.shape, problem.e_continuous)
         if code.scheme is None
-        else problem.law.with_phases(PHASES).restitution(steps)
+        else replace(problem.law, phases=PHASES).restitution(steps)
     )
     return Verification(
         program=program,

@@ -214,7 +214,9 @@ def dataset_template(plan: Plan) -> xr.Dataset:
     It has no index: storing it needs none, and building one takes longer than everything else.
     """
     # the coordinates come first in a file
-    dataset = xr.Dataset(coords=plan_coordinates(plan), attrs=provenance_attributes(plan))
+    # the core that the sweep chooses for its trajectories; a calibration or a study runs many sweeps
+    attributes = provenance_attributes(plan) | {"core": plan.solver.core}
+    dataset = xr.Dataset(coords=plan_coordinates(plan), attrs=attributes)
     axes = [axis.name for axis in plan.config.axes]
     # in one call: xarray merges the whole dataset in each call
     return dataset.assign(template(stored_variables(plan), dataset.sizes, axes))
@@ -400,7 +402,7 @@ def provenance_attributes(plan: Plan) -> dict[str, object]:
         "fingerprint": plan.fingerprint,
         "rtol": config.solver.rtol,
         "max_steps": config.solver.max_steps,
-        "core": plan.solver.core,
+        "core": config.solver.core,
         # results of the continuous law have the attributes that they had before there were schemes
         **({} if config.solver.integrator == EXACT else {"integrator": config.solver.integrator}),
         "impact_version": __version__,
