@@ -8,14 +8,16 @@ import json
 import re
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from types import FrameType
 from typing import Any
 
 import numpy as np
 import pytest
 
 import impact
-from impact.config.load import read_config
+from impact.config.load import build, read_config
 from impact.contact.status import Status
 from impact.engine.checkpoint import open_work_folder
 from impact.engine.plan import Plan
@@ -23,6 +25,8 @@ from impact.engine.plugins import read_plugins
 from impact.engine.run import Run
 from impact.errors import ModelError, UsageError
 from impact.results.sweep import find_finished
+
+from .conftest import ROOT
 
 SWEEP = {"e": [0.2, 0.8], "v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 6e9}
 COARSE = {"rtol": 1e-4}
@@ -281,3 +285,29 @@ def test_an_error_of_the_program_is_not_reported_as_one_of_the_model(monkeypatch
     monkeypatch.setattr("impact.contact.simulate.integrate_phases", broken)
     with pytest.raises(KeyError, match="of our own"):
         impact.sweep({"models": "hertz", "sweep": SWEEP, "solver": COARSE})
+
+
+@pytest.mark.parametrize(
+    "act",
+    [
+        lambda: impact.run(model="bilinear", at={"K": 1e6, "e": 0.5}),
+        lambda: impact.run(ROOT / "configs" / "figure6.toml", at={"e": 0.5}),
+        lambda: impact.solve("gharib-hurmuzlu-2012", "e", {"e_out": 0.5}, at={"v1": 2.0}),
+        lambda: impact.timestep("anagnostopoulos-1988", at={"e": 0.5}, steps_per_contact=[20]),
+        lambda: impact.export("opensees", "kelvin-voigt", at={"K": 1e6, "e": 0.6}),
+    ],
+    ids=["run", "run of a file", "solve", "timestep", "export"],
+)
+def test_an_act_reads_the_config_once(act: Callable[[], object]) -> None:
+    readings = 0
+
+    def count(frame: FrameType, event: str, _: object) -> None:
+        nonlocal readings
+        readings += event == "call" and frame.f_code is build.__code__
+
+    sys.setprofile(count)
+    try:
+        act()
+    finally:
+        sys.setprofile(None)
+    assert readings == 1

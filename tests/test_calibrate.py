@@ -49,6 +49,11 @@ def test_a_fit_at_a_bound_is_ranked_last_and_has_no_weight(drops: xr.Dataset) ->
     assert last["weight"] == 0.0
 
 
+def test_the_stored_core_is_the_one_of_fits_where_a_sweep_would_use_numba(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("impact.engine.plan.NUMBA_MIN_TRAJECTORIES", 1)
+    assert impact.calibrate(LINEAR).attrs["core"] == "numpy"
+
+
 def test_curves_and_bands_pass_through_the_predictions(drops: xr.Dataset) -> None:
     law = drops.isel(model=0, output_name=0)
     at_points = np.interp(drops["v1"], drops["grid"], law["curve"])
@@ -320,7 +325,7 @@ def test_the_law_that_made_the_data_is_ranked_first_in_nine_of_ten_sets() -> Non
     from impact.config.load import read_config
     from impact.config.measurements import fitted_parameters
     from impact.inverse.calibrate import prediction
-    from impact.inverse.fit import Bounds, DataPoints, Problem, fit_all
+    from impact.inverse.fit import Bounds, DataPoints, FitProblem, fit_all
 
     speeds = np.geomspace(0.1, 3.0, 20)
     config = read_config(FOLDER / "drops.toml", purpose="calibrate")
@@ -335,7 +340,7 @@ def test_the_law_that_made_the_data_is_ranked_first_in_nine_of_ten_sets() -> Non
     values = {key: functions[key](np.array([[value]]))[0] for key, value in truths.items()}
     sets = [(key, values[key] + 0.01 * random.standard_normal(speeds.size)) for key in [*truths] * 67]
     problems = [
-        Problem(
+        FitProblem(
             model.key,
             Bounds(*np.array([config.fits[name] for name in names[model.key]]).T),
             DataPoints(measured, np.full(speeds.size, 0.01), "given"),

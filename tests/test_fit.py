@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy import stats
 
-from impact.inverse.fit import Bounds, DataPoints, Fit, Problem, fit_all
+from impact.inverse.fit import Bounds, DataPoints, Fit, FitProblem, fit_all
 
 Array = NDArray[np.float64]
 # damping ratio of a linear spring and dashpot with e = 0.5, and de/dzeta there
@@ -71,7 +71,7 @@ def fit(
     key: str, least: list[float], most: list[float], values: Array, sigma: float, noise: str = "given", **data: Any
 ) -> Fit:
     points = DataPoints(values, np.full(values.size, sigma), noise, **data)  # type: ignore[arg-type]
-    (result,) = fit_all([Problem(key, Bounds(np.array(least), np.array(most)), points)], FUNCTIONS)
+    (result,) = fit_all([FitProblem(key, Bounds(np.array(least), np.array(most)), points)], FUNCTIONS)
     return result
 
 
@@ -151,7 +151,7 @@ def test_a_parameter_at_a_bound_is_reported(values: Array, status: str) -> None:
 def test_as_many_points_as_parameters_are_too_few() -> None:
     functions = {"line": lambda rows: rows[:, :1] + rows[:, 1:] * X[:2]}
     data = DataPoints(np.array([0.5, 0.6]), np.full(2, 0.01), "scale")
-    (result,) = fit_all([Problem("line", Bounds(np.full(2, -1.0), np.full(2, 2.0)), data)], functions)
+    (result,) = fit_all([FitProblem("line", Bounds(np.full(2, -1.0), np.full(2, 2.0)), data)], functions)
     assert result.status == "too_few_points"
     assert np.isnan(result.lower).all()
     assert np.isnan(result.aicc)
@@ -160,7 +160,7 @@ def test_as_many_points_as_parameters_are_too_few() -> None:
 def test_a_fit_does_not_depend_on_the_others() -> None:
     random = np.random.default_rng(10)
     problems = [
-        Problem(
+        FitProblem(
             "decay",
             Bounds(np.array([1e-3, 1e-3]), np.array([10.0, 10.0])),
             DataPoints(
@@ -259,7 +259,7 @@ def test_an_end_of_the_allowed_values_is_a_limit_and_no_bound_of_the_search(
     values: Array, is_limit: list[list[bool]] | None, status: str
 ) -> None:
     bounds = Bounds(np.array([0.05]), np.array([0.9]), None if is_limit is None else np.array(is_limit))
-    problem = Problem("zeta", bounds, DataPoints(values, np.full(20, 0.01), "given"))
+    problem = FitProblem("zeta", bounds, DataPoints(values, np.full(20, 0.01), "given"))
     (result,) = fit_all([problem], FUNCTIONS)
     assert result.status == status
 
@@ -272,7 +272,7 @@ def test_coverage_of_400_sets_of_four_specimens(deviation: float) -> None:
     bounds = Bounds(np.array([0.0]), np.array([1.0]))
     sets = [specimens_with_deviations(deviation, sigma, seed) for seed in range(count)]
     data = DataPoints(sets[0], np.full(SPECIMENS.size, sigma), "excess", SPECIMENS)
-    problems = [Problem("constant", bounds, replace(data, values=values)) for values in sets]
+    problems = [FitProblem("constant", bounds, replace(data, values=values)) for values in sets]
     fits = fit_all(problems, FUNCTIONS, leave_one_out=False)
     covered = np.mean([result.lower[0] <= 0.7 <= result.upper[0] for result in fits])
     print(f"deviation {deviation}: coverage {covered:.4f}")
@@ -288,7 +288,7 @@ def test_coverage_and_bias_of_4000_synthetic_sets() -> None:
     random = np.random.default_rng(20261123)
     bounds = Bounds(np.array([0.01]), np.array([0.9]))
     values = restitution(np.array([ZETA])) + sigma * random.standard_normal((count, n))
-    problems = [Problem("zeta", bounds, DataPoints(row, np.full(n, sigma), "given")) for row in values]
+    problems = [FitProblem("zeta", bounds, DataPoints(row, np.full(n, sigma), "given")) for row in values]
     fits = fit_all(problems, FUNCTIONS, leave_one_out=False)
     estimates = np.array([result.estimate[0] for result in fits])
     covered = np.mean([result.lower[0] <= ZETA <= result.upper[0] for result in fits])

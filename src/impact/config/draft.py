@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pydantic_core import PydanticCustomError
 
@@ -33,13 +33,10 @@ from .input_names import InputName, input_values
 from .library import library
 from .lines import MAX_PROBLEM_LINES, key_lines, path_text
 from .quantities import VALUE_FORMS, ConfigProblem, KeyPath
-from .tables import MATERIAL_KEYS, SWEEP_DEFAULTS, SWEEP_QUANTITIES, expand_models
+from .tables import MATERIAL_KEYS, SWEEP_DEFAULTS, SWEEP_QUANTITIES, Loss, Noise, expand_models
 
 # keys of [sweep] that arrange inputs
 NO_INPUTS = (("sweep", "zip"), ("sweep", "cases"))
-
-if TYPE_CHECKING:
-    from .measurements import Measurements
 
 
 @dataclass(frozen=True)
@@ -66,6 +63,22 @@ class Setting:
     def override(self) -> str:
         """PATH=VALUE."""
         return self.text or override_text(self.path, to_plain_data(self.value)[0])
+
+
+@dataclass(frozen=True)
+class Measurements:
+    """Measured points, in SI."""
+
+    file: str  # name of the CSV file as in the config; empty for values in the config
+    lines: tuple[int, ...]  # of each point in the file; its number, from 1, for values in the config
+    inputs: Mapping[str, tuple[float, ...]]  # those that vary from point to point, by config name
+    outputs: Mapping[str, tuple[float, ...]]
+    sigma: Mapping[str, tuple[float, ...]]  # standard deviations of the outputs that have some
+    # "given": sigma as it is; "scale": times a common factor, which also stands for a sigma that is missing; or
+    # "excess": with a variance between specimens added
+    noise: Noise
+    specimens: tuple[str, ...] = ()  # of each point, for the noise "excess"; empty if each point has its own
+    loss: Loss = "linear"
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from ..contact.variables import BY_DEFAULT
 from . import measurements, quantities, tables
 from .columns import expand_cases, named_files, read_files
 from .design import design_problems, distribution_paths, draw_columns, unit_samples
-from .draft import Draft, Setting, add_library_materials, open_config, open_text
+from .draft import Draft, Measurements, Setting, add_library_materials, open_config, open_text
 from .files import as_table, override_text, set_value
 from .grid import MAX_POINTS, Axis, build_grid, chunk_problems
 from .input_names import InputName
@@ -50,7 +50,7 @@ class Config:
     # first the library materials that are used, then those of the caller, then the values of CSV files
     settings: tuple[Setting, ...] = field(repr=False, compare=False)
     fits: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # bounds of the parameters to fit
-    data: measurements.Measurements | None = None
+    data: Measurements | None = None
     design: tables.Design | None = None
     distributions: Mapping[str, Distribution] = field(default_factory=dict)  # of the uncertain inputs
     files: tuple[Path, ...] = field(default=(), repr=False, compare=False)

@@ -14,11 +14,11 @@ from ..errors import ConfigError, did_you_mean
 from ..formatting import number
 from ..text import safe_text
 from .columns import Cells, Columns, contains_path, read_cells, read_csv_of
-from .draft import Draft
+from .draft import Draft, Measurements
 from .files import set_value
 from .input_names import InputName, input_values
 from .quantities import MAX_PROBLEMS, ConfigProblem, KeyPath, Quantity, as_text, value_error
-from .tables import LOSSES, MAX_MEASURED, MIN_SIGMA, NOISES, SWEEP_QUANTITIES, Loss, Noise
+from .tables import LOSSES, MAX_MEASURED, MIN_SIGMA, NOISES, SWEEP_QUANTITIES
 
 SIGMA, SPECIMEN = "sigma", "specimen"
 SPECIMEN_EXPECTED = "got nothing, expected the name of a specimen"
@@ -33,22 +33,6 @@ MEASURED_OUTPUTS = {
     for name, output in OUTPUTS.items()
     if output.measured
 }
-
-
-@dataclass(frozen=True)
-class Measurements:
-    """Measured points, in SI."""
-
-    file: str  # name of the CSV file as in the config; empty for values in the config
-    lines: tuple[int, ...]  # of each point in the file; its number, from 1, for values in the config
-    inputs: Mapping[str, tuple[float, ...]]  # those that vary from point to point, by config name
-    outputs: Mapping[str, tuple[float, ...]]
-    sigma: Mapping[str, tuple[float, ...]]  # standard deviations of the outputs that have some
-    # "given": sigma as it is; "scale": times a common factor, which also stands for a sigma that is missing; or
-    # "excess": with a variance between specimens added
-    noise: Noise
-    specimens: tuple[str, ...] = ()  # of each point, for the noise "excess"; empty if each point has its own
-    loss: Loss = "linear"
 
 
 @dataclass(frozen=True)

@@ -45,6 +45,11 @@ class Collision:
         """Whether the stiffness follows from the materials of both balls."""
         return not self.has_user_stiffness and all(self.materials)
 
+    def require_materials(self, reason: str) -> None:
+        """Refuse a stiffness that does not follow from the materials."""
+        if not self.has_materials:
+            raise UsageError(f"{reason}: expected a material, not K")
+
     @property
     def has_one_material(self) -> bool:
         return self.materials[0] == self.materials[1]

@@ -7,7 +7,7 @@ import re
 import subprocess
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -153,7 +153,7 @@ def verify_scripts(problem: ExportProblem, program: str, dt: float) -> Verificat
     predicted = (
         np.full(measured.shape, problem.e_continuous)
         if code.scheme is None
-        else problem.law.with_phases(PHASES).restitution(steps)
+        else replace(problem.law, phases=PHASES).restitution(steps)
     )
     return Verification(
         program=program,
@@ -165,11 +165,10 @@ def verify_scripts(problem: ExportProblem, program: str, dt: float) -> Verificat
     )
 
 
-def extrapolate(restitutions: Array, order: int = 1) -> tuple[float, float]:
+def extrapolate(restitutions: Array) -> tuple[float, float]:
     """Extrapolate to a step of zero, with the uncertainty, from runs at h, h/2 and h/4, of shape (3, phases)."""
     coarse, middle, fine = restitutions.mean(axis=1)
-    ratio = 2**order
-    first, second = (ratio * middle - coarse) / (ratio - 1), (ratio * fine - middle) / (ratio - 1)
+    first, second = 2.0 * middle - coarse, 2.0 * fine - middle
     return float(second), float(abs(second - first) + np.ptp(restitutions[2]) / 2)
 
 

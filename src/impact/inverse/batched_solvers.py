@@ -31,14 +31,9 @@ class _Stopped(Exception):
 
 
 def run_together(functions: Mapping[str, VectorFunction], solvers: Sequence[Callable[[Evaluate], T]]) -> list[T]:
-    """The results of solvers, whose requests are evaluated in batches.
+    """Run solvers, each called with a function `evaluate(key, rows)`, and evaluate their requests in batches.
 
     A result does not depend on the other solvers, as long as the functions treat each row separately.
-
-    Parameters
-    ----------
-    functions : by key; rows of shape (k, p) to values of shape (k, n)
-    solvers : each is called with a function `evaluate(key, rows)`
 
     >>> def root_of(square):
     ...     def newton(evaluate):
@@ -102,11 +97,11 @@ def _run_threads(functions: Mapping[str, VectorFunction], solvers: Sequence[Call
 def _evaluate_all(
     functions: Mapping[str, VectorFunction], requests: Mapping[int, tuple[str, Array]]
 ) -> dict[int, Array]:
-    """The values of all requests; those of one function are evaluated together, in the order of the solvers."""
+    """Evaluate all requests, those of one function together, in the order of the solvers."""
     values: dict[int, Array] = {}
     for key in dict.fromkeys(key for key, _ in requests.values()):
-        numbers = sorted(number for number, (of, _) in requests.items() if of == key)
+        numbers = sorted(number for number, (requested, _) in requests.items() if requested == key)
         rows = [requests[number][1] for number in numbers]
-        parts = np.split(functions[key](np.concatenate(rows)), np.cumsum([len(part) for part in rows])[:-1])
-        values |= dict(zip(numbers, parts, strict=True))
+        ends = np.cumsum([len(block) for block in rows])
+        values |= dict(zip(numbers, np.split(functions[key](np.concatenate(rows)), ends[:-1]), strict=True))
     return values

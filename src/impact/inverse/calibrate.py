@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
@@ -20,6 +20,7 @@ from ..config.input_names import InputName
 from ..config.load import Config, parse_config, read_config
 from ..config.measurements import fitted_parameters
 from ..config.quantities import KeyPath, Quantity
+from ..config.tables import Solver
 from ..contact.model import ForceModel
 from ..contact.outputs import collide
 from ..contact.units import dimension
@@ -33,7 +34,7 @@ from ..results.calibration import calibration_template
 from ..results.schema import FIT_STATUSES
 from ..results.xarray_backend import save
 from .batched_solvers import VectorFunction
-from .fit import Bounds, DataPoints, Fit, Problem, fit_all, half_widths
+from .fit import Bounds, DataPoints, Fit, FitProblem, fit_all, half_widths
 
 # points of the curve of each law over an input
 CURVE_POINTS = 101
@@ -124,25 +125,14 @@ def calibrate_config(config: Config, plugins: Plugins, jobs: int = 1) -> xr.Data
 def prediction(
     config: Config, model: ForceModel, names: Sequence[str], inputs: Mapping[str, Sequence[float]], points: int
 ) -> VectorFunction:
-    """The outputs of a law as a function of its parameters.
+    """Build the function from parameters, shape (k, len(names)), to outputs of a law, shape (k, outputs points).
 
-    Parameters
-    ----------
-    config : the inputs that do not vary, and the outputs
-    model : the law
-    names : config names of its parameters
-    inputs : values of the inputs that vary from point to point, by config name
-    points : their number, n
-
-    Returns
-    -------
-    Parameters of shape (k, len(names)) to outputs of shape (k, outputs n): all points of the first output, then of
-    the next; NaN where the law has no result
+    All points of the first output come first; NaN where the law has no result.
     """
     assert config.data is not None
     outputs = tuple(config.data.outputs)
     scalars = {name: value for name, value in config.scalars.items() if name not in (*names, *inputs)}
-    core = "numba" if config.solver.core == "numba" else "numpy"
+    solver = fit_solver(config)
 
     def predict(rows: Array) -> Array:
         columns = {name: np.tile(values, len(rows)) for name, values in inputs.items()}
@@ -153,12 +143,7 @@ def prediction(
         swept = Inputs(scalars, (axis,), config.materials)
         impacts = build_impacts(swept, model, swept.index()).broadcast()
         collisions = collide(
-            model,
-            impacts,
-            rtol=config.solver.rtol,
-            max_steps=config.solver.max_steps,
-            core=core,
-            names=outputs,
+            model, impacts, rtol=solver.rtol, max_steps=solver.max_steps, core=solver.core, names=outputs
         )
         # a law on which no column has an effect has one trajectory
         shape = len(rows) * points
@@ -167,6 +152,11 @@ def prediction(
         )
 
     return predict
+
+
+def fit_solver(config: Config) -> Solver:
+    """Choose the core of fits: NumPy, unless the config names numba."""
+    return replace(config.solver, core="numba" if config.solver.core == "numba" else "numpy")
 
 
 def _fit_remotely(key: str, text: str, overrides: Sequence[str], context: WorkerContext) -> FittedLaw:
@@ -190,7 +180,7 @@ def fit_laws(config: Config) -> dict[str, FittedLaw]:
     names = {model.key: fitted_parameters(config.fits, model) for model in config.models}
     problems, functions = [], {}
     for model in config.models:
-        problems.append(Problem(model.key, _bounds(config, names[model.key]), points))
+        problems.append(FitProblem(model.key, _bounds(config, names[model.key]), points))
         functions[model.key] = prediction(config, model, names[model.key], data.inputs, len(data.lines))
     fits = fit_all(problems, functions)
     varied = varied_input(data.inputs)
@@ -214,14 +204,18 @@ def varied_input(inputs: Mapping[str, Sequence[float]]) -> tuple[str, Array]:
     if len(varying) != 1:
         return "", np.array([])
     ((name, column),) = varying.items()
-    least, most = float(column.min()), float(column.max())
-    if least > 0.0 and most / least > LOG_CURVE_RATIO:
-        return name, np.geomspace(least, most, CURVE_POINTS)
-    return name, np.linspace(least, most, CURVE_POINTS)
+    lower, upper = float(column.min()), float(column.max())
+    space = np.geomspace if lower > 0.0 and upper / lower > LOG_CURVE_RATIO else np.linspace
+    return name, space(lower, upper, CURVE_POINTS)
 
 
 def _curve(
-    config: Config, model: ForceModel, names: Sequence[str], fit: Fit, problem: Problem, varied: tuple[str, Array]
+    config: Config,
+    model: ForceModel,
+    names: Sequence[str],
+    fit: Fit,
+    problem: FitProblem,
+    varied: tuple[str, Array],
 ) -> Array:
     """Predict the outputs over the varied input, with the ends of the band of 95 % without the noise."""
     assert config.data is not None
@@ -245,26 +239,20 @@ def _curve(
 
 
 def determined_groups(config: Config, model: ForceModel, names: Sequence[str], fit: Fit) -> list[str]:
-    """What the data determine of the parameters that they do not identify, as products of powers.
-
-    The effective mass m and the closing speed v0 make a product dimensionless where they can.
-    """
-    involved = np.flatnonzero(~fit.identifiable)
-    directions = fit.unidentified[:, involved]
-    positive = all(config.fits[names[number]][0] > 0.0 for number in involved.tolist())
-    if not involved.size or not positive:
+    """Write what the data determine of the other parameters as products of powers, dimensionless by m and v0."""
+    involved = [name for name, is_identifiable in zip(names, fit.identifiable, strict=True) if not is_identifiable]
+    if not involved or any(config.fits[name][0] <= 0.0 for name in involved):
         return []
     # the directions that the data do determine, in reduced echelon form from the last parameter on
-    _, sizes, rows = np.linalg.svd(directions)
+    _, sizes, rows = np.linalg.svd(fit.unidentified[:, ~fit.identifiable])
     complement = rows[np.count_nonzero(sizes > 0.5) :]
-    reduced = _reduced(complement[:, ::-1])[:, ::-1]
+    units = [_quantity(config, name).unit for name in involved]
     groups = []
-    for row in reduced:
+    for row in _reduced(complement[:, ::-1])[:, ::-1].tolist():
         powers = {
-            InputName.parse(names[number]).key: Fraction(float(power)).limit_denominator(MAX_DENOMINATOR)
-            for number, power in zip(involved.tolist(), row, strict=True)
+            InputName.parse(name).key: Fraction(power).limit_denominator(MAX_DENOMINATOR)
+            for name, power in zip(involved, row, strict=True)
         }
-        units = [_quantity(config, names[number]).unit for number in involved.tolist()]
         groups.append(_product(_completion(list(powers.values()), units, config, model) | powers))
     return groups
 
@@ -278,7 +266,7 @@ def _quantity(config: Config, name: str) -> Quantity:
 def _completion(
     powers: Sequence[Fraction], units: Sequence[str], config: Config, model: ForceModel
 ) -> dict[str, Fraction]:
-    """The powers of m and v0 that make a product of powers of parameters dimensionless; empty if none do."""
+    """Find the powers of m and v0 that make a product of powers dimensionless; empty if none do."""
     exponents = {"n": float(model.exponent or config.scalars.get("n", 1.5))}
     mass = length = time = Fraction(0)
     for power, unit in zip(powers, units, strict=True):
@@ -290,7 +278,7 @@ def _completion(
 
 
 def _reduced(rows: Array) -> Array:
-    """Reduced row echelon form."""
+    """Bring rows to reduced row echelon form."""
     rows = rows.copy()
     column = 0
     for row in range(len(rows)):
@@ -308,7 +296,7 @@ def _reduced(rows: Array) -> Array:
 
 
 def _product(powers: Mapping[str, Fraction]) -> str:
-    """A product of powers as text.
+    """Write a product of powers.
 
     >>> _product({"m": Fraction(-1, 2), "C": Fraction(1), "K": Fraction(-1, 2)})
     'C/sqrt(m K)'
@@ -332,10 +320,7 @@ def _factors(powers: Sequence[tuple[str, Fraction]]) -> str:
 
 
 def best_config(config: Config, result: xr.Dataset) -> str:
-    """Write a config in TOML with the best law and its parameters; inputs that vary in the data are axes.
-
-    It has all values in SI units, and needs no other file.
-    """
+    """Write a config of its own in SI units with the best law; inputs that vary in the data are axes."""
     assert config.data is not None
     best = result.isel(model=0)
     key = str(best["model"].item())
@@ -357,13 +342,11 @@ def best_config(config: Config, result: xr.Dataset) -> str:
 
 
 def _calibration_dataset(config: Config, plugins: Plugins, laws: Mapping[str, FittedLaw]) -> xr.Dataset:
-    """Store the fits of laws, the best law first: by AICc, those without one last, by chi2.
-
-    A law at a bound is ranked by what it reaches there: a wider search can only improve it.
-    """
+    """Store the fits of laws, the best law first: by AICc, those without one last, by chi2."""
     assert config.data is not None
     models = {model.key: model for model in config.models}
 
+    # a law at a bound is ranked by what it reaches there: a wider search can only improve it
     def rank(key: str) -> list[float]:
         fit = laws[key].fit
         return [math.inf if math.isnan(value) else value for value in (fit.aicc, fit.chi2_reduced)]
@@ -372,7 +355,8 @@ def _calibration_dataset(config: Config, plugins: Plugins, laws: Mapping[str, Fi
     fits = [laws[key].fit for key in keys]
     parameters = list(config.fits)
     varied = varied_input(config.data.inputs)
-    dataset = calibration_template(config, [models[key] for key in keys], plugins, varied)
+    fitted = replace(config, solver=fit_solver(config))
+    dataset = calibration_template(fitted, [models[key] for key in keys], plugins, varied)
     shape = (len(keys), len(parameters))
     arrays = {name: np.full(shape, np.nan) for name in ("estimate", "lower", "upper")}
     covariance = np.full((*shape, len(parameters)), np.nan)
@@ -402,7 +386,7 @@ def _calibration_dataset(config: Config, plugins: Plugins, laws: Mapping[str, Fi
 
 
 def akaike_weights(aicc: Mapping[str, float]) -> dict[str, float]:
-    """Weights of laws from their AICc; 0 for those without one.
+    """Weigh laws by their AICc; 0 for those without one.
 
     >>> akaike_weights({"hertz": 3.0, "tsuji-1992": 3.0, "bilinear": math.nan})
     {'hertz': 0.5, 'tsuji-1992': 0.5, 'bilinear': 0.0}

@@ -13,7 +13,7 @@ with closed forms of linear regression and with simulations.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Literal, TypeAlias, TypeVar
@@ -61,68 +61,53 @@ SCANNED_EXCESS = np.concatenate([[0.0], np.geomspace(1e-8, 10.0, 64)])
 
 @dataclass(frozen=True)
 class Bounds:
-    """Least and largest values of parameters, shape (p,), and the scale of each between them.
+    """Bounds of parameters, shape (p,), and their scale u in [0, 1]: logarithmic if positive and far apart."""
 
-    The solver works with u in [0, 1]: linear between the bounds, or logarithmic where they are positive and far
-    apart.
-
-    `is_limit` has shape (2, p): whether the least, and whether the largest value is an end of the allowed values
-    of the parameter, not only of the search; None if none is.
-    """
-
-    least: Array
-    most: Array
+    lower: Array
+    upper: Array
+    # shape (2, p): whether each bound is an end of the allowed values, not only of the search
     is_limit: Mask | None = None
 
     @property
     def is_log(self) -> Mask:
-        positive = self.least > 0.0
-        ratio = np.divide(self.most, self.least, out=np.ones_like(self.most), where=positive)
+        positive = self.lower > 0.0
+        ratio = np.divide(self.upper, self.lower, out=np.ones_like(self.upper), where=positive)
         return positive & (ratio > LOG_RATIO)
 
     def values(self, u: Array) -> Array:
-        """Parameters of rows u, shape (..., p)."""
-        least, most = np.where(self.is_log, self.least, 1.0), np.where(self.is_log, self.most, 1.0)
-        between = self.least + u * (self.most - self.least)
+        """Convert rows u to parameters, shape (..., p)."""
+        lower, upper = np.where(self.is_log, self.lower, 1.0), np.where(self.is_log, self.upper, 1.0)
+        between = self.lower + u * (self.upper - self.lower)
         # a bound is met exactly
-        between = np.where(u == 1.0, self.most, between)
-        return np.where(self.is_log, np.clip(least * (most / least) ** u, least, most), between)
+        between = np.where(u == 1.0, self.upper, between)
+        return np.where(self.is_log, np.clip(lower * (upper / lower) ** u, lower, upper), between)
 
     def units(self, values: Array) -> Array:
-        """The u of parameters, shape (..., p)."""
-        least, most = np.where(self.is_log, self.least, 1.0), np.where(self.is_log, self.most, np.e)
+        """Convert parameters to u, shape (..., p)."""
+        lower, upper = np.where(self.is_log, self.lower, 1.0), np.where(self.is_log, self.upper, np.e)
         positive = np.where(self.is_log, values, 1.0)
-        log_u = np.log(positive / least) / np.log(most / least)
-        return np.where(self.is_log, log_u, (values - self.least) / (self.most - self.least))
+        log_u = np.log(positive / lower) / np.log(upper / lower)
+        return np.where(self.is_log, log_u, (values - self.lower) / (self.upper - self.lower))
 
     def slope(self, u: Array) -> Array:
-        """Derivative of each parameter by its u, shape (p,)."""
-        least, most = np.where(self.is_log, self.least, 1.0), np.where(self.is_log, self.most, np.e)
-        return np.where(self.is_log, self.values(u) * np.log(most / least), self.most - self.least)
+        """Differentiate each parameter by its u, shape (p,)."""
+        lower, upper = np.where(self.is_log, self.lower, 1.0), np.where(self.is_log, self.upper, np.e)
+        return np.where(self.is_log, self.values(u) * np.log(upper / lower), self.upper - self.lower)
 
 
 @dataclass(frozen=True)
 class DataPoints:
-    """Measured values with their standard deviations, each of shape (n,).
-
-    `specimens` are the numbers, from 0, of the specimens of the points, shape (n,); None if each point has its
-    own.
-    """
+    """Measured values with their standard deviations, each of shape (n,)."""
 
     values: Array
     sigma: Array
     noise: Noise
+    # numbers from 0, shape (n,); None if each point has its own specimen
     specimens: NDArray[np.intp] | None = None
     loss: Loss = "linear"
 
-    def without(self, point: int) -> DataPoints:
-        """The measurements without one: its standard deviation is infinite."""
-        sigma = self.sigma.copy()
-        sigma[point] = np.inf
-        return replace(self, sigma=sigma)
-
     def specimen_sums(self, values: Array) -> Array:
-        """The sums over the points of each specimen, shape (..., n) to (..., specimens)."""
+        """Sum over the points of each specimen, shape (..., n) to (..., specimens)."""
         if self.specimens is None:
             return values
         sums = np.zeros((*values.shape[:-1], int(self.specimens.max()) + 1))
@@ -130,16 +115,16 @@ class DataPoints:
         return sums
 
     def at_points(self, values: Array) -> Array:
-        """Values of specimens at their points, shape (..., specimens) to (..., n)."""
+        """Spread values of specimens to their points, shape (..., specimens) to (..., n)."""
         return values if self.specimens is None else values[..., self.specimens]
 
     @cached_property
     def precision(self) -> Array:
-        """The sum of 1/sigma^2 over the points of each specimen, shape (specimens,)."""
+        """Sum 1/sigma^2 over the points of each specimen, shape (specimens,)."""
         return self.specimen_sums(self.sigma**-2.0)
 
     def whiten(self, scaled: Array, excess: float) -> Array:
-        """Independent residuals with a variance of 1: V^(-1/2) r, shape (..., n), from r/sigma."""
+        """Compute independent residuals with a variance of 1: V^(-1/2) r, shape (..., n), from r/sigma."""
         if excess == 0.0:
             return scaled
         p = self.precision
@@ -163,31 +148,26 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Fit:
-    """A fit of a model to measurements.
+    """The fit of a model with p parameters to n measurements.
 
     Parameters
     ----------
-    status : "ok"; "at_limit" where a parameter is at an end of its allowed values, "at_bound" at one of the search
-        alone; "not_converged", "too_few_points", or "no_prediction" where the model has no result at a point
+    status : "at_limit" at an end of the allowed values of a parameter, "at_bound" at one of the search alone
     estimate : parameters, shape (p,)
     lower, upper : ends of the intervals of 95 % by profile likelihood, shape (p,); NaN where a parameter is not
         identified; a bound where the interval reaches it
-    covariance : of the parameters, shape (p, p), in the linear approximation
-    covariance_deviation : its standard deviation, as far as the noise is estimated; see `half_widths`
+    covariance, covariance_deviation : of the parameters in the linear approximation, and its standard deviation,
+        as far as the noise is estimated, shape (p, p)
     identifiable : whether the measurements determine each parameter, shape (p,)
     unidentified : directions in the logarithms of the parameters (in units of the bounds for those that may be
         negative or zero) that do not change the prediction, shape (k, p)
     predicted, residual : at the points; the residual is measured minus predicted, shape (n,)
     jacobian : derivatives of the predictions by the parameters, shape (n, p)
-    chi2_reduced : chi2 over the degrees of freedom; with noise "scale" the variance of the points in units of the
-        given variances
+    chi2_reduced : with noise "scale" the variance of the points in units of the given variances
     p_value : probability of a larger chi2; NaN where the noise is estimated from the residuals
-    excess : see `Estimate`
     aicc : corrected information criterion of Akaike; NaN with too few points
-    loo : root mean square of the residuals of each point in the fit without it, in units of its given standard
-        deviation
-    loo_residual : the residuals of each point in the fit without it, in their own standard deviations and in the
-        linear approximation, shape (n,)
+    loo : root mean square of the residuals of each point in the fit without it, in its given standard deviations
+    loo_residual : those residuals in their own standard deviations, in the linear approximation, shape (n,)
     """
 
     status: FitStatus
@@ -210,21 +190,18 @@ class Fit:
 
 
 @dataclass(frozen=True)
-class Problem:
-    """A model, the bounds of its parameters and the measurements.
+class FitProblem:
+    """A model with parameters in bounds, and the measurements."""
 
-    `key` names the function of `run_together` that predicts, from rows of parameters of shape (k, p), values of
-    shape (k, n).
-    """
-
+    # of the function of `run_together` that predicts from rows of parameters, shape (k, p) to (k, n)
     key: str
     bounds: Bounds
     data: DataPoints
 
     @property
     def count(self) -> int:
-        """Number of parameters."""
-        return self.bounds.least.size
+        """Count the parameters."""
+        return self.bounds.lower.size
 
     @property
     def is_determined(self) -> bool:
@@ -232,16 +209,20 @@ class Problem:
         return self.data.values.size > self.count + (self.data.noise != "given")
 
     def predict(self, evaluate: Evaluate, u: Array) -> Array:
-        """Predictions of rows u, shape (k, p) to (k, n)."""
+        """Predict the measurements from rows u, shape (k, p) to (k, n)."""
         return evaluate(self.key, self.bounds.values(u))
 
+    def scale(self, predicted: Array) -> Array:
+        """Subtract the measurements from predictions, in given standard deviations, shape (..., n)."""
+        difference = (predicted - self.data.values) / self.data.sigma
+        return np.where(np.isfinite(difference), difference, NO_PREDICTION)
+
     def residuals(self, evaluate: Evaluate, u: Array, excess: float = 0.0) -> Array:
-        """Independent residuals of rows u in standard deviations, shape (k, n)."""
-        difference = (self.predict(evaluate, u) - self.data.values) / self.data.sigma
-        return self.data.whiten(np.where(np.isfinite(difference), difference, NO_PREDICTION), excess)
+        """Compute the independent residuals of rows u in standard deviations, shape (k, n)."""
+        return self.data.whiten(self.scale(self.predict(evaluate, u)), excess)
 
     def slopes(self, evaluate: Evaluate, u: Array, free: NDArray[np.intp], excess: float) -> Array:
-        """Derivatives of the residuals by the free ones of u, shape (n, len(free)), in one evaluation."""
+        """Differentiate the residuals by the free ones of u, shape (n, len(free)), in one evaluation."""
         low, high = np.maximum(u[free] - STEP, 0.0), np.minimum(u[free] + STEP, 1.0)
         rows = np.tile(u, (2 * free.size, 1))
         rows[np.arange(free.size), free], rows[free.size + np.arange(free.size), free] = low, high
@@ -250,8 +231,8 @@ class Problem:
         return slopes
 
 
-def scan(problem: Problem, evaluate: Evaluate) -> Array:
-    """The u that are starts of a fit: the best of a Sobol sequence, shape (N_STARTS, p)."""
+def scan(problem: FitProblem, evaluate: Evaluate) -> Array:
+    """Find the starts u of a fit: the best of a Sobol sequence, shape (N_STARTS, p)."""
     if not problem.count:
         return np.zeros((1, 0))
     # the sequence begins at 0; half a cell away from it, no bound is tried
@@ -262,22 +243,18 @@ def scan(problem: Problem, evaluate: Evaluate) -> Array:
 
 
 def minimize(
-    problem: Problem,
-    evaluate: Evaluate,
+    problem: FitProblem,
     start: Array,
+    evaluate: Evaluate,
     *,
     fixed: int | None = None,
     excess: float | None = None,
     taken: Array | None = None,
     tolerance: float = SOLVER_TOLERANCE,
 ) -> Estimate:
-    """Find the local minimum of the objective from a start u.
-
-    The parameter `fixed` stays at its start; an `excess` of None is found if the noise asks for it; for `taken`
-    see `ExcessLikelihood`.
-    """
+    """Find the local minimum of the objective from a start u, at which the parameter `fixed` stays."""
     if problem.data.noise == "excess" and excess is None:
-        return _minimize_with_excess(problem, evaluate, start, fixed, taken, tolerance)
+        return _minimize_with_excess(problem, start, evaluate, fixed, taken, tolerance)
     excess = excess or 0.0
     free = np.array([number for number in range(problem.count) if number != fixed], np.intp)
 
@@ -291,9 +268,8 @@ def minimize(
         return np.asarray(values)
 
     if not free.size:
-        return Estimate(
-            start, float(LOSS_DERIVATIVES[problem.data.loss](residuals(start[free]))[0].sum()), excess, True
-        )
+        loss, *_ = LOSS_DERIVATIVES[problem.data.loss](residuals(start[free]))
+        return Estimate(start, float(loss.sum()), excess, True)
 
     def slopes(free_u: Array) -> Array:
         return problem.slopes(evaluate, full(free_u), free, excess)
@@ -316,9 +292,9 @@ def minimize(
 
 
 def _minimize_with_excess(
-    problem: Problem, evaluate: Evaluate, start: Array, fixed: int | None, taken: Array | None, tolerance: float
+    problem: FitProblem, start: Array, evaluate: Evaluate, fixed: int | None, taken: Array | None, tolerance: float
 ) -> Estimate:
-    """The minimum over the parameters and the excess deviation, each in turn: their information is independent."""
+    """Minimize over the parameters and the excess deviation in turn: their information is independent."""
     is_coarse = tolerance >= COARSE_TOLERANCE
     accuracy = COARSE_EXCESS_TOLERANCE if is_coarse else EXCESS_TOLERANCE
     best = Estimate(start, math.inf, -1.0, False)
@@ -328,19 +304,14 @@ def _minimize_with_excess(
         excess = likelihood.best()
         if abs(excess - best.excess) <= accuracy * excess:
             return replace(best, objective=likelihood.objective(best.excess**2))
-        best = minimize(problem, evaluate, best.u, fixed=fixed, excess=excess, tolerance=tolerance)
+        best = minimize(problem, best.u, evaluate, fixed=fixed, excess=excess, tolerance=tolerance)
     return replace(best, objective=likelihood.objective(best.excess**2), converged=False)
 
 
 class ExcessLikelihood:
-    """The likelihood of residuals as a function of the excess variance.
+    """The likelihood of residuals over sigma, shape (n,), as a function of the excess variance.
 
-    Parameters
-    ----------
-    data : the measurements
-    scaled : residuals over the given standard deviations, shape (n,)
-    taken : orthonormal directions of `scaled` that the parameters take up, shape (n, r), for the restricted
-        likelihood; None for the likelihood
+    It is the restricted one if `taken` are the orthonormal directions that the parameters take up, shape (n, r).
     """
 
     def __init__(self, data: DataPoints, scaled: Array, taken: Array | None = None) -> None:
@@ -349,25 +320,25 @@ class ExcessLikelihood:
         self.deviation, self.taken_sums = (data.specimen_sums(z / data.sigma) for z in (scaled, self.taken))
 
     def objective(self, variance: float) -> float:
-        """Minus twice the logarithm of the likelihood, without the part that sigma alone determines."""
+        """Compute minus twice the log likelihood, without the part that sigma alone determines."""
         white = self.data.whiten(self.scaled, math.sqrt(variance))
         growth = 1.0 + variance * self.data.precision
         sign, determinant = np.linalg.slogdet(self._left(variance))
         return float(white @ white + np.log(growth).sum() + determinant) if sign > 0.0 else math.inf
 
     def slope(self, variance: float) -> float:
-        """The derivative of the objective by the variance."""
+        """Differentiate the objective by the variance."""
         growth = 1.0 + variance * self.data.precision
         change = np.linalg.pinv(self._left(variance)) @ (self.taken_sums / growth**2) @ self.taken_sums.T
         return float((self.data.precision / growth - (self.deviation / growth) ** 2).sum() - np.trace(change))
 
     def _left(self, variance: float) -> Array:
-        """Q^T V^(-1) Q in units of the given variances, where Q are the directions taken."""
+        """Compute Q^T V^(-1) Q in units of the given variances, where Q are the directions taken."""
         white = self.data.whiten(self.taken, math.sqrt(variance))
         return white @ white.T
 
     def best(self) -> float:
-        """The standard deviation between specimens of the largest likelihood."""
+        """Find the standard deviation between specimens of the largest likelihood."""
         largest = (self.deviation / np.where(self.data.precision > 0.0, self.data.precision, 1.0)) ** 2
         tried = SCANNED_EXCESS * largest.max()
         number = int(np.argmin([self.objective(variance) for variance in tried]))
@@ -391,47 +362,41 @@ LOSS_DERIVATIVES: Mapping[str, Callable[[Array], tuple[Array, Array, Array]]] = 
 
 
 def profile_end(
-    problem: Problem,
-    evaluate: Evaluate,
+    problem: FitProblem,
     best: Estimate,
+    taken: Array | None,
     parameter: int,
-    direction: int,
     rise: float,
     width: float,
-    taken: Array | None = None,
+    direction: int,
+    evaluate: Evaluate,
 ) -> float:
-    """Find the u of a parameter at which the least objective over the others has risen by `rise`; at most a bound.
-
-    `direction` is -1 for the lower and 1 for the upper end, and `width` the expected distance, in u.
-    """
+    """Find the u, about `width` from the best, where the least objective over the others is `rise` higher."""
     bound = 0.0 if direction < 0 else 1.0
-    centre = float(best.u[parameter])
-    # brentq asks again for values that it has seen, and a search from another start may end elsewhere
+    inner = centre = float(best.u[parameter])
+    # a root finder needs a function: a search from another start may end elsewhere
     known = {centre: (-rise, best.u)}
 
     def surplus(value: float) -> float:
         if value not in known:
             start = known[min(known, key=lambda other: abs(other - value))][1].copy()
             start[parameter] = value
-            estimate = minimize(problem, evaluate, start, fixed=parameter, taken=taken, tolerance=COARSE_TOLERANCE)
+            estimate = minimize(problem, start, evaluate, fixed=parameter, taken=taken, tolerance=COARSE_TOLERANCE)
             known[value] = estimate.objective - best.objective - rise, estimate.u
         return known[value][0]
 
-    inner = centre
     for number in range(MAX_BRACKETS):
-        outer = centre + direction * width * 1.5**number
-        is_bound = (outer - bound) * direction >= 0.0
-        outer = bound if is_bound else outer
+        outer = min(max(centre + direction * width * 1.5**number, 0.0), 1.0)
         if surplus(outer) > 0.0:
             return float(brentq(surplus, inner, outer, xtol=PROFILE_XTOL * width, rtol=1e-12))
-        if is_bound:
+        if outer == bound:
             break
         inner = outer
     return bound
 
 
-def final_jacobian(problem: Problem, evaluate: Evaluate, u: Array) -> tuple[Array, Array]:
-    """The predictions, shape (n,), and their derivatives by u, shape (n, p), of fourth order inside the bounds."""
+def final_jacobian(problem: FitProblem, evaluate: Evaluate, u: Array) -> tuple[Array, Array]:
+    """Predict, shape (n,), with derivatives by u, shape (n, p), of fourth order inside the bounds."""
     count = problem.count
     steps = np.minimum(FINAL_STEP, 0.5 * np.minimum(u, 1.0 - u))
     inside = steps > 1e-2 * FINAL_STEP
@@ -455,37 +420,8 @@ def final_jacobian(problem: Problem, evaluate: Evaluate, u: Array) -> tuple[Arra
     return predicted[-1], jacobian
 
 
-def log_slopes(problem: Problem, u: Array) -> Array:
-    """Derivative of each u by the logarithm of its parameter, or by itself where the parameter may be zero."""
-    values = problem.bounds.values(u)
-    positive = problem.bounds.least > 0.0
-    slope: Array = np.where(positive, values / problem.bounds.slope(u), 1.0)
-    return slope
-
-
-def find_unidentified(jacobian: Array) -> Array:
-    """Directions that change no prediction, shape (k, p), from derivatives in units of sigma, shape (n, p)."""
-    if not jacobian.shape[1]:
-        return np.zeros((0, 0))
-    _, sizes, directions = np.linalg.svd(jacobian, full_matrices=True)
-    sizes = np.concatenate([sizes, np.zeros(jacobian.shape[1] - sizes.size)])
-    largest = sizes.max(initial=0.0)
-    unidentified: Array = directions[sizes <= RANK_RTOL * largest] if largest > 0.0 else directions
-    return unidentified
-
-
-def directions_taken(jacobian: Array) -> Array:
-    """Orthonormal combinations of points that the parameters take up, shape (n, r), from derivatives (n, p)."""
-    left, sizes, _ = np.linalg.svd(jacobian, full_matrices=False)
-    taken: Array = left[:, sizes > RANK_RTOL * sizes.max(initial=0.0)]
-    return taken
-
-
-def information(problem: Problem, objective: float) -> float:
-    """AICc, of the largest likelihood with normal errors; NaN with too few points.
-
-    With a loss, its sum takes the place of the squares.
-    """
+def information(problem: FitProblem, objective: float) -> float:
+    """Compute the AICc of the largest likelihood with normal errors, or of a loss; NaN with too few points."""
     data = problem.data
     n, parameters = data.values.size, problem.count + (data.noise != "given")
     if n - parameters - 1 <= 0:
@@ -497,25 +433,19 @@ def information(problem: Problem, objective: float) -> float:
 
 
 def degrees_of_freedom(variance: Array, deviation: Array) -> Array:
-    """Satterthwaite's degrees of freedom of variances with these standard deviations, at least 1."""
+    """Estimate Satterthwaite's degrees of freedom of variances with these standard deviations, at least 1."""
     with np.errstate(divide="ignore", invalid="ignore"):
         freedom = np.where(deviation > 0.0, 2.0 * (variance / deviation) ** 2, np.inf)
     return np.maximum(freedom, 1.0)
 
 
 def t_quantile(freedom: Array) -> Array:
-    """The distance of an end of an interval of 95 % from the estimate, in standard deviations."""
+    """Find the distance of an end of an interval of 95 % from the estimate, in standard deviations."""
     return np.asarray(t.ppf(0.5 + CONFIDENCE / 2, freedom))
 
 
 def half_widths(covariance: Array, covariance_deviation: Array, directions: Array) -> Array:
-    """Half the widths of intervals of 95 % of linear functions of the parameters, shape (k,).
-
-    Parameters
-    ----------
-    covariance, covariance_deviation : see `Fit`
-    directions : gradients of the functions, shape (k, p)
-    """
+    """Find the half-widths of intervals of 95 % of functions with gradients `directions`, shape (k, p) to (k,)."""
     variance, deviation = (
         np.maximum(np.einsum("kp,pq,kq->k", directions, matrix, directions), 0.0)
         for matrix in (covariance, covariance_deviation)
@@ -525,7 +455,7 @@ def half_widths(covariance: Array, covariance_deviation: Array, directions: Arra
 
 
 def best_of(estimates: Sequence[Estimate]) -> Estimate:
-    """The estimate with the least objective; of equal ones, one that converged."""
+    """Choose the estimate with the least objective; of equal ones, one that converged."""
     least = min(estimate.objective for estimate in estimates)
     near = [estimate for estimate in estimates if estimate.objective <= least + 1e-9 * abs(least) + 1e-12]
     return min(near, key=lambda estimate: not estimate.converged)
@@ -533,12 +463,10 @@ def best_of(estimates: Sequence[Estimate]) -> Estimate:
 
 @dataclass(frozen=True)
 class _Minimum:
-    """A minimum, with the predictions and their derivatives there.
+    """A minimum of the objective, and the statistics of the fit there."""
 
-    `objective` is that of the largest likelihood; with noise "excess" the minimum is that of the restricted one.
-    """
-
-    problem: Problem
+    problem: FitProblem
+    # of the largest likelihood; with noise "excess" the minimum is that of the restricted one
     objective: float
     best: Estimate
     predicted: Array
@@ -546,30 +474,34 @@ class _Minimum:
 
     @cached_property
     def scaled_jacobian(self) -> Array:
-        """The derivatives in given standard deviations, shape (n, p)."""
+        """Scale the derivatives to given standard deviations, shape (n, p)."""
         return np.where(np.isfinite(self.jacobian), self.jacobian, 0.0) / self.problem.data.sigma[:, None]
 
     @cached_property
     def scaled_residual(self) -> Array:
-        """Predicted minus measured in given standard deviations, shape (n,)."""
-        data = self.problem.data
-        scaled = (self.predicted - data.values) / data.sigma
-        return np.where(np.isfinite(scaled), scaled, NO_PREDICTION)
+        """Subtract the measurements, in given standard deviations, shape (n,)."""
+        return self.problem.scale(self.predicted)
 
     @cached_property
     def white_jacobian(self) -> Array:
-        """The derivatives of the independent residuals, shape (n, p)."""
+        """Differentiate the independent residuals, shape (n, p)."""
         return self.problem.data.whiten(self.scaled_jacobian.T, self.best.excess).T
 
     @cached_property
     def white_residual(self) -> Array:
-        """Independent residuals, shape (n,)."""
+        """Compute the independent residuals, shape (n,)."""
         return self.problem.data.whiten(self.scaled_residual, self.best.excess)
 
     @cached_property
     def unidentified(self) -> Array:
         """See `Fit`."""
-        return find_unidentified(self.white_jacobian * log_slopes(self.problem, self.best.u))
+        bounds, u = self.problem.bounds, self.best.u
+        # by the logarithm of each parameter, or by itself where it may be zero
+        slope = np.where(bounds.lower > 0.0, bounds.values(u) / bounds.slope(u), 1.0)
+        _, sizes, directions = np.linalg.svd(self.white_jacobian * slope, full_matrices=True)
+        sizes = np.concatenate([sizes, np.zeros(slope.size - sizes.size)])
+        unidentified: Array = directions[sizes <= RANK_RTOL * sizes.max(initial=0.0)]
+        return unidentified
 
     @property
     def identifiable(self) -> Mask:
@@ -582,38 +514,35 @@ class _Minimum:
 
     @cached_property
     def variance_factors(self) -> tuple[float, float]:
-        """The factors of the covariance and of the rise of the objective that the residuals give.
-
-        With noise "scale" that of the variances; with a loss, those of M-estimates from the means of its squared
-        first and of its second derivative.
-        """
+        """Estimate the factors of the covariance and of the rise of the objective from the residuals."""
         data = self.problem.data
         if data.noise == "scale":
             return (self.best.objective / max(self.freedom, 1),) * 2
         if data.loss == "linear":
             return 1.0, 1.0
+        # an M-estimate: means of the squared first and of the second derivative of the loss
         _, slope, curvature = LOSS_DERIVATIVES[data.loss](self.white_residual)
         squares, mean = float(slope @ slope) / max(self.freedom, 1), float(curvature.mean())
         return (squares / mean**2, squares / mean) if mean > 0.0 else (math.nan, math.nan)
 
     @cached_property
     def inverse(self) -> Array:
-        """(J^T V^(-1) J)^(-1) without the directions that are not identified, shape (p, p)."""
+        """Invert J^T V^(-1) J without the directions that are not identified, shape (p, p)."""
         information = self.white_jacobian.T @ self.white_jacobian
         return np.asarray(np.linalg.pinv(information, rcond=RANK_RTOL**2, hermitian=True), float)
 
     @cached_property
     def covariance(self) -> Array:
-        """Covariance of u, shape (p, p); NaN for parameters without one."""
+        """Estimate the covariance of u, shape (p, p); NaN for parameters without one."""
         covariance = np.full((self.problem.count,) * 2, np.nan)
         if self.problem.is_determined:
-            where = np.ix_(self.identifiable, self.identifiable)
-            covariance[where] = (self.variance_factors[0] * self.inverse)[where]
+            block = np.ix_(self.identifiable, self.identifiable)
+            covariance[block] = (self.variance_factors[0] * self.inverse)[block]
         return covariance
 
     @cached_property
     def covariance_deviation(self) -> Array:
-        """Standard deviation of the covariance of u, shape (p, p)."""
+        """Estimate the standard deviation of the covariance of u, shape (p, p)."""
         data = self.problem.data
         if data.noise == "scale" or data.loss != "linear":
             return self.covariance * math.sqrt(2.0 / max(self.freedom, 1))
@@ -632,11 +561,14 @@ class _Minimum:
     @cached_property
     def taken(self) -> Array | None:
         """See `ExcessLikelihood`."""
-        return directions_taken(self.scaled_jacobian) if self.problem.data.noise == "excess" else None
+        if self.problem.data.noise != "excess":
+            return None
+        left, sizes, _ = np.linalg.svd(self.scaled_jacobian, full_matrices=False)
+        return np.asarray(left[:, sizes > RANK_RTOL * sizes.max(initial=0.0)])
 
-    def end_tasks(self) -> list[Callable[[Evaluate], tuple[int, int, float]]]:
+    def end_tasks(self) -> list[Callable[[Evaluate], float]]:
         """Find both ends of the interval of each parameter that has a variance."""
-        tasks: list[Callable[[Evaluate], tuple[int, int, float]]] = []
+        tasks: list[Callable[[Evaluate], float]] = []
         variances = np.diag(self.covariance)
         freedom = degrees_of_freedom(variances, np.diag(self.covariance_deviation))
         quantiles, best = t_quantile(freedom), self.best
@@ -649,7 +581,7 @@ class _Minimum:
             rises[finite] = freedom[finite] * np.log1p(rises[finite] / freedom[finite])
         for parameter in np.flatnonzero(variances > 0.0).tolist():
             width = float(quantiles[parameter] * math.sqrt(variances[parameter]))
-            end = partial(_end, self.problem, best, self.taken, parameter, float(rises[parameter]), width)
+            end = partial(profile_end, self.problem, best, self.taken, parameter, float(rises[parameter]), width)
             tasks += [partial(end, direction) for direction in (-1, 1)]
         return tasks
 
@@ -674,12 +606,11 @@ class _Minimum:
         points = self.problem.data.values.size if self.problem.is_determined else 0
         return [partial(_prediction_without, self.problem, self.best, point) for point in range(points)]
 
-    def result(self, ends: Iterable[tuple[int, int, float]], predictions: Sequence[float]) -> Fit:
-        """The fit, from the results of both kinds of tasks."""
+    def result(self, ends: Sequence[float], predictions: Sequence[float]) -> Fit:
+        """Collect the fit, with the results of both kinds of tasks."""
         problem, best = self.problem, self.best
-        lower, upper = np.full(problem.count, np.nan), np.full(problem.count, np.nan)
-        for parameter, direction, u in ends:
-            (lower if direction < 0 else upper)[parameter] = u
+        lower, upper = intervals = np.full((2, problem.count), np.nan)
+        intervals[:, np.diag(self.covariance) > 0.0] = np.reshape(ends, (-1, 2)).T
         slope = problem.bounds.slope(best.u)
         data, squares = problem.data, float(self.white_residual @ self.white_residual)
         left_out = (data.values - np.array(predictions)) / data.sigma if predictions else np.array([np.nan])
@@ -718,22 +649,18 @@ class _Minimum:
 
 
 def fit_all(
-    problems: Sequence[Problem], functions: Mapping[str, VectorFunction], *, leave_one_out: bool = True
+    problems: Sequence[FitProblem], functions: Mapping[str, VectorFunction], *, leave_one_out: bool = True
 ) -> list[Fit]:
-    """The fits of problems; the starts, intervals and leave-one-out fits of all of them run at the same time.
-
-    A fit does not depend on the other problems.
-    """
+    """Fit problems at the same time; a fit does not depend on the other problems."""
     starts = run_together(functions, [partial(scan, problem) for problem in problems])
     minima = _run_each(
         functions,
         [
-            [partial(_minimize, problem, start) for start in of_problem]
+            [partial(minimize, problem, start) for start in of_problem]
             for problem, of_problem in zip(problems, starts, strict=True)
         ],
     )
-    best = [best_of(estimates) for estimates in minima]
-    pairs = list(zip(problems, best, strict=True))
+    pairs = zip(problems, map(best_of, minima), strict=True)
     fits = run_together(functions, [partial(_minimum, *pair) for pair in pairs])
     ends = _run_each(functions, [minimum.end_tasks() for minimum in fits])
     left_out = _run_each(functions, [minimum.leave_one_out_tasks() if leave_one_out else [] for minimum in fits])
@@ -743,43 +670,24 @@ def fit_all(
 def _run_each(
     functions: Mapping[str, VectorFunction], groups: Sequence[Sequence[Callable[[Evaluate], T]]]
 ) -> list[list[T]]:
-    """The results of groups of tasks, which all run together."""
+    """Run groups of tasks, all at the same time."""
     results = iter(run_together(functions, [task for group in groups for task in group]))
     return [[next(results) for _ in group] for group in groups]
 
 
-# tasks of `run_together`, whose last argument is its function
-
-
-def _minimize(problem: Problem, start: Array, evaluate: Evaluate) -> Estimate:
-    return minimize(problem, evaluate, start)
-
-
-def _minimum(problem: Problem, best: Estimate, evaluate: Evaluate) -> _Minimum:
-    """The minimum of a problem, from that of the likelihood."""
+def _minimum(problem: FitProblem, best: Estimate, evaluate: Evaluate) -> _Minimum:
+    """Evaluate the minimum of a problem, from that of the likelihood."""
     minimum = _Minimum(problem, best.objective, best, *final_jacobian(problem, evaluate, best.u))
     if minimum.taken is None:
         return minimum
-    restricted = minimize(problem, evaluate, best.u, taken=minimum.taken)
+    restricted = minimize(problem, best.u, evaluate, taken=minimum.taken)
     return _Minimum(problem, best.objective, restricted, *final_jacobian(problem, evaluate, restricted.u))
 
 
-def _end(
-    problem: Problem,
-    best: Estimate,
-    taken: Array | None,
-    parameter: int,
-    rise: float,
-    width: float,
-    direction: int,
-    evaluate: Evaluate,
-) -> tuple[int, int, float]:
-    end = profile_end(problem, evaluate, best, parameter, direction, rise, width, taken)
-    return parameter, direction, end
-
-
-def _prediction_without(problem: Problem, best: Estimate, point: int, evaluate: Evaluate) -> float:
-    """The prediction of a point by the fit without it."""
-    part = replace(problem, data=problem.data.without(point))
-    estimate = minimize(part, evaluate, best.u, excess=best.excess, tolerance=COARSE_TOLERANCE)
+def _prediction_without(problem: FitProblem, best: Estimate, point: int, evaluate: Evaluate) -> float:
+    """Predict a point by the fit without it: its standard deviation is infinite."""
+    sigma = problem.data.sigma.copy()
+    sigma[point] = np.inf
+    others = replace(problem, data=replace(problem.data, sigma=sigma))
+    estimate = minimize(others, best.u, evaluate, excess=best.excess, tolerance=COARSE_TOLERANCE)
     return float(problem.predict(evaluate, estimate.u[None, :])[0, point])

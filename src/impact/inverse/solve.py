@@ -1,4 +1,4 @@
-"""Solve for an input of a law: the value of a parameter, of K, or the e to ask for, that gives a wanted output.
+"""Solve for an input of a law: the value of a parameter, of K, or the e to ask for, that gives a target.
 
 The output is scanned at logarithmically spaced values of the input. Interior extrema of the scan are refined by
 the method of Chandrupatla (1998), Computer Methods in Applied Mechanics and Engineering 152, 211-217, and roots
@@ -13,9 +13,10 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, NoReturn, TypeAlias
+from typing import Any, Literal, NoReturn, TypeAlias
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 from scipy.optimize import elementwise, minimize_scalar
 
@@ -39,9 +40,6 @@ from ..errors import UsageError, did_you_mean
 from ..formatting import number, quantity
 from ..results.single_impact import open_source, single_point
 from ..results.sweep import sweep_in_memory
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 # values that are tried before roots are refined: powers of ten times the contact's own unit of the parameter
 SCAN_DECADES, SCAN_PER_DECADE = 8, 16
@@ -73,16 +71,13 @@ class Root:
 
 @dataclass(frozen=True)
 class SolveResult(Displayed):
-    """The values of an input with which a law gives a wanted output.
+    """The values of an input with which a law gives a target.
 
     Parameters
     ----------
-    model : key of the law
-    name : of the input: a parameter of the law, "K" or "e"
-    unit : SI unit of the input
-    target : the wanted value by variable
-    status : "ok" for one root, "several_roots", "at_bound" where the only root is the least or largest allowed
-        value, "no_root"
+    name : the input: a parameter of the law, "K" or "e"
+    target : value by variable
+    status : "at_bound" where the only root is the least or largest allowed value
     roots : in ascending order; over a range of inputs, the best value
     attainable : the least and the largest value of the target over the scan and its refined extrema, or over a
         range of inputs at the best value, to six digits
@@ -99,24 +94,15 @@ class SolveResult(Displayed):
     over: tuple[Mapping[str, float], ...] | None
 
     def as_dict(self) -> dict[str, Any]:
-        """The result as plain data."""
-        return {
-            "model": self.model,
-            "for": self.name,
-            "unit": self.unit,
-            "target": dict(self.target),
-            "status": self.status,
-            "roots": [asdict(root) for root in self.roots],
-            "attainable": self.attainable,
-            "over": None if self.over is None else [dict(condition) for condition in self.over],
-        }
+        """Convert to plain data."""
+        return {"for" if name == "name" else name: value for name, value in asdict(self).items()}
 
     def records(self) -> Sequence[Mapping[str, Any]]:
-        """The conditions of a range of inputs; without one the roots."""
+        """List the conditions of a range of inputs; without one the roots."""
         return self.over if self.over is not None else [asdict(root) for root in self.roots]
 
     def sections(self, width: int) -> Iterator[Block]:
-        """A line for each root, or the range that can be attained."""
+        """Write a line for each root, or the range that can be attained."""
         ((variable, value),) = self.target.items()
         target = f"{variable} = {number(value)}"
         for root in self.roots:
@@ -193,7 +179,7 @@ def solve(
 
 
 def unknown_of(model: ForceModel, name: str) -> Parameter:
-    """The input to solve for, as a parameter with its unit and bounds.
+    """Describe the input to solve for as a parameter with its unit and bounds.
 
     >>> from impact.contact.models import find
     >>> unknown_of(find("hunt-crossley-1975"), "e").most
@@ -217,8 +203,8 @@ def placeholder(model: ForceModel, unknown: Parameter) -> dict[str, float]:
     return {name: min(max(value, unknown.least), unknown.most)}
 
 
-def check_target(target: Mapping[str, float]) -> tuple[str, float]:
-    """The variable and the value of a target."""
+def solve_input(config: Config, plugins: Plugins, unknown: Parameter, target: Mapping[str, float]) -> SolveResult:
+    """Find all values of an input that give a target; with an axis, the value nearest to it everywhere."""
     names = [name for name, variable in OUTPUTS.items() if variable.dtype == "f8" and "model" in variable.dims]
     if len(target) != 1:
         raise UsageError(f"--target: got {len(target)} targets, expected one, such as e_out=0.6")
@@ -227,23 +213,12 @@ def check_target(target: Mapping[str, float]) -> tuple[str, float]:
         raise UsageError(f'--target: no output "{name}"; {did_you_mean(name, names)}')
     if not (isinstance(value, int | float) and math.isfinite(value)):
         raise UsageError(f"--target {name}: got {value}, expected a finite number")
-    return name, float(value)
-
-
-def solve_input(config: Config, plugins: Plugins, unknown: Parameter, target: Mapping[str, float]) -> SolveResult:
-    """Find the values of an input of a law that give a target.
-
-    Without an axis in the config: all roots, by a scan over the allowed values, whose interior extrema are
-    refined, and Chandrupatla's method between neighbours on different sides of the target. With an axis: the value
-    for which the largest distance from the target over that axis is least.
-    """
-    variable, value = check_target(target)
-    problem = _Problem(config, plugins, unknown, variable)
-    return _best_over_axis(problem, value) if config.axes else _all_roots(problem, value)
+    problem = _SolveProblem(config, plugins, unknown, name)
+    return _best_over_axis(problem, float(value)) if config.axes else _all_roots(problem, float(value))
 
 
 @dataclass(frozen=True)
-class _Problem:
+class _SolveProblem:
     """The target variable as a function of the unknown and of the condition, a position on the axis."""
 
     config: Config
@@ -257,17 +232,17 @@ class _Problem:
 
     @property
     def name(self) -> str:
-        """Config name of the unknown."""
+        """Write the config name of the unknown."""
         name = self.unknown.name
         is_shared = name == "e" or (name == "K" and self.model.exponent is None)
         return name if is_shared else f"{self.model.key}.{name}"
 
     def plan(self, values: Array, conditions: NDArray[np.intp], *, is_scan: bool = False) -> Plan:
-        """The plan that integrates each value under the condition of the same position."""
+        """Plan to integrate each value under the condition of the same position."""
         columns: dict[str, Any] = {self.name: tuple(values.tolist())}
         for axis in self.config.axes:
             for name, column in axis.columns.items():
-                columns[name] = tuple(column[at] for at in conditions.tolist())
+                columns[name] = tuple(column[condition] for condition in conditions.tolist())
         solver = self.config.solver
         replaced = {self.name, "alpha"} if self.name == "e" else {self.name}
         config = replace(
@@ -285,16 +260,9 @@ class _Problem:
     def evaluate(
         self, values: Array, conditions: NDArray[np.intp] | None = None, *, is_scan: bool = False
     ) -> xr.Dataset:
-        """The outputs at some values, along the dimension `trial`; NaN where the integration fails."""
-        at = np.zeros(values.size, np.intp) if conditions is None else conditions
-        return sweep_in_memory(self.plan(values, at, is_scan=is_scan)).isel(model=0)
-
-    def target_values(
-        self, values: Array, conditions: NDArray[np.intp] | None = None, *, is_scan: bool = False
-    ) -> Array:
-        """The target variable at some values, shape (n,); NaN where the integration fails."""
-        result: Array = self.evaluate(values, conditions, is_scan=is_scan)[self.variable].values
-        return result
+        """Compute the outputs at some values, along the dimension `trial`; NaN where the integration fails."""
+        conditions = np.zeros(values.size, np.intp) if conditions is None else conditions
+        return sweep_in_memory(self.plan(values, conditions, is_scan=is_scan)).isel(model=0)
 
     def raise_failure(self, values: Array, conditions: NDArray[np.intp] | None = None) -> NoReturn:
         """Raise a UsageError with the most frequent status of the integrations that fail."""
@@ -304,28 +272,28 @@ class _Problem:
         raise UsageError(f"{self.model.key}: no {self.variable} at any value of {self.unknown.name}: {reason}")
 
     def scan_values(self) -> Array:
-        """The allowed values that are tried first, in ascending order."""
-        least, most = self.unknown.least, self.unknown.most
+        """List the allowed values that are tried first, in ascending order."""
+        lower, upper = self.unknown.least, self.unknown.most
         decades = np.arange(-SCAN_DECADES * SCAN_PER_DECADE, SCAN_DECADES * SCAN_PER_DECADE + 1) / SCAN_PER_DECADE
         sizes = self._scale() * 10.0**decades
-        values = [sizes, np.array([bound for bound in (0.0, least, most) if math.isfinite(bound)])]
-        if least < 0.0:
+        values = [sizes, np.array([bound for bound in (0.0, lower, upper) if math.isfinite(bound)])]
+        if lower < 0.0:
             values.append(-sizes)
-        if math.isfinite(least) and math.isfinite(most):
-            values.append(np.linspace(least, most, SCAN_BETWEEN_BOUNDS))
+        if math.isfinite(lower) and math.isfinite(upper):
+            values.append(np.linspace(lower, upper, SCAN_BETWEEN_BOUNDS))
         all_values: Array = np.unique(np.concatenate(values))
         # a stiffness of zero is no contact
         is_allowed = (all_values > 0.0) | (self.unknown.name != "K")
-        return all_values[is_allowed & (all_values >= least) & (all_values <= most)]
+        return all_values[is_allowed & (all_values >= lower) & (all_values <= upper)]
 
     def unit(self) -> str:
-        """The SI unit of the unknown, with numbers for the names in its exponents."""
+        """Write the SI unit of the unknown, with numbers for the names in its exponents."""
         numbers = {InputName.parse(name).key: v for name, v in self.config.scalars.items() if isinstance(v, float)}
         exponent = {} if self.model.exponent is None else {"n": self.model.exponent}
         return with_numbers(self.unknown.unit, {**numbers, **exponent})
 
     def _scale(self) -> float:
-        """The size of the unknown that is 1 in the contact's own units, or that of its typical value."""
+        """Find the size of the unknown that is 1 in the contact's own units, or that of its typical value."""
         if self.unknown.typical:
             return abs(self.unknown.typical)
         inputs = self.plan(np.ones(1), np.zeros(1, np.intp)).inputs
@@ -341,10 +309,10 @@ class _Problem:
         return unit if 0.0 < unit < math.inf else 1.0
 
 
-def _all_roots(problem: _Problem, target: float) -> SolveResult:
-    """All values that give the target."""
+def _all_roots(problem: _SolveProblem, target: float) -> SolveResult:
+    """Find all values that give the target."""
     scan = problem.scan_values()
-    values = problem.target_values(scan, is_scan=True)
+    values = problem.evaluate(scan, is_scan=True)[problem.variable].values
     if np.isnan(values).all():
         problem.raise_failure(scan)
     # a value at which the integration fails, often for want of steps, hides no root between its neighbours
@@ -353,7 +321,7 @@ def _all_roots(problem: _Problem, target: float) -> SolveResult:
     tolerance = TARGET_TOLERANCE * problem.config.solver.rtol * scale
     is_exact = np.abs(values - target) <= SCAN_TOLERANCE * scale
     is_exact[[values.argmin(), values.argmax()]] = True
-    exact = problem.target_values(scan[is_exact])
+    exact = problem.evaluate(scan[is_exact])[problem.variable].values
     values[is_exact] = np.where(np.isnan(exact), values[is_exact], exact)
     scan, values = _with_extrema(problem, scan, values, np.abs(values - target) <= tolerance)
     distance = values - target
@@ -366,7 +334,7 @@ def _all_roots(problem: _Problem, target: float) -> SolveResult:
         is_end = np.arange(left.size) >= between.size
 
         def function(x: Array, is_end: Mask) -> Array:
-            of_x = problem.target_values(x) - target
+            of_x = problem.evaluate(x)[problem.variable].values - target
             return np.where(is_end, np.abs(of_x) - tolerance, of_x)
 
         refined = elementwise.find_root(
@@ -387,18 +355,18 @@ def _all_roots(problem: _Problem, target: float) -> SolveResult:
     return _result(problem, target, status, map(Root, roots, e_out), values)
 
 
-def _with_extrema(problem: _Problem, scan: Array, values: Array, reached: Mask) -> tuple[Array, Array]:
-    """The scan and its values with each interior extremum refined, except those that reach the target."""
+def _with_extrema(problem: _SolveProblem, scan: Array, values: Array, reached: Mask) -> tuple[Array, Array]:
+    """Add each refined interior extremum to a scan, except those that reach the target."""
     is_restitution = problem.variable.startswith("e_")
     size = np.ones_like(values) if is_restitution else np.abs(values)
     minima, maxima = _minima(values, size), _minima(-values, size)
-    at, sign = np.append(minima, maxima), np.repeat([1.0, -1.0], [minima.size, maxima.size])
-    at, sign = at[~reached[at]], sign[~reached[at]]
-    if not at.size:
+    extrema, sign = np.append(minima, maxima), np.repeat([1.0, -1.0], [minima.size, maxima.size])
+    extrema, sign = extrema[~reached[extrema]], sign[~reached[extrema]]
+    if not extrema.size:
         return scan, values
     refined = elementwise.find_minimum(
-        lambda x, *signs: signs[0] * problem.target_values(x),
-        (scan[at - 1], scan[at], scan[at + 1]),
+        lambda x, *signs: signs[0] * problem.evaluate(x)[problem.variable].values,
+        (scan[extrema - 1], scan[extrema], scan[extrema + 1]),
         args=(sign,),
         tolerances={"fatol": EXTREMUM_TOLERANCE * is_restitution, "frtol": EXTREMUM_TOLERANCE},
     )
@@ -408,29 +376,19 @@ def _with_extrema(problem: _Problem, scan: Array, values: Array, reached: Mask) 
 
 
 def _minima(values: Array, size: Array) -> NDArray[np.intp]:
-    """The positions of the interior minima of a scan; differences that are small beside `size` are noise."""
+    """Find the positions of the interior minima of a scan; differences small relative to `size` are noise."""
     rises = np.stack([values[:-2], values[2:]]) - values[1:-1]
     return 1 + np.flatnonzero((rises.min(axis=0) >= 0.0) & (rises.max(axis=0) > SCAN_NOISE * size[1:-1]))
 
 
-def _extremes(values: Array) -> tuple[float, float]:
-    """The least and the largest value that are not NaN, to the digits of the scan."""
-    return float(f"{np.nanmin(values):.6g}"), float(f"{np.nanmax(values):.6g}")
-
-
 def _runs(reached: Mask, scan: Array, bounds: set[float]) -> tuple[list[float], list[int]]:
-    """The runs of neighbouring values that reach the target.
-
-    Returns
-    -------
-    roots : single values; of a run at a bound the bound alone; the end of a run that is the end of the scan
-    ends : for each other end of a run, the position of the left one of the two values that it is between
-    """
+    """Reduce runs of neighbouring values that reach the target to roots, and to left positions of their ends."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], reached, [False]]))).reshape(-1, 2)
     roots: list[float] = []
     ends: list[int] = []
     for first, after in edges.tolist():
         at_bound = sorted({float(scan[first]), float(scan[after - 1])} & bounds)
+        # of a run at a bound the bound alone is a root
         if at_bound or after - first == 1:
             roots.append(at_bound[0] if at_bound else float(scan[first]))
             continue
@@ -442,16 +400,16 @@ def _runs(reached: Mask, scan: Array, bounds: set[float]) -> tuple[list[float], 
     return roots, ends
 
 
-def _best_over_axis(problem: _Problem, target: float) -> SolveResult:
-    """The value for which the largest distance from the target over the axis of the config is least."""
+def _best_over_axis(problem: _SolveProblem, target: float) -> SolveResult:
+    """Find the value for which the largest distance from the target over the axis of the config is least."""
     (axis,) = problem.config.axes
     conditions = np.arange(axis.size)
 
     def largest_distance(values: Array, *, is_scan: bool = False) -> Array:
-        """Over all conditions, shape (n,); infinite where an integration fails."""
+        """Find the largest distance over all conditions; infinite where an integration fails."""
         trials = np.repeat(values, axis.size)
-        of_target = problem.target_values(trials, np.tile(conditions, values.size), is_scan=is_scan)
-        distances = np.abs(of_target - target).reshape(values.size, axis.size)
+        outputs = problem.evaluate(trials, np.tile(conditions, values.size), is_scan=is_scan)
+        distances = np.abs(outputs[problem.variable].values - target).reshape(values.size, axis.size)
         return np.where(np.isnan(distances).any(axis=1), np.inf, distances.max(axis=1))
 
     scan = problem.scan_values()
@@ -462,22 +420,23 @@ def _best_over_axis(problem: _Problem, target: float) -> SolveResult:
     scan, distances = scan[is_finite], distances[is_finite]
     candidates = []
     # the least distance is at an end of the scan, or in one of its basins
-    for at in {int(distances.argmin()), *_minima(distances, distances).tolist()}:
-        neighbours = float(scan[max(at - 1, 0)]), float(scan[min(at + 1, scan.size - 1)])
+    for position in {int(distances.argmin()), *_minima(distances, distances).tolist()}:
+        neighbours = float(scan[max(position - 1, 0)]), float(scan[min(position + 1, scan.size - 1)])
         refined = minimize_scalar(
             lambda x: float(largest_distance(np.array([x]))[0]),
             bounds=neighbours,
             method="bounded",
             options={"xatol": 1e-12 * max(map(abs, neighbours))},
         )
-        candidates += [(float(distances[at]), float(scan[at])), (float(refined.fun), float(refined.x))]
+        candidates.append((float(distances[position]), float(scan[position])))
+        candidates.append((float(refined.fun), float(refined.x)))
     value = min(candidates)[1]
     outputs = problem.evaluate(np.full(axis.size, value), conditions)
     inputs = {name: column for name, column in axis.columns.items() if not isinstance(column[0], str)}
     over = tuple(
-        {name: float(column[at]) for name, column in inputs.items()}
-        | {name: float(outputs[name].values[at]) for name in dict.fromkeys((problem.variable, "e_out"))}
-        for at in conditions.tolist()
+        {name: float(column[condition]) for name, column in inputs.items()}
+        | {name: float(outputs[name].values[condition]) for name in dict.fromkeys((problem.variable, "e_out"))}
+        for condition in conditions.tolist()
     )
     status: SolveStatus = "at_bound" if value in (problem.unknown.least, problem.unknown.most) else "ok"
     root = Root(value, float(outputs["e_out"].values.mean()))
@@ -485,7 +444,7 @@ def _best_over_axis(problem: _Problem, target: float) -> SolveResult:
 
 
 def _result(
-    problem: _Problem,
+    problem: _SolveProblem,
     target: float,
     status: SolveStatus,
     roots: Iterable[Root],
@@ -499,6 +458,7 @@ def _result(
         target={problem.variable: target},
         status=status,
         roots=tuple(roots),
-        attainable=_extremes(values),
+        # to the digits of the scan
+        attainable=(float(f"{np.nanmin(values):.6g}"), float(f"{np.nanmax(values):.6g}")),
         over=over,
     )

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -59,10 +59,8 @@ class TimestepRow:
     dt : time step [s]
     steps_per_contact : contact time of the continuous law over dt
     e_mean, e_least, e_largest : restitution over the phases; NaN if a collision fails
-    e_to_ask : the e to ask for at this dt, so that the mean is the e wanted; NaN for a law without an e, or if
-        there is none
-    status : "ok", or what most of the collisions that fail have in common, such as "unstable": a name of
-        `impact.contact.status.Status`, as the point of a sweep has it
+    e_to_ask : the e to ask for, so that the mean is the e wanted; NaN for a law without an e, or if there is none
+    status : of `impact.contact.status.Status`: "ok", or that of most of the collisions that fail
     failed : number of phases at which the collision fails
     """
 
@@ -77,7 +75,7 @@ class TimestepRow:
 
     @property
     def cells(self) -> tuple[str, ...]:
-        """The row in a table; a step at which a collision fails has its status."""
+        """Format the row of a table; a step at which a collision fails has its status."""
         mean = self.status if self.failed else decimals(self.e_mean)
         others = map(decimals, (self.e_least, self.e_largest, self.e_to_ask))
         return (number(self.steps_per_contact), number(self.dt), mean, *others)
@@ -85,7 +83,7 @@ class TimestepRow:
 
 @dataclass(frozen=True)
 class NeededSteps:
-    """The smallest whole number of steps per contact with which every phase is within `tol`, and its dt [s]."""
+    """The smallest number of steps per contact with which every phase is within `tol`, and its dt [s]."""
 
     tol: float
     steps_per_contact: int
@@ -98,15 +96,12 @@ class TimestepResult(Displayed):
 
     Parameters
     ----------
-    model : key of the law
     scheme : name of the scheme, see `impact.contact.timestep.SCHEMES`
     e : the e that is asked for; NaN for a law without one
-    e_continuous : restitution of the continuous law
-    contact_time : of the continuous law, until its own end [s]
+    e_continuous, contact_time : of the continuous law [s]
     rows : one for each step
-    needed : for a tolerance; None without one, or if no number of steps up to `MAX_STEPS_PER_CONTACT` is enough
+    needed : for `tol`; None without one, or if no number of steps up to `MAX_STEPS_PER_CONTACT` is enough
     phases : number of phases of each row
-    tol : the tolerance; None without one
     """
 
     model: str
@@ -120,23 +115,15 @@ class TimestepResult(Displayed):
     tol: float | None
 
     def as_dict(self) -> dict[str, Any]:
-        """The result as plain data; numbers that do not apply are NaN."""
-        return {
-            "model": self.model,
-            "scheme": self.scheme,
-            "e": self.e,
-            "e_continuous": self.e_continuous,
-            "contact_time": self.contact_time,
-            "rows": self.records(),
-            "needed": None if self.needed is None else asdict(self.needed),
-        }
+        """Convert to plain data; numbers that do not apply are NaN."""
+        return {name: value for name, value in asdict(self).items() if name not in ("phases", "tol")}
 
     def records(self) -> Sequence[Mapping[str, Any]]:
-        """The rows, one for each step."""
+        """List the rows, one for each step."""
         return [asdict(row) for row in self.rows]
 
     def sections(self, width: int) -> Iterator[Block]:
-        """The continuous law, a row for each step, the steps that fail, and the number of steps needed."""
+        """Write the continuous law, a row for each step, the steps that fail, and the number of steps needed."""
         e = f"e = {number(self.e)}, " if self.e == self.e else ""
         contact_time = quantity(self.contact_time, "s")
         yield f"{self.model}: {e}e_out = {number(self.e_continuous)} in a contact time of {contact_time}"
@@ -249,21 +236,12 @@ class FixedStepLaw:
         """The e that is asked for; NaN for a law without one."""
         return float(self.impact.e[0]) if self.has_e else math.nan
 
-    def with_phases(self, phases: int) -> FixedStepLaw:
-        return replace(self, phases=phases)
-
     def restitution(self, dt: Array, e: Array | None = None) -> Array:
-        """The delivered restitution at steps dt [s] over all phases, shape (k, phases); see `collide`."""
+        """Compute the delivered restitution at steps dt [s] over all phases, shape (k, phases)."""
         return self.collide(dt, e).e_out.reshape(dt.size, self.phases)
 
     def collide(self, dt: Array, e: Array | None = None) -> FixedStepResult:
-        """The collisions at steps dt [s], each over all phases, shape (k phases,).
-
-        Parameters
-        ----------
-        dt : time steps [s], shape (k,)
-        e : the e to ask for at each, shape (k,); by default that of the impact
-        """
+        """Collide at steps dt [s] with the e to ask for at each, over all phases, shape (k,) to (k phases,)."""
         phase = (np.arange(self.phases) + 0.5) / self.phases
         count = dt.size * self.phases
         values = {
@@ -280,7 +258,7 @@ class FixedStepLaw:
 
 
 def timestep_rows(law: FixedStepLaw, dt: Sequence[float]) -> tuple[TimestepRow, ...]:
-    """What a law delivers at steps dt [s], and the e to ask for."""
+    """Find what a law delivers at steps dt [s], and the e to ask for."""
     steps = np.array(dt)
     result = law.collide(steps)
     delivered = result.e_out.reshape(steps.size, law.phases)
@@ -302,17 +280,13 @@ def timestep_rows(law: FixedStepLaw, dt: Sequence[float]) -> tuple[TimestepRow, 
 
 
 def _shared_status(statuses: NDArray[np.int8]) -> Status:
-    """The most frequent status of the collisions that fail; OK if none fails."""
+    """Find the most frequent status of the collisions that fail; OK if none fails."""
     failures = statuses[statuses >= FIRST_FAILURE]
     return Status(int(np.bincount(failures).argmax())) if failures.size else Status.OK
 
 
 def compensated_e(law: FixedStepLaw, dt: Array) -> Array:
-    """The e to ask for at each step dt [s] for a mean over the phases that is the e of the impact, shape (k,).
-
-    NaN where there is none. Where e changes the number of steps of a phase, its e_out jumps: if the mean jumps
-    across the e of the impact, the e of the jump is returned.
-    """
+    """Find the e to ask for at steps dt [s], so that the mean over the phases is e; NaN where there is none."""
     if not law.has_e:
         return np.full(dt.size, np.nan)
     target = law.e
@@ -327,16 +301,14 @@ def compensated_e(law: FixedStepLaw, dt: Array) -> Array:
     is_crossed = distances[:, :-1] * distances[:, 1:] <= 0.0
     # of several, the largest e
     last = N_SCAN - 2 - np.argmax(is_crossed[:, ::-1], axis=1)
+    # where e changes the number of steps of a phase, its e_out jumps; the root may be such a jump
     solution = elementwise.find_root(distance, (scan[last], scan[last + 1]), args=(dt,))
     is_root = is_crossed.any(axis=1) & (np.abs(solution.f_x) <= MAX_JUMP)
     return np.where(is_root, solution.x, np.nan)
 
 
 def needed_steps(law: FixedStepLaw, tol: float, e_continuous: float) -> NeededSteps | None:
-    """The smallest whole number of steps per contact with which every phase is within a relative tolerance.
-
-    It is found by bisection: with one step less, a phase is outside.
-    """
+    """Bisect for the smallest number of steps per contact with which every phase is within a tolerance."""
     target = law.e if law.has_e else e_continuous
     if not target > 0.0:
         raise UsageError("--tol is relative to e, expected e > 0")
@@ -359,7 +331,7 @@ def needed_steps(law: FixedStepLaw, tol: float, e_continuous: float) -> NeededSt
 def fixed_step_law(
     config: Config, phases: int, scheme: str | None = None
 ) -> tuple[FixedStepLaw, dict[str, float]]:
-    """The law and the impact of a config without axes, and the outputs of the continuous law by name, in SI."""
+    """Build the law and impact of a config without axes, and the outputs of the continuous law by name, in SI."""
     plan = Plan(config)
     model = config.models[0]
     impact = build_impacts(plan.inputs, model, ())
@@ -374,13 +346,13 @@ def fixed_step_law(
 
 
 def time_steps(contact_time: float, steps_per_contact: Sequence[float], dt: Sequence[float]) -> list[float]:
-    """Time steps [s] from numbers of steps per contact, and from themselves."""
+    """List time steps [s], from numbers of steps per contact and from themselves."""
     for name, values in (("--steps-per-contact", steps_per_contact), ("--dt", dt)):
         for value in values:
             if not (math.isfinite(value) and value > 0.0):
                 raise UsageError(f"{name}: got {number(value)}, expected a finite number > 0")
     steps = [*(contact_time / steps for steps in steps_per_contact), *dt]
-    most = contact_time / min(steps)
-    if most > MAX_STEPS_PER_CONTACT:
-        raise UsageError(f"got {number(most)} steps per contact, expected at most {MAX_STEPS_PER_CONTACT:,}")
+    largest = contact_time / min(steps)
+    if largest > MAX_STEPS_PER_CONTACT:
+        raise UsageError(f"got {number(largest)} steps per contact, expected at most {MAX_STEPS_PER_CONTACT:,}")
     return steps

@@ -21,11 +21,7 @@ MAX_BLOCK = 2**22
 
 @dataclass(frozen=True)
 class Indices:
-    """First-order and total indices of several outputs, each of shape (outputs, inputs).
-
-    The ends of their intervals of 95 % are from 0 to 1, as the indices are, while an estimate may lie outside.
-    They are NaN where no bootstrap was asked for.
-    """
+    """Indices, shape (outputs, inputs), with the ends of intervals of 95 %, NaN without a bootstrap."""
 
     first: Array
     total: Array
@@ -36,16 +32,7 @@ class Indices:
 
 
 def mixed_rows(a: Array, b: Array) -> Array:
-    """The rows at which a function has to be known: those of A, of B, and of A with each column of B.
-
-    Parameters
-    ----------
-    a, b : independent samples of the inputs, shape (n, inputs)
-
-    Returns
-    -------
-    array of shape (n (inputs + 2), inputs)
-    """
+    """Stack A, B, and A with each column of B, shape (n, inputs) to (n (inputs + 2), inputs)."""
     mixed = [np.where(np.arange(a.shape[1]) == column, b, a) for column in range(a.shape[1])]
     return np.concatenate([a, b, *mixed])
 
@@ -81,6 +68,7 @@ def indices_of(values: Array, seed: int | None = None) -> Indices:
     lower = upper = np.full_like(estimates, np.nan)
     if seed is not None:
         ends = 0.5 - 0.5 * CONFIDENCE, 0.5 + 0.5 * CONFIDENCE
+        # as the indices are, while an estimate may lie outside
         lower, upper = np.clip(np.quantile(resampled, ends, axis=1), 0.0, 1.0)
     pairs = (np.split(array, 2, axis=1) for array in (estimates, lower, upper))
     (first, total), (first_lower, total_lower), (first_upper, total_upper) = pairs
@@ -88,14 +76,14 @@ def indices_of(values: Array, seed: int | None = None) -> Indices:
 
 
 def _columns(values: Array) -> Array:
-    """The columns whose means give the indices of one output, shape (3 inputs + 2, n)."""
+    """Build the columns whose means give the indices of one output, shape (3 inputs + 2, n)."""
     a, b, *_ = mixed = values - values[:2].mean()
     change = mixed[2:] - a
     return np.concatenate([b * change, change, 0.5 * change**2, [0.5 * (a * a + b * b), 0.5 * (a + b)]])
 
 
 def _indices_from_means(means: Array) -> Array:
-    """First-order and total indices, shape (..., 2 inputs); zero where the output does not vary."""
+    """Compute first-order and total indices, shape (..., 2 inputs); zero where the output does not vary."""
     *_, square, mean = np.moveaxis(means, -1, 0)
     first, change, total = np.split(means[..., :-2], 3, axis=-1)
     explained = np.concatenate([first - mean[..., None] * change, total], axis=-1)

@@ -121,8 +121,10 @@ def sensitivities(
     >>> [round(study["mean"].item(), 5) for study in studies]
     [187.75797, 0.00998]
     """
+    names = [name for name in OUTPUTS if name not in ("status", "in_domain")]
     for name in of:
-        check_output_name(name)
+        if name not in names:
+            raise UsageError(f'--of: no output "{name}"; {did_you_mean(name, names)}')
     if output is not None and len(of) > 1:
         raise UsageError(f"--output: got {len(of)} outputs (--of), expected one for a file")
     plan = prepare(source, overrides, plugins, Run(max_points=max_points))
@@ -135,15 +137,8 @@ def sensitivities(
     return results
 
 
-def check_output_name(of: str) -> None:
-    """Raise a UsageError, which names the nearest output, if there is no such output."""
-    if of not in OUTPUTS or of in ("status", "in_domain"):
-        outputs = [name for name in OUTPUTS if name not in ("status", "in_domain")]
-        raise UsageError(f'--of: no output "{of}"; {did_you_mean(of, outputs)}')
-
-
 def sensitivity_plan(plan: Plan, of: Sequence[str], max_points: int, name: str) -> Plan:
-    """The plan of all points that the indices of outputs need: n (inputs + 2) for each n of the design."""
+    """Plan all points that the indices of outputs need: n (inputs + 2) for each n of the design."""
     config = plan.config
     if config.design is None:
         example = "[design] n = 1024 and v1 = { normal = [1.0, 0.05] }"
@@ -158,12 +153,12 @@ def sensitivity_plan(plan: Plan, of: Sequence[str], max_points: int, name: str) 
     names = list(config.distributions)
     models = {model.key: model for model in config.models}
     u = unit_samples(config.design, 2 * len(names))
-    parts = [draw_columns(config.distributions, models, part) for part in np.split(u, 2, axis=1)]
-    problems = dict(problem for _, of_part in parts for problem in of_part.items())
+    draws = [draw_columns(config.distributions, models, half) for half in np.split(u, 2, axis=1)]
+    problems = {key: text for _, of_draw in draws for key, text in of_draw.items()}
     if problems:
         paths = {key: path_text(InputName.parse(key).path) for key in problems}
         raise ConfigError(*(f"{name}: {paths[key]}: {text}" for key, text in problems.items()))
-    rows = mixed_rows(*(np.column_stack([drawn[key] for key in names]) for drawn, _ in parts))
+    rows = mixed_rows(*(np.column_stack([drawn[key] for key in names]) for drawn, _ in draws))
     columns = dict(zip(names, (tuple(column) for column in rows.T.tolist()), strict=True))
     axes = tuple(replace(axis, columns=columns) if axis.name == SAMPLE else axis for axis in config.axes)
     output = replace(config.output, variables=tuple(of), dtype="float64", chunks={})
@@ -176,7 +171,7 @@ def sensitivity_plan(plan: Plan, of: Sequence[str], max_points: int, name: str) 
 
 
 def sensitivity_of(plan: Plan, of: str, swept: xr.Dataset) -> xr.Dataset:
-    """The sensitivity of an output, as a dataset; see `impact.sensitivity`."""
+    """Build the dataset of the sensitivity of an output."""
     plan = replace(plan, config=replace(plan.config, output=replace(plan.config.output, variables=(of,))))
     config = plan.config
     assert config.design is not None
@@ -200,11 +195,7 @@ def sensitivity_of(plan: Plan, of: str, swept: xr.Dataset) -> xr.Dataset:
 
 
 def _statistics(values: Array, config: Config) -> dict[str, Array]:
-    """Mean, standard deviation, quantiles and indices of outputs, from values of shape (outputs, inputs + 2, n).
-
-    They are NaN for an output with a failed sample; the indices are NaN for one that is constant, and zero for an
-    input that changes it by no more than errors of the integration.
-    """
+    """Compute the statistics of outputs, from shape (outputs, inputs + 2, n); NaN for one with a failed sample."""
     assert config.design is not None
     outputs, blocks, n = values.shape
     failed = np.isnan(values).sum(axis=(1, 2))
@@ -212,23 +203,24 @@ def _statistics(values: Array, config: Config) -> dict[str, Array]:
     mean, deviation = independent.mean(axis=1), independent.std(axis=1, ddof=1)
     largest = np.abs(independent).max(axis=1)
     resolution = CONSTANT_FACTOR * config.solver.rtol * largest
+    # indices are NaN for a constant output, and zero for an input that changes it by errors of the integration
     varies = deviation > resolution
     changes = np.abs(values[:, 2:] - values[:, :1]).max(axis=2) > resolution[:, None]
     values = np.concatenate([values[:, :2], np.where(changes[..., None], values[:, 2:], values[:, :1])], axis=1)
-    statistics = {
+    whole, half = indices_of(values[varies], config.design.seed), None
+    if n > 2:
+        half = indices_of(np.ascontiguousarray(values[varies][..., : n // 2]))
+
+    def of_all(indices: Array | float) -> Array:
+        array = np.full((outputs, blocks - 2), np.nan)
+        array[varies] = indices
+        return array
+
+    return {
         "failed": failed,
         "mean": mean,
         "sd": deviation,
         "quantiles": np.quantile(independent, QUANTILES, axis=1).T,
+        **{name: of_all(array) for name, array in vars(whole).items()},
+        **{name: of_all(np.nan if half is None else vars(half)[name.removesuffix("_half")]) for name in HALF},
     }
-    whole, half = indices_of(values[varies], config.design.seed), None
-    if n > 2:
-        half = indices_of(np.ascontiguousarray(values[varies][..., : n // 2]))
-    for name in ("first", "total", "first_lower", "first_upper", "total_lower", "total_upper"):
-        statistics[name] = np.full((outputs, blocks - 2), np.nan)
-        statistics[name][varies] = getattr(whole, name)
-    for name in HALF:
-        statistics[name] = np.full((outputs, blocks - 2), np.nan)
-        if half is not None:
-            statistics[name][varies] = getattr(half, name.removesuffix("_half"))
-    return statistics
