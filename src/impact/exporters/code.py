@@ -87,11 +87,6 @@ class Collision:
         return {name: repr(value) for name, value in values.items()}
 
 
-def no_lines(collision: Collision) -> list[str]:
-    """Return no lines."""
-    return []
-
-
 @dataclass(frozen=True)
 class Code:
     """A code that simulates contacts, and how a law is written for it.
@@ -135,8 +130,8 @@ class Code:
     read_version: Callable[[str], str] = lambda text: text
     version_of: Callable[[str], str | None] = lambda program: None
     comment: tuple[str, str] = ("# ", "")
-    notes: Callable[[Collision], list[str]] = no_lines
-    warnings: Callable[[Collision], list[str]] = no_lines
+    notes: Callable[[Collision], list[str]] = lambda collision: []
+    warnings: Callable[[Collision], list[str]] = lambda collision: []
     template: str = ""
     suffix: str = ".py"
     program: str = ""
