@@ -572,7 +572,7 @@ def test_a_picture_never_replaces_its_result(cli: Run, stored: Path, tmp_path: P
 @pytest.mark.slow
 def test_narrow_and_ascii_terminals(cli: Run, stored: Path) -> None:
     for environment in ({"COLUMNS": "20"}, {"PYTHONIOENCODING": "ascii"}, {"NO_COLOR": "1", "LC_ALL": "C"}):
-        for words in (["models"], ["info", stored], ["run", "--at", "e=0.5"]):
+        for words in (["models"], ["info", stored], ["recommend", stored], ["run", "--at", "e=0.5"]):
             done = cli(*words, **environment)
             assert (done.returncode, done.stderr) == (0, ""), (words, environment)
 

@@ -674,14 +674,18 @@ def test_the_memory_of_a_rerun_is_bounded_by_the_size_of_the_file(forked: ForkSe
         assert "note: repeated " in done.stdout
 
 
-def test_a_rerun_needs_the_plug_in_of_the_result(forked: ForkServer, tmp_path: Path) -> None:
+@pytest.fixture
+def plugin(forked: ForkServer, tmp_path: Path) -> Path:
+    """A plug-in, beside a result that was made with it."""
     config = 'models = ["hertz", "mine-2026"]\n[sweep]\ne = [0.2, 0.8]\nv1 = 1\nm1 = 1\nm2 = 1\nK = 6e9\n'
     config += "[solver]\nrtol = 1e-4\n"
     (tmp_path / "config.toml").write_text(config, encoding="utf-8")
-    plugin = tmp_path / "mine.py"
-    plugin.write_text(PLUGIN.format(chi=CHI), encoding="utf-8")
+    (tmp_path / "mine.py").write_text(PLUGIN.format(chi=CHI), encoding="utf-8")
     assert forked("sweep", "config.toml", "--plugin", "mine.py", cwd=tmp_path).returncode == 0
+    return tmp_path / "mine.py"
 
+
+def test_a_rerun_needs_the_plug_in_of_the_result(forked: ForkServer, plugin: Path, tmp_path: Path) -> None:
     done = forked("rerun", "results.h5", cwd=tmp_path)
     message = "results.h5: made with mine-2026 of mine.py; give it again with --plugin FILE\n"
     assert (done.returncode, done.stdout, done.stderr) == (2, "", message)
@@ -694,13 +698,8 @@ def test_a_rerun_needs_the_plug_in_of_the_result(forked: ForkServer, tmp_path: P
 
 
 @pytest.mark.slow
-def test_a_rerun_with_a_changed_plug_in_has_a_note(forked: ForkServer, tmp_path: Path) -> None:
-    config = 'models = ["mine-2026"]\n[sweep]\ne = [0.2, 0.8]\nv1 = 1\nm1 = 1\nm2 = 1\nK = 6e9\n'
-    config += "[solver]\nrtol = 1e-4\n"
-    (tmp_path / "config.toml").write_text(config, encoding="utf-8")
-    plugin = tmp_path / "mine.py"
-    plugin.write_text(PLUGIN.format(chi=CHI), encoding="utf-8")
-    assert forked("sweep", "config.toml", "--plugin", "mine.py", cwd=tmp_path).returncode == 0
+def test_a_rerun_with_a_changed_plug_in_has_a_note(forked: ForkServer, plugin: Path, tmp_path: Path) -> None:
+    point = ("--model", "mine-2026", "--at", "e=0.8")
     original_hash = sha256(plugin.read_bytes()).hexdigest()
     same = plugin.read_text(encoding="utf-8") + "# the same numbers\n"
     for text, code in ((same, 0), (PLUGIN.format(chi="(1 - e) / e"), 1)):
@@ -710,13 +709,15 @@ def test_a_rerun_with_a_changed_plug_in_has_a_note(forked: ForkServer, tmp_path:
         assert (done.returncode, done.stderr) == (code, "")
         (note,) = [line for line in done.stdout.splitlines() if all(digest in line for digest in hashes)]
         assert note.startswith("note: mine-2026 is ")
-        done = forked("run", "results.h5", "--plugin", "mine.py", "--at", "e=0.8", cwd=tmp_path)
+        done = forked("run", "results.h5", "--plugin", "mine.py", *point, cwd=tmp_path)
         assert done.returncode == 0
         (note,) = done.stderr.splitlines()
         assert note.startswith("note: results.h5: was made with another version of mine.py")
         assert all(digest in note for digest in hashes)
         # a picture that would show the changed law as that of the result is refused
-        done = forked("plot", "results.h5", "--plugin", "mine.py", "-k", "loop", cwd=tmp_path)
+        done = forked(
+            "plot", "results.h5", "--plugin", "mine.py", "-k", "loop", "--model", "mine-2026", cwd=tmp_path
+        )
         assert (done.returncode, note.removeprefix("note: ") in done.stderr) == (2, False)
 
 

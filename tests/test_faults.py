@@ -241,7 +241,21 @@ def create_folder(sweeps: SweepServer, state: State, text: str = "") -> Path:
     return folder
 
 
-def check_power_failures(sweeps: SweepServer, kinds: set[str], writes: int) -> None:
+# when the result or a block gets its name, at the end, and at any operation
+@pytest.mark.parametrize(
+    ("text", "kinds", "writes"),
+    [
+        (CONFIG_TEXT, {"link"}, 0),
+        pytest.param(CONFIG_TEXT, {"rename", "rmdir"}, 0, marks=pytest.mark.slow),
+        pytest.param(FACTORED_CONFIG, {"link"}, 0, marks=pytest.mark.slow),
+        pytest.param(CONFIG_TEXT, None, 60, marks=pytest.mark.faults),
+    ],
+)
+def test_a_sweep_is_resumed_after_a_power_failure_at_any_operation(
+    sweeps: SweepServer, text: str, kinds: set[str] | None, writes: int
+) -> None:
+    sweeps = sweeps.with_config(text)
+    kinds = kinds or ({entry[0] for entry in sweeps.operations} | {"kept"}) - {"write"}
     report = FaultReport("power failure", sweeps)
     log = sweeps(cwd=sweeps.folder(), fault=("record_operations",)).log
     cuts = [at for at, entry in enumerate(log) if entry[0] in kinds]
@@ -251,25 +265,6 @@ def check_power_failures(sweeps: SweepServer, kinds: set[str], writes: int) -> N
         report.resume(folder, kept, at)
         shutil.rmtree(folder)
     report.check()
-
-
-@pytest.mark.parametrize(
-    ("text", "kinds"),
-    [
-        (CONFIG_TEXT, {"link"}),
-        pytest.param(CONFIG_TEXT, {"rename", "rmdir"}, marks=pytest.mark.slow),
-        pytest.param(FACTORED_CONFIG, {"link"}, marks=pytest.mark.slow),
-    ],
-)
-def test_a_sweep_is_resumed_after_a_power_failure(sweeps: SweepServer, text: str, kinds: set[str]) -> None:
-    # when the result or a block gets its name, and at the end
-    check_power_failures(sweeps.with_config(text), kinds, 0)
-
-
-@pytest.mark.faults
-def test_a_sweep_is_resumed_after_a_power_failure_at_any_operation(sweeps: SweepServer) -> None:
-    kinds = {entry[0] for entry in sweeps.operations} | {"kept"}
-    check_power_failures(sweeps, kinds - {"write"}, 60)
 
 
 def test_without_fsync_a_power_failure_leaves_an_incomplete_result_and_loses_blocks(sweeps: SweepServer) -> None:

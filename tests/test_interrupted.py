@@ -10,7 +10,7 @@ import signal
 import sys
 import time
 import zipfile
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from contextlib import nullcontext
 from pathlib import Path
 
@@ -351,7 +351,19 @@ def check_interrupted(completed: FinishedSweep, folder: Path, number: int, at: o
     assert completed.stderr.startswith("interrupted" if number == INT else "terminated"), (at, completed)
 
 
-def check_signals(sweeps: SweepServer, count: int | None, moments: int) -> None:
+@pytest.mark.parametrize(
+    ("text", "count", "moments"),
+    [
+        (CONFIG_TEXT, 3, 1),
+        pytest.param(FACTORED_CONFIG, 3, 1, marks=pytest.mark.slow),
+        pytest.param(CONFIG_TEXT, 60, 40, marks=pytest.mark.faults),
+        pytest.param(FACTORED_CONFIG, 20, 40, marks=pytest.mark.faults),
+    ],
+)
+def test_an_interrupted_sweep_prints_one_line_and_is_resumed(
+    sweeps: SweepServer, text: str, count: int, moments: int
+) -> None:
+    sweeps = sweeps.with_config(text)
     report = FaultReport("SIGINT, SIGTERM at an operation on files", sweeps)
     for turn, operation in enumerate(sweeps.choose_operations(count)):
         folder, numbers = sweeps.folder(), SIGNALS[turn % len(SIGNALS)]
@@ -380,19 +392,6 @@ def check_signals(sweeps: SweepServer, count: int | None, moments: int) -> None:
     report.check()
 
 
-@pytest.mark.parametrize(
-    ("text", "count"), [(CONFIG_TEXT, 3), pytest.param(FACTORED_CONFIG, 3, marks=pytest.mark.slow)]
-)
-def test_an_interrupted_sweep_prints_one_line_and_is_resumed(sweeps: SweepServer, text: str, count: int) -> None:
-    check_signals(sweeps.with_config(text), count, 1)
-
-
-@pytest.mark.faults
-@pytest.mark.parametrize(("text", "count"), [(CONFIG_TEXT, 60), (FACTORED_CONFIG, 20)])
-def test_a_sweep_interrupted_at_many_operations_is_resumed(sweeps: SweepServer, text: str, count: int) -> None:
-    check_signals(sweeps.with_config(text), count, 40)
-
-
 def test_an_interrupted_small_sweep_writes_nothing(sweeps: SweepServer) -> None:
     folder = sweeps.folder(CONFIG_TEXT.replace("100]", "10]"))
     completed = sweeps(cwd=folder, fault=("send_signals", 0, INT))
@@ -416,36 +415,35 @@ def test_the_flags_that_an_interrupted_overwriting_sweep_prints_continue_it(swee
 # ---- several processes
 
 
-def check_workers(sweeps: SweepServer, ways: Iterable[tuple[int, bool, int]]) -> None:
-    report = FaultReport("a signal to processes", sweeps)
-    for number, group, count in ways:
-        folder = sweeps.folder(LONG_CONFIG)
-        # stopped before a block gets its name
-        running = start_stopped(sweeps, folder, sweeps.block_renames[count], "--jobs", 2)
-        children = running.children()
-        assert len(running.workers()) == 2
-        assert running.signal(number, group=group)
-        completed = running.wait()
-        if number == KILL:
-            assert completed.returncode == -KILL
-        else:
-            check_interrupted(completed, folder, number, (group, count))
-        # the lock is released when the writing process ends
-        report.resume(folder, finished_blocks(folder), (number, group, count))
-        wait_until(lambda those=children: all(process_state(pid) in "ZX" for pid in those))
-        shutil.rmtree(folder)
+@pytest.mark.parametrize(
+    ("number", "group", "count"),
+    [
+        pytest.param(KILL, False, 1, marks=pytest.mark.slow),
+        *(
+            pytest.param(number, group, count, marks=pytest.mark.faults)
+            for number, group in ((INT, False), (INT, True), (TERM, False), (TERM, True), (KILL, False))
+            for count in (0, 2)
+        ),
+    ],
+)
+def test_no_process_outlives_the_writing_process_after_any_signal(
+    sweeps: SweepServer, number: int, group: bool, count: int
+) -> None:
+    report, folder = FaultReport("a signal to processes", sweeps), sweeps.folder(LONG_CONFIG)
+    # stopped before a block gets its name
+    running = start_stopped(sweeps, folder, sweeps.block_renames[count], "--jobs", 2)
+    children = running.children()
+    assert len(running.workers()) == 2
+    assert running.signal(number, group=group)
+    completed = running.wait()
+    if number == KILL:
+        assert completed.returncode == -KILL
+    else:
+        check_interrupted(completed, folder, number, (group, count))
+    # the lock is released when the writing process ends
+    report.resume(folder, finished_blocks(folder), (number, group, count))
+    wait_until(lambda: all(process_state(pid) in "ZX" for pid in children))
     report.check()
-
-
-@pytest.mark.slow
-def test_no_process_outlives_the_writing_process(sweeps: SweepServer) -> None:
-    check_workers(sweeps, [(KILL, False, 1)])
-
-
-@pytest.mark.faults
-def test_no_process_outlives_the_writing_process_after_any_signal(sweeps: SweepServer) -> None:
-    ways = [(INT, False), (INT, True), (TERM, False), (TERM, True), (KILL, False)]
-    check_workers(sweeps, [(*way, count) for way in ways for count in (0, 2)])
 
 
 @pytest.mark.slow
@@ -462,7 +460,16 @@ def test_an_interrupt_while_processes_start_prints_one_line(sweeps: SweepServer)
         check_interrupted(completed, folder, INT, "begin")
 
 
-def check_killed(sweeps: SweepServer, moments: Iterable[int]) -> None:
+@pytest.mark.parametrize(
+    "moments",
+    [
+        pytest.param((0,), marks=pytest.mark.slow),
+        pytest.param((1, 1, 2, 2, 3), marks=pytest.mark.faults),
+    ],
+)
+def test_a_sweep_interrupted_twice_whose_process_is_killed_gives_the_same_file(
+    sweeps: SweepServer, moments: tuple[int, ...]
+) -> None:
     report = FaultReport("one of several processes killed", sweeps)
     for count in moments:
         # twice interrupted before
@@ -488,16 +495,6 @@ def check_killed(sweeps: SweepServer, moments: Iterable[int]) -> None:
         report.lost += [str(kept)] if sorted(kept) != list(range(LONG_BLOCKS)) else []
         report.wrong += [completed.stderr] if digest(folder / RESULT) != sweeps.expected_digest(folder) else []
     report.check()
-
-
-@pytest.mark.slow
-def test_a_sweep_interrupted_twice_whose_process_is_killed_gives_the_same_file(sweeps: SweepServer) -> None:
-    check_killed(sweeps, [0])
-
-
-@pytest.mark.faults
-def test_a_sweep_whose_process_is_killed_at_other_times_gives_the_same_file(sweeps: SweepServer) -> None:
-    check_killed(sweeps, [1, 1, 2, 2, 3])
 
 
 # the trajectories of the largest e come last

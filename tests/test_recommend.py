@@ -398,12 +398,3 @@ def test_an_error_of_the_command_is_one_line(cli: Run, tmp_path: Path) -> None:
     ):
         done = cli("recommend", *words)
         assert (done.returncode, done.stdout, done.stderr) == (2, "", line)
-
-
-@pytest.mark.slow
-def test_help_has_an_example_and_any_terminal_shows_a_table(cli: Run, fair_and_exact_file: Path) -> None:
-    assert "Example: impact recommend results.h5" in cli("recommend", "--help").stdout
-    path = fair_and_exact_file
-    for environment in ({"COLUMNS": "20"}, {"PYTHONIOENCODING": "ascii"}, {"NO_COLOR": "1", "LC_ALL": "C"}):
-        done = cli("recommend", path, **environment)
-        assert (done.returncode, done.stderr) == (0, ""), environment

@@ -278,17 +278,22 @@ def test_an_output_that_another_program_writes_meanwhile_is_kept(
     assert [p.name for p in tmp_path.iterdir()] == ["out.h5"]
 
 
+def sync_files_only(monkeypatch: pytest.MonkeyPatch, number: int) -> None:
+    """Let the sync of a folder fail with the error of this number."""
+    fsync = os.fsync
+
+    def fsync_files_only(descriptor: int) -> None:
+        if stat.S_ISDIR(os.fstat(descriptor).st_mode):
+            raise OSError(number, os.strerror(number))
+        fsync(descriptor)
+
+    monkeypatch.setattr(os, "fsync", fsync_files_only)
+
+
 def test_a_folder_that_cannot_be_synced_is_a_note(
     figure6: xr.Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    fsync = os.fsync
-
-    def fsync_files_only(number: int) -> None:
-        if stat.S_ISDIR(os.fstat(number).st_mode):
-            raise OSError(errno.EINVAL, os.strerror(errno.EINVAL))
-        fsync(number)
-
-    monkeypatch.setattr(os, "fsync", fsync_files_only)
+    sync_files_only(monkeypatch, errno.EINVAL)
     with pytest.warns(UserWarning, match=r"folders cannot be synced here \(Invalid argument\)"):
         impact.save(figure6, tmp_path / "out.h5")
     assert impact.load(tmp_path / "out.h5").identical(figure6)
@@ -298,16 +303,9 @@ def test_a_folder_that_cannot_be_synced_is_a_note(
 def test_an_error_after_the_rename_says_that_the_file_is_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int
 ) -> None:
-    fsync = os.fsync
-
-    def fsync_files_only(descriptor: int) -> None:
-        if stat.S_ISDIR(os.fstat(descriptor).st_mode):
-            raise OSError(number, os.strerror(number))
-        fsync(descriptor)
-
     path = tmp_path / "out.csv"
     path.write_bytes(b"old")
-    monkeypatch.setattr(os, "fsync", fsync_files_only)
+    sync_files_only(monkeypatch, number)
     with pytest.raises(StoreError, match=r"out\.csv: written, but its name may not be on the disk: ") as caught:
         write_file(path, b"new", overwrite=True)
     assert "not written" not in str(caught.value)

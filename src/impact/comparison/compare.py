@@ -24,7 +24,7 @@ from .align import MODEL_COORDINATES, Alignment, align_sweeps
 from .calibrations import align_calibrations, fit_notes
 from .tolerances import ALL_VARIABLES, Tolerances, calibration_tolerances, effective_tolerances
 from .values import compare_values, group_size, representative_regions
-from .verdict import Difference, VariableComparison, Verdict
+from .verdict import Difference, Verdict
 
 
 def compare(
@@ -100,23 +100,22 @@ def compare(
     variables = [schema[name] for name in schema if name in aligned.dims]
     # for all variables before the first comparison, so that a refusal comes early
     regions = representative_regions(variables, aligned)
-    comparisons: list[VariableComparison] = []
-    largest: dict[str, Mapping[str, np.ndarray]] = {}
-    for variable in variables:
-        tolerance = tolerances.get(variable.name, tolerances[ALL_VARIABLES])
-        comparison, ratios = compare_values(variable, aligned, tolerance, regions[variable.name])
-        comparisons.append(comparison)
-        largest[variable.name] = ratios
-    if not comparisons and not faults:
+    compared = {
+        v.name: compare_values(v, aligned, tolerances.get(v.name, tolerances[ALL_VARIABLES]), regions[v.name])
+        for v in variables
+    }
+    if not compared and not faults:
         faults.append(Difference("nothing in common", "", "the two have no variable in common"))
     return Verdict(
         new=names[0],
         baseline=names[1],
         faults=tuple(faults),
-        variables=tuple(comparisons),
+        variables=tuple(comparison for comparison, _ in compared.values()),
         notes=tuple(notes),
         repeats=repeats,
-        worst_along={} if is_calibration(b) else _along_axes(largest, aligned.baseline.coords),
+        worst_along={}
+        if is_calibration(b)
+        else _along_axes({name: ratios for name, (_, ratios) in compared.items()}, aligned.baseline.coords),
     )
 
 

@@ -58,15 +58,16 @@ def rerun(
     """
     stored = load(result)
     plugin_set = read_plugins(plugins)
-    if is_calibration(stored):
-        new = _repeat_calibration(stored, plugin_set, str(result))
-        return replace(compare(new, stored, tol=tol, subset=subset), new="the rerun", baseline=str(result))
-    require_sweep(stored, "rerun")
     # models by key, because "all" may include new models; the tolerances that were used
     keys = stored["model"].values.tolist() if "model" in stored.dims else []
-    solver = (f"solver.{name}={stored.attrs.get(name)}" for name in ("rtol", "max_steps"))
+    changes = [f"models={json.dumps(keys)}"]
+    changes += [f"solver.{name}={stored.attrs.get(name)}" for name in ("rtol", "max_steps")]
+    if is_calibration(stored):
+        new = _repeat_calibration(stored, changes, plugin_set, str(result))
+        return replace(compare(new, stored, tol=tol, subset=subset), new="the rerun", baseline=str(result))
+    require_sweep(stored, "rerun")
     # any core gives the same result
-    changes = [f"models={json.dumps(keys)}", *solver, 'solver.core="auto"']
+    changes.append('solver.core="auto"')
     config = stored_config(stored.attrs, changes, plugin_set, str(result), max_points, allow_changed_plugins=True)
     whole = Plan(config, plugin_set.of(config.models))
     plan = replace(whole, config=config_of_part(config, stored))
@@ -80,12 +81,10 @@ def rerun(
     return replace(verdict, new="the rerun", baseline=str(result), repeats=command)
 
 
-def _repeat_calibration(stored: xr.Dataset, plugins: Plugins, name: str) -> xr.Dataset:
+def _repeat_calibration(stored: xr.Dataset, changes: list[str], plugins: Plugins, name: str) -> xr.Dataset:
     """Repeat a calibration with the models and the tolerances of the result."""
     # its modules import scipy.optimize, which is slow to import
     from ..inverse.calibrate import calibrate_config
 
-    changes = [f"models={json.dumps(stored['model'].values.tolist())}"]
-    changes += [f"solver.{key}={stored.attrs.get(key)}" for key in ("rtol", "max_steps")]
     config = stored_config(stored.attrs, changes, plugins, name, allow_changed_plugins=True, purpose="calibrate")
     return calibrate_config(config, plugins.of(config.models))

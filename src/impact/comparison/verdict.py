@@ -173,14 +173,14 @@ class Verdict(Displayed):
                 return f"{count}, none differs"
             at = f" at {closest.location}" if closest.location else ""
             return f"{count}, largest difference {number(closest.ratio, 2)} x tolerance: {closest.name}{at}"
-        by_kind: dict[DifferenceKind, dict[str, None]] = {}
+        names_by_kind: dict[DifferenceKind, dict[str, None]] = {}
         for fault in self.faults:
-            by_kind.setdefault(fault.kind, {})[safe_text(fault.name, 60)] = None
+            names_by_kind.setdefault(fault.kind, {})[safe_text(fault.name, 60)] = None
         for variable in self.differing:
-            by_kind.setdefault("values", {})[safe_text(variable.name, 60)] = None
+            names_by_kind.setdefault("values", {})[safe_text(variable.name, 60)] = None
         parts = []
-        for kind in (kind for kind in DIFFERENCE_KINDS if kind in by_kind):
-            names = [name for name in by_kind[kind] if name]
+        for kind in (kind for kind in DIFFERENCE_KINDS if kind in names_by_kind):
+            names = [name for name in names_by_kind[kind] if name]
             more = f" and {len(names) - MAX_NAMES} more" if len(names) > MAX_NAMES else ""
             parts.append(f"{kind} ({', '.join(names[:MAX_NAMES])}{more})" if names else kind)
         return f"not equal: {', '.join(parts)}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,7 @@ import numpy as np
 from ..array_types import Array
 from ..display import Block, Displayed, Styled, Table
 from ..formatting import number
-from .impacts import Impacts, stiffness
+from .impacts import INPUTS, Impacts, stiffness
 from .materials import effective_mass, hertz_stiffness, sphere_radius
 from .model import QUANTITIES, ForceModel, Parameter
 from .outputs import Outputs, collide
@@ -233,7 +233,7 @@ def in_other_units(model: ForceModel, impacts: Impacts) -> Impacts:
         mass, length, time = dimension(units[name], exponents)
         return np.asarray(value * 1e3**mass * (1 / 0.3048) ** length * (1 / 60.0) ** time)
 
-    arrays = {f.name: changed(f.name, getattr(impacts, f.name)) for f in fields(impacts) if f.name != "parameters"}
+    arrays = {name: changed(name, getattr(impacts, name)) for name in INPUTS}
     return Impacts(**arrays, parameters={name: changed(name, value) for name, value in impacts.parameters.items()})
 
 

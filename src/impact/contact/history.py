@@ -68,17 +68,12 @@ def integrate_history(
         collision = integrate_phases(law, params, 1, rtol, max_steps, record=True)
     if collision.restitution is None or collision.result.status[0] != Status.OK:
         return None
-    peak_time, restitution_duration = (
-        float(collision.approach.state[2, 0]),
-        float(collision.restitution.state[2, 0]),
-    )
-    times_in_unit = None if times is None else np.linspace(0.0, peak_time + restitution_duration, times)
-    approach_times = None if times_in_unit is None else times_in_unit[times_in_unit <= peak_time]
-    restitution_times = (
-        None
-        if times_in_unit is None
-        else np.minimum(times_in_unit[times_in_unit > peak_time] - peak_time, restitution_duration)
-    )
+    peak_time, duration = (float(phase.state[2, 0]) for phase in (collision.approach, collision.restitution))
+    approach_times = restitution_times = None
+    if times is not None:
+        uniform = np.linspace(0.0, peak_time + duration, times)
+        approach_times = uniform[uniform <= peak_time]
+        restitution_times = np.minimum(uniform[uniform > peak_time] - peak_time, duration)
     approach = _phase(law, motion.approach_problem(law), collision.approach.recorded, params, approach_times)
     back_law = motion.restitution_law(law)
     restitution = _phase(

@@ -1,4 +1,4 @@
-"""The impacts of a block: the inputs of a law in SI, and the contact's own units."""
+"""The impacts of a batch: the inputs of a law in SI, and the contact's own units."""
 
 from __future__ import annotations
 
@@ -61,19 +61,19 @@ class Impacts:
         return len(self.e)
 
     def __getitem__(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> Impacts:
-        arrays = {f.name: getattr(self, f.name)[chosen] for f in fields(self) if f.name != "parameters"}
+        arrays = {name: getattr(self, name)[chosen] for name in INPUTS}
         return Impacts(**arrays, parameters={name: a[chosen] for name, a in self.parameters.items()})
 
     def broadcast(self) -> Impacts:
         """Give every field the shape of all of them."""
-        arrays = {f.name: np.broadcast_to(getattr(self, f.name), self.shape) for f in fields(self)[:-1]}
+        arrays = {name: np.broadcast_to(getattr(self, name), self.shape) for name in INPUTS}
         parameters = {name: np.broadcast_to(array, self.shape) for name, array in self.parameters.items()}
         return Impacts(**arrays, parameters=parameters)
 
     @cached_property
     def shape(self) -> tuple[int, ...]:
         """The shape to which all fields broadcast."""
-        shapes = {getattr(self, f.name).shape for f in fields(self) if f.name != "parameters"}
+        shapes = {getattr(self, name).shape for name in INPUTS}
         return np.broadcast_shapes(*shapes.union(array.shape for array in self.parameters.values()))
 
     @cached_property
@@ -134,6 +134,10 @@ class Impacts:
                 value = value / powers(getattr(self, unit), np.asarray(exponent))
         # adding zero turns -0.0 into 0.0, which is the same physics
         return value + 0.0
+
+
+# names of the inputs of an impact that do not belong to one law
+INPUTS = tuple(field.name for field in fields(Impacts) if field.name != "parameters")
 
 
 def dimensionless_exponents(

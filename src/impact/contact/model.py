@@ -221,7 +221,8 @@ class ForceModel:
             raise ModelError(f"model {self.key}: unloading_breakpoints: set without unloading, expected both")
         self._check_fields()
         self._check_velocity_coordinate()
-        names = {*QUANTITIES, *(parameter.name for parameter in self.parameters)}
+        inputs = {*QUANTITIES, *(parameter.name for parameter in self.parameters)}
+        names = set(inputs)
         for name, formula in self.coefficients.items():
             self._check_arguments(f"coefficient {name}", formula, names)
             names.add(name)
@@ -238,11 +239,7 @@ class ForceModel:
                 "unloading breakpoint", formula, {*names, *FORCE_ARGUMENTS, *UNLOADING_ARGUMENTS}
             )
         self._check_arguments("oracle", self.oracle, names)
-        self._check_arguments(
-            "stiffness",
-            self.stiffness,
-            {*QUANTITIES, *(parameter.name for parameter in self.parameters)} - {"K", "e"},
-        )
+        self._check_arguments("stiffness", self.stiffness, inputs - {"K", "e"})
 
     def _check_velocity_coordinate(self) -> None:
         required = COORDINATE_COEFFICIENTS[self.velocity_coordinate]
@@ -318,10 +315,8 @@ class ForceModel:
 
     def unit_of(self, name: str) -> str:
         """Find the unit of a quantity or parameter."""
-        return (
-            next((parameter.unit for parameter in self.parameters if parameter.name == name), None)
-            or QUANTITIES[name]
-        )
+        units = {parameter.name: parameter.unit for parameter in self.parameters}
+        return units.get(name) or QUANTITIES[name]
 
     @property
     def is_permanent(self) -> bool:

@@ -67,10 +67,7 @@ class MotionLaw:
 
     @classmethod
     def of(cls, model: ForceModel, n: float, strong: bool) -> MotionLaw:
-        """The law of a model at an exponent n.
-
-        With `strong`, the velocity is replaced by the coordinate that the model declares for strong damping.
-        """
+        """Make the law at an exponent n; if `strong`, with the coordinate that it declares for strong damping."""
         arguments = {name for formula in model.motion_formulas for name in argument_names(formula)}
         param_names = {*model.quantities, *model.coefficients} - {"K", "m", "v0", "n"}
         return cls(
@@ -163,10 +160,10 @@ def breakpoints(
             continue
         x = np.broadcast_to(law.call(formula, params[:n_law_params], unloading_values), start.shape[1])
         x = x - (0.0 if residual is None else residual)
-        at = power(np.where(x > 0.0, x, np.nan), 1.0 / model.coordinate_power)
+        s = power(np.where(x > 0.0, x, np.nan), 1.0 / model.coordinate_power)
         phase_breakpoints.append(_breakpoint_at_column(len(params)))
         # a breakpoint at the start of the phase is not crossed
-        params = (*params, np.where(np.abs(at - start[0]) > BREAKPOINT_TOLERANCE * at, at, np.nan))
+        params = (*params, np.where(np.abs(s - start[0]) > BREAKPOINT_TOLERANCE * s, s, np.nan))
     return params, phase_breakpoints
 
 

@@ -101,10 +101,10 @@ def _mask_if_any(mask: Mask) -> Mask | None:
 
 
 def _replace_where(
-    value: NDArray[Any], where: Mask | None, otherwise: float | np.int32 | NDArray[Any]
+    value: NDArray[Any], mask: Mask | None, otherwise: float | np.int32 | NDArray[Any]
 ) -> NDArray[Any]:
     """Replace the value by another one where the mask is True."""
-    return value if where is None else np.where(where, otherwise, value)
+    return value if mask is None else np.where(mask, otherwise, value)
 
 
 # ---- intermediate values; the arguments of each function are names of FORMULAS

@@ -53,10 +53,8 @@ def in_parts(
         sides[:, rows] = np.where(met, -sides[:, rows], sides[:, rows])
         state[:, rows] += STEP_BEYOND * np.minimum(part.state[0], 1.0) * k[:N_INTEGRATED]
         done = rows[~at_breakpoint]
-        total.termination[done], total.state[:, done] = (
-            part.termination[~at_breakpoint],
-            part.state[:, ~at_breakpoint],
-        )
+        total.termination[done] = part.termination[~at_breakpoint]
+        total.state[:, done] = part.state[:, ~at_breakpoint]
         rows = rows[at_breakpoint]
         if not rows.size:
             break

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,19 +82,9 @@ class CollisionResult:
     @classmethod
     def blank(cls, n: int) -> CollisionResult:
         """n impacts without values, with status OK and no steps."""
-        return cls(
-            e_out=np.full(n, np.nan),
-            peak=np.full(n, np.nan),
-            permanent=np.full(n, np.nan),
-            force=np.full(n, np.nan),
-            contact_time=np.full(n, np.nan),
-            approach_work=np.full(n, np.nan),
-            restitution_work=np.full(n, np.nan),
-            steps=np.zeros(n, np.int32),
-            status=np.full(n, Status.OK, np.int8),
-            chi=np.full(n, np.nan),
-            exact=np.full(n, np.nan),
-        )
+        arrays: dict[str, NDArray[Any]] = {field.name: np.full(n, np.nan) for field in fields(cls)}
+        arrays |= {"steps": np.zeros(n, np.int32), "status": np.full(n, Status.OK, np.int8)}
+        return cls(**arrays)
 
     def put(self, rows: Positions | NDArray[np.bool_], part: CollisionResult) -> None:
         """Write the arrays of a part to its positions."""
@@ -437,10 +428,10 @@ def integrate_phases(
     e_out, work = -back.velocity(restitution.state, params), 2.0 * restitution.state[3]
     status = _status_of_solution(restitution)
     # the balls are held, or separate at zero speed after infinite time: all their energy is lost
-    held = restitution.termination == Termination.EVENT_UNREACHABLE
-    if held.any():
-        held &= motion.may_be_overdamped(back.model) | np.broadcast_to(never_separates, n)[rows]
-        e_out[held], work[held], status[held] = 0.0, 0.0, LIMIT
+    at_limit = restitution.termination == Termination.EVENT_UNREACHABLE
+    if at_limit.any():
+        at_limit &= motion.may_be_overdamped(back.model) | np.broadcast_to(never_separates, n)[rows]
+        e_out[at_limit], work[at_limit], status[at_limit] = 0.0, 0.0, LIMIT
     result.e_out[rows] = e_out
     result.contact_time[rows] += restitution.state[2]
     result.restitution_work[rows] = work
@@ -453,14 +444,14 @@ def integrate_phases(
 
 def _mark_never_separating(law: motion.MotionLaw, solution: Solution, params: Params, recovered: Array) -> None:
     """Set the termination of trajectories that never separate, unlike those that only take too many steps."""
-    unfinished = np.isin(solution.termination, (Termination.MAX_STEPS, Termination.STEP_UNDERFLOW))
-    unfinished_at = np.flatnonzero(unfinished)
-    if not unfinished_at.size or law.model.release != "gap":
+    stopped = np.isin(solution.termination, (Termination.MAX_STEPS, Termination.STEP_UNDERFLOW))
+    unfinished = np.flatnonzero(stopped)
+    if not unfinished.size or law.model.release != "gap":
         return
     rates = motion.restitution_problem(replace(law, coordinate=VelocityCoordinate())).rates
-    unfinished_params = tuple(column[unfinished_at] for column in params)
-    never = motion.never_separates(rates, unfinished_params, recovered[unfinished_at], law.model.coordinate_power)
-    solution.termination[unfinished_at[never]] = Termination.EVENT_UNREACHABLE
+    unfinished_params = tuple(column[unfinished] for column in params)
+    never = motion.never_separates(rates, unfinished_params, recovered[unfinished], law.model.coordinate_power)
+    solution.termination[unfinished[never]] = Termination.EVENT_UNREACHABLE
 
 
 def _status_of_solution(solution: Solution) -> NDArray[np.int8]:

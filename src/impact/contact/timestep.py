@@ -9,7 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -283,16 +284,10 @@ class _Contacts:
 
 def _run(contacts: _Contacts) -> FixedStepResult:
     count = contacts.x.size
-    result = FixedStepResult(
-        e_out=np.full(count, np.nan),
-        peak=np.full(count, np.nan),
-        permanent=np.full(count, np.nan),
-        force=np.full(count, np.nan),
-        approach_work=np.full(count, np.nan),
-        restitution_work=np.full(count, np.nan),
-        steps=contacts.limit.astype(np.int32),
-        status=np.full(count, Status.NOT_SEPARATED, np.int8),
-    )
+    arrays: dict[str, NDArray[Any]] = {field.name: np.full(count, np.nan) for field in fields(FixedStepResult)}
+    arrays["steps"] = contacts.limit.astype(np.int32)
+    arrays["status"] = np.full(count, Status.NOT_SEPARATED, np.int8)
+    result = FixedStepResult(**arrays)
     active = np.ones(count, bool)
     contacts.begin_work()
     for step in range(1, int(contacts.limit.max(initial=0)) + 1):

@@ -45,6 +45,11 @@ class Collision:
         """Whether the stiffness follows from the materials of both balls."""
         return not self.has_user_stiffness and all(self.materials)
 
+    def require_materials(self, reason: str) -> None:
+        """Refuse a stiffness that does not follow from the materials."""
+        if not self.has_materials:
+            raise UsageError(f"{reason}: expected a material, not K")
+
     @property
     def has_one_material(self) -> bool:
         return self.materials[0] == self.materials[1]
@@ -80,11 +85,6 @@ class Collision:
         }
         values |= {name: self[name] for name in ("R1", "R2", "m1", "m2", "v1", "v2", "v0")}
         return {name: repr(value) for name, value in values.items()}
-
-
-def no_lines(collision: Collision) -> list[str]:
-    """Return no lines."""
-    return []
 
 
 @dataclass(frozen=True)
@@ -130,8 +130,8 @@ class Code:
     read_version: Callable[[str], str] = lambda text: text
     version_of: Callable[[str], str | None] = lambda program: None
     comment: tuple[str, str] = ("# ", "")
-    notes: Callable[[Collision], list[str]] = no_lines
-    warnings: Callable[[Collision], list[str]] = no_lines
+    notes: Callable[[Collision], list[str]] = lambda collision: []
+    warnings: Callable[[Collision], list[str]] = lambda collision: []
     template: str = ""
     suffix: str = ".py"
     program: str = ""

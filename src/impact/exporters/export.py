@@ -179,7 +179,7 @@ def export(
     # before a program is run
     check_outputs([output], [source], overwrite=overwrite)
     code = find_code(to)
-    found, version = choose_version(code, program, code_version, verify=verify)
+    program_path, version = choose_version(code, program, code_version, verify=verify)
     problem = prepare_export(code, model, version, source, at or {}, overrides)
     check_outputs([output], [source, *problem.config.files], overwrite=overwrite)
     if (script or verify) and not code.template:
@@ -205,7 +205,7 @@ def export(
         lines=tuple(code.lines(collision, parameters)),
         script="\n".join(lines) if script else None,
         warnings=tuple(_warnings(problem, collision, at_dt)),
-        verification=verify_scripts(problem, found, dt) if verify and found is not None else None,
+        verification=verify_scripts(problem, program_path, dt) if verify and program_path else None,
         comment=code.comment,
     )
     if output is not None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 
-from ..errors import UsageError
 from .code import Code, Collision, Parameters
 from .programs import python_package_version
 
@@ -116,8 +115,7 @@ os._exit(0)
 def parameters(collision: Collision) -> dict[str, float | str]:
     """Variables of the materials and of their relation, by their names in Kratos."""
     c = collision
-    if not c.has_materials:
-        raise UsageError("Kratos takes Young's modulus and Poisson's ratio: expected a material, not K")
+    c.require_materials("Kratos takes Young's modulus and Poisson's ratio")
     second: dict[str, float | str] = (
         {} if c.has_one_material else {"YOUNG_MODULUS2": c["E2"], "POISSON_RATIO2": c["nu2"]}
     )

@@ -55,8 +55,7 @@ def read_version(text: str) -> str:
 def parameters(collision: Collision) -> dict[str, float | str]:
     """Write the words after each property of fix property/global: its kind, and values by (pair of) types."""
     c = collision
-    if not c.has_materials:
-        raise UsageError("LIGGGHTS takes Young's modulus and Poisson's ratio: expected a material, not K")
+    c.require_materials("LIGGGHTS takes Young's modulus and Poisson's ratio")
     e = 1.0 if c.model.key == "liggghts-edinburgh" else c["e"]
     if not LEAST_E < e <= 1.0:
         raise UsageError(f"e: got {number(e)}, expected {LEAST_E} < e <= 1: LIGGGHTS refuses others")

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 from ..config.load import Config
-from ..contact.impacts import Impacts
+from ..contact.impacts import INPUTS, Impacts
 from ..contact.model import ForceModel
 from ..contact.models import find
 from ..engine.plugins import Plugins
@@ -83,8 +83,7 @@ class ExportProblem:
 
 def input_values(impact: Impacts) -> dict[str, float]:
     """Return all inputs and derived quantities of one impact, by name, in SI."""
-    names = [field.name for field in fields(impact) if field.name != "parameters"]
-    names += ["m", "R_eff", "E_eff", "v0", *impact.parameters]
+    names = [*INPUTS, "m", "R_eff", "E_eff", "v0", *impact.parameters]
     return {name: float(impact.quantity(name)[0]) for name in names}
 
 

@@ -25,10 +25,10 @@ MAX_OUTPUT_BYTES, KEPT_OUTPUT_BYTES = 2**26, 2**20
 POLL_INTERVAL_S = 0.05
 
 
-def find_program(name: str, given: str | None) -> str | None:
-    """Find a program: the given one, this interpreter for "python", else the one next to it or on the path."""
-    if given is not None:
-        path = shutil.which(given)
+def find_program(name: str, requested: str | None) -> str | None:
+    """Find a program: the requested one, this interpreter for "python", else the one next to it or on the path."""
+    if requested is not None:
+        path = shutil.which(requested)
         # it is run in another folder
         return None if path is None else str(Path(path).absolute())
     if name == "python":

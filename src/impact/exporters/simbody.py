@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from ..errors import UsageError
 from .code import Code, Collision, Parameters
 from .programs import python_package_version
 
@@ -60,8 +59,7 @@ print("e_out =", (v2 - v1) / {v0})
 def parameters(collision: Collision) -> dict[str, float | str]:
     """Write stiffness and dissipation of each sphere; the stiffness is the modulus of plane strain."""
     c = collision
-    if not c.has_materials:
-        raise UsageError("Simbody takes the moduli of both spheres: expected a material, not K")
+    c.require_materials("Simbody takes the moduli of both spheres")
     mixed = c.model.key == "simbody-hunt-crossley-mixed"
     return {
         f"{name}{i}": value

@@ -165,11 +165,10 @@ def verify_scripts(problem: ExportProblem, program: str, dt: float) -> Verificat
     )
 
 
-def extrapolate(restitutions: Array, order: int = 1) -> tuple[float, float]:
+def extrapolate(restitutions: Array) -> tuple[float, float]:
     """Extrapolate to a step of zero, with the uncertainty, from runs at h, h/2 and h/4, of shape (3, phases)."""
     coarse, middle, fine = restitutions.mean(axis=1)
-    ratio = 2**order
-    first, second = (ratio * middle - coarse) / (ratio - 1), (ratio * fine - middle) / (ratio - 1)
+    first, second = 2.0 * middle - coarse, 2.0 * fine - middle
     return float(second), float(abs(second - first) + np.ptp(restitutions[2]) / 2)
 
 

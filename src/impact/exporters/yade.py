@@ -64,8 +64,7 @@ def parameters(collision: Collision) -> dict[str, float | str]:
     if "viscoelastic" in c.model.key:
         # the springs and dashpots of the two balls act in series
         return {"kn": 2.0 * c["K"], "cn": 2.0 * c["C"], "ks": 0.0, "cs": 0.0}
-    if not c.has_materials:
-        raise UsageError("YADE takes Young's modulus and Poisson's ratio: expected a material, not K")
+    c.require_materials("YADE takes Young's modulus and Poisson's ratio")
     elastic: dict[str, float | str] = {"young": c["E1"], "poisson": c["nu1"]}
     if not c.has_one_material:
         elastic |= {"young2": c["E2"], "poisson2": c["nu2"]}
@@ -85,15 +84,15 @@ def linear_damping(e: float) -> float:
 
 
 def lines(collision: Collision, parameters: Parameters) -> list[str]:
-    given = dict(parameters)
-    second = {name: given.pop(f"{name}2") for name in ("young", "poisson") if f"{name}2" in given}
-    if "kn" in given:
-        material, physics = f"ViscElMat({_arguments(given)}", "Ip2_ViscElMat_ViscElMat_ViscElPhys()"
+    remaining = dict(parameters)
+    second = {name: remaining.pop(f"{name}2") for name in ("young", "poisson") if f"{name}2" in remaining}
+    if "kn" in remaining:
+        material, physics = f"ViscElMat({_arguments(remaining)}", "Ip2_ViscElMat_ViscElMat_ViscElPhys()"
         law = "Law2_ScGeom_ViscElPhys_Basic()"
     else:
-        elastic = {name: given.pop(name) for name in ("young", "poisson")}
+        elastic = {name: remaining.pop(name) for name in ("young", "poisson")}
         material = f"FrictMat({_arguments(elastic)}"
-        physics = f"Ip2_FrictMat_FrictMat_MindlinPhys({_arguments(given)})"
+        physics = f"Ip2_FrictMat_FrictMat_MindlinPhys({_arguments(remaining)})"
         law = "Law2_ScGeom_MindlinPhys_Mindlin()"
     text = [f"material1 = O.materials.append({material}, frictionAngle=0))"]
     if second:

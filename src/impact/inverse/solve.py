@@ -203,8 +203,8 @@ def placeholder(model: ForceModel, unknown: Parameter) -> dict[str, float]:
     return {name: min(max(value, unknown.least), unknown.most)}
 
 
-def check_target(target: Mapping[str, float]) -> tuple[str, float]:
-    """Check a target, and return its variable and value."""
+def solve_input(config: Config, plugins: Plugins, unknown: Parameter, target: Mapping[str, float]) -> SolveResult:
+    """Find all values of an input that give a target; with an axis, the value nearest to it everywhere."""
     names = [name for name, variable in OUTPUTS.items() if variable.dtype == "f8" and "model" in variable.dims]
     if len(target) != 1:
         raise UsageError(f"--target: got {len(target)} targets, expected one, such as e_out=0.6")
@@ -213,18 +213,12 @@ def check_target(target: Mapping[str, float]) -> tuple[str, float]:
         raise UsageError(f'--target: no output "{name}"; {did_you_mean(name, names)}')
     if not (isinstance(value, int | float) and math.isfinite(value)):
         raise UsageError(f"--target {name}: got {value}, expected a finite number")
-    return name, float(value)
-
-
-def solve_input(config: Config, plugins: Plugins, unknown: Parameter, target: Mapping[str, float]) -> SolveResult:
-    """Find all values of an input that give a target; with an axis, the value nearest to it everywhere."""
-    variable, value = check_target(target)
-    problem = _Problem(config, plugins, unknown, variable)
-    return _best_over_axis(problem, value) if config.axes else _all_roots(problem, value)
+    problem = _SolveProblem(config, plugins, unknown, name)
+    return _best_over_axis(problem, float(value)) if config.axes else _all_roots(problem, float(value))
 
 
 @dataclass(frozen=True)
-class _Problem:
+class _SolveProblem:
     """The target variable as a function of the unknown and of the condition, a position on the axis."""
 
     config: Config
@@ -238,7 +232,7 @@ class _Problem:
 
     @property
     def name(self) -> str:
-        """Config name of the unknown."""
+        """Write the config name of the unknown."""
         name = self.unknown.name
         is_shared = name == "e" or (name == "K" and self.model.exponent is None)
         return name if is_shared else f"{self.model.key}.{name}"
@@ -315,7 +309,7 @@ class _Problem:
         return unit if 0.0 < unit < math.inf else 1.0
 
 
-def _all_roots(problem: _Problem, target: float) -> SolveResult:
+def _all_roots(problem: _SolveProblem, target: float) -> SolveResult:
     """Find all values that give the target."""
     scan = problem.scan_values()
     values = problem.evaluate(scan, is_scan=True)[problem.variable].values
@@ -361,7 +355,7 @@ def _all_roots(problem: _Problem, target: float) -> SolveResult:
     return _result(problem, target, status, map(Root, roots, e_out), values)
 
 
-def _with_extrema(problem: _Problem, scan: Array, values: Array, reached: Mask) -> tuple[Array, Array]:
+def _with_extrema(problem: _SolveProblem, scan: Array, values: Array, reached: Mask) -> tuple[Array, Array]:
     """Add each refined interior extremum to a scan, except those that reach the target."""
     is_restitution = problem.variable.startswith("e_")
     size = np.ones_like(values) if is_restitution else np.abs(values)
@@ -406,7 +400,7 @@ def _runs(reached: Mask, scan: Array, bounds: set[float]) -> tuple[list[float], 
     return roots, ends
 
 
-def _best_over_axis(problem: _Problem, target: float) -> SolveResult:
+def _best_over_axis(problem: _SolveProblem, target: float) -> SolveResult:
     """Find the value for which the largest distance from the target over the axis of the config is least."""
     (axis,) = problem.config.axes
     conditions = np.arange(axis.size)
@@ -450,7 +444,7 @@ def _best_over_axis(problem: _Problem, target: float) -> SolveResult:
 
 
 def _result(
-    problem: _Problem,
+    problem: _SolveProblem,
     target: float,
     status: SolveStatus,
     roots: Iterable[Root],

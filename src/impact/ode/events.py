@@ -90,17 +90,17 @@ def locate_event(
     from the end of the step, as fractions of it.
     """
     g, dg = problem.event(trial.y[:N_COMPONENTS], trial.k, state.params)
-    at = (is_event_ahead(g, dg, trial.h_next) & accepted).nonzero()[0]
-    if not at.size:
-        return at, g[at]
-    g, dg, h = g[at], dg[at], state.h[at]
+    positions = (is_event_ahead(g, dg, trial.h_next) & accepted).nonzero()[0]
+    if not positions.size:
+        return positions, g[positions]
+    g, dg, h = g[positions], dg[positions], state.h[positions]
     g_before, dg_before = problem.event(state.y[:N_COMPONENTS], state.k, state.params)
-    offset, certain = event_offset(g, dg, g_before[at], dg_before[at], h)
-    near, h_next = before_event(offset, certain, h, trial.h_next[at])
-    y, remaining = _step_to_event(problem, state, trial, at, np.where(near, offset, 0.0))
-    located, crossed, trial.h_next[at] = at_event(near, remaining, g, offset, h, h_next)
-    trial.is_accurate[at[crossed]] = False
-    ended = at[located]
+    offset, certain = event_offset(g, dg, g_before[positions], dg_before[positions], h)
+    near, h_next = before_event(offset, certain, h, trial.h_next[positions])
+    y, remaining = _step_to_event(problem, state, trial, positions, np.where(near, offset, 0.0))
+    located, crossed, trial.h_next[positions] = at_event(near, remaining, g, offset, h, h_next)
+    trial.is_accurate[positions[crossed]] = False
+    ended = positions[located]
     if ended.size:
         trial.y[:, ended] = y[:, located]
         state.termination[ended] = Termination.EVENT_REACHED
@@ -108,10 +108,11 @@ def locate_event(
 
 
 def _step_to_event(
-    problem: Problem, state: State, trial: TrialStep, at: NDArray[np.intp], offset: Array
+    problem: Problem, state: State, trial: TrialStep, positions: NDArray[np.intp], offset: Array
 ) -> tuple[Array, Array]:
     """The rows at the event, by a step of order two and a linear one, and the offset of the linear step."""
-    y, k, params = trial.y[:, at], trial.k[:, at], tuple(column[at] for column in state.params)
+    params = tuple(column[positions] for column in state.params)
+    y, k = trial.y[:, positions], trial.k[:, positions]
     k_end = problem.rates(y[:N_COMPONENTS] + offset * k[:N_COMPONENTS], params)
     y = y + trapezoid(offset, k, k_end)[:N_INTEGRATED]
     k = problem.rates(y[:N_COMPONENTS], params)

@@ -37,10 +37,10 @@ def secant_update(left: Array, d_left: Array, right: Array, d_right: Array) -> A
 def update_peaks(state: State, trial: TrialStep, accepted: Mask, ended: NDArray[np.intp]) -> None:
     """Update the candidates where the watched quantity begins to fall, or a trajectory ends, above `best`."""
     value, value_end = state.k[WATCHED_ROW], trial.k[WATCHED_ROW]
-    at = (begins_to_fall(value, value_end, state.best) & accepted).nonzero()[0]
-    if at.size:
-        state.best[at] = value[at]
-        state.peak.put(state.index[at], state.y[:N_COMPONENTS, at], state.h_last[at], state.h[at])
+    falls = (begins_to_fall(value, value_end, state.best) & accepted).nonzero()[0]
+    if falls.size:
+        state.best[falls] = value[falls]
+        state.peak.put(state.index[falls], state.y[:N_COMPONENTS, falls], state.h_last[falls], state.h[falls])
     ended = ended[value_end[ended] > state.best[ended]]
     if ended.size:
         state.best[ended] = value_end[ended]
@@ -64,20 +64,20 @@ def refine_maximum(
     k = problem.rates(peak.y, params)
     d_peak = slope(peak.y, k)
     h = np.where(d_peak > 0.0, peak.ahead, -peak.behind)
-    at = np.flatnonzero(np.abs(d_peak * h) > FLAT_SLOPE * np.abs(best))
-    if not at.size:
+    positions = np.flatnonzero(np.abs(d_peak * h) > FLAT_SLOPE * np.abs(best))
+    if not positions.size:
         return
-    small, params = small[at], tuple(column[at] for column in params)
-    h, k, d_peak = h[at], k.take(at, 1), d_peak[at]
-    y = np.zeros((N_INTEGRATED, at.size))
-    y[:N_COMPONENTS] = peak.y[:, at]
+    small, params = small[positions], tuple(column[positions] for column in params)
+    h, k, d_peak = h[positions], k.take(positions, 1), d_peak[positions]
+    y = np.zeros((N_INTEGRATED, positions.size))
+    y[:N_COMPONENTS] = peak.y[:, positions]
 
     def slope_at(fraction: Array) -> Array:
-        y_end, k_end = take_step(at, y, k, fraction * h)
-        best[at] = np.fmax(best[at], k_end[WATCHED_ROW])
+        y_end, k_end = take_step(positions, y, k, fraction * h)
+        best[positions] = np.fmax(best[positions], k_end[WATCHED_ROW])
         return slope(y_end, k_end)
 
-    left, right = np.zeros(at.size), np.ones(at.size)
+    left, right = np.zeros(positions.size), np.ones(positions.size)
     d_left, d_right = d_peak, slope_at(right)
     for _ in range(SECANT_STEPS):
         root = secant_update(left, d_left, right, d_right)

@@ -97,9 +97,9 @@ def integrate(
                 break
         if problem.watch:
 
-            def take_step(at: NDArray[np.intp], y: Array, k: Array, h: Array) -> tuple[Array, Array]:
-                step_params = tuple(column[at] for column in params)
-                y_end, stages = rk_step(problem, y, k, h, step_params, workspace.narrow(at.size))
+            def take_step(positions: NDArray[np.intp], y: Array, k: Array, h: Array) -> tuple[Array, Array]:
+                step_params = tuple(column[positions] for column in params)
+                y_end, stages = rk_step(problem, y, k, h, step_params, workspace.narrow(positions.size))
                 return y_end, stages[-1]
 
             refine_maximum(problem, params, state.peak, solution.maximum, take_step)
@@ -231,11 +231,11 @@ def first_step(problem: Problem, rtol: float) -> float:
 
 def _halve_non_finite_steps(state: State, trial: TrialStep, error: Array) -> None:
     """Halve the steps that have a rate which is not finite; end trajectories after too many halvings."""
-    at = np.flatnonzero(~trial.is_accurate)
-    at = at[~np.isfinite(error[at]) & (state.termination[at] == RUNNING)]
-    trial.h_next[at] = 0.5 * state.h[at]
-    state.halvings[at] += 1
-    state.termination[at[state.halvings[at] > MAX_HALVINGS]] = Termination.NOT_FINITE
+    positions = np.flatnonzero(~trial.is_accurate)
+    positions = positions[~np.isfinite(error[positions]) & (state.termination[positions] == RUNNING)]
+    trial.h_next[positions] = 0.5 * state.h[positions]
+    state.halvings[positions] += 1
+    state.termination[positions[state.halvings[positions] > MAX_HALVINGS]] = Termination.NOT_FINITE
 
 
 def _move_to_ends(state: State, trial: TrialStep) -> None:

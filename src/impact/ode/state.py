@@ -36,11 +36,11 @@ class PeakCandidate:
         """The starts of all trajectories, without adjacent steps."""
         return cls(start.copy(), np.zeros(start.shape[1]), np.zeros(start.shape[1]))
 
-    def put(self, where: NDArray[np.intp], y: Array, behind: Array, ahead: Array | float) -> None:
+    def put(self, positions: NDArray[np.intp], y: Array, behind: Array, ahead: Array | float) -> None:
         """Replace the candidates at the given positions."""
         for row, values in zip(self.y, y, strict=True):
-            row[where] = values
-        self.behind[where], self.ahead[where] = behind, ahead
+            row[positions] = values
+        self.behind[positions], self.ahead[positions] = behind, ahead
 
 
 @dataclass
@@ -119,13 +119,13 @@ class State:
 
     def put(self, solution: Solution) -> None:
         """Write the trajectories that have ended to the solution."""
-        at = np.flatnonzero(self.termination != RUNNING)
-        where, termination = self.index[at], self.termination[at]
+        ended = np.flatnonzero(self.termination != RUNNING)
+        index, termination = self.index[ended], self.termination[ended]
         reached = termination == EVENT_REACHED
         for row, values in zip(solution.state, self.y, strict=True):
-            row[where] = np.where(reached, values[at], np.nan)
-        solution.maximum[where] = np.where(reached, self.best[at], np.nan)
-        solution.steps[where], solution.termination[where] = self.steps[at], termination
+            row[index] = np.where(reached, values[ended], np.nan)
+        solution.maximum[index] = np.where(reached, self.best[ended], np.nan)
+        solution.steps[index], solution.termination[index] = self.steps[ended], termination
 
     def compacted(self) -> State:
         """The running trajectories, in the same memory: they are moved into the spare array of each pair."""

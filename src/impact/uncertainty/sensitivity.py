@@ -121,8 +121,10 @@ def sensitivities(
     >>> [round(study["mean"].item(), 5) for study in studies]
     [187.75797, 0.00998]
     """
+    names = [name for name in OUTPUTS if name not in ("status", "in_domain")]
     for name in of:
-        check_output_name(name)
+        if name not in names:
+            raise UsageError(f'--of: no output "{name}"; {did_you_mean(name, names)}')
     if output is not None and len(of) > 1:
         raise UsageError(f"--output: got {len(of)} outputs (--of), expected one for a file")
     plan = prepare(source, overrides, plugins, Run(max_points=max_points))
@@ -133,13 +135,6 @@ def sensitivities(
     if output is not None:
         save(results[0], output, overwrite=overwrite)
     return results
-
-
-def check_output_name(of: str) -> None:
-    """Raise a UsageError, which names the nearest output, if there is no such output."""
-    outputs = [name for name in OUTPUTS if name not in ("status", "in_domain")]
-    if of not in outputs:
-        raise UsageError(f'--of: no output "{of}"; {did_you_mean(of, outputs)}')
 
 
 def sensitivity_plan(plan: Plan, of: Sequence[str], max_points: int, name: str) -> Plan:
