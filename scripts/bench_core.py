@@ -29,7 +29,7 @@ from impact.contact.closed_forms.hysteresis import delivered_restitution
 from impact.contact.impacts import Impacts
 from impact.contact.model import ForceModel
 from impact.contact.numba.dispatch import is_installed
-from impact.contact.outputs import collide
+from impact.contact.output_formulas import collide
 from impact.contact.variables import OUTPUTS
 from impact.engine.executors import choose_executor
 from impact.engine.trajectories import RANGE_TRAJECTORIES, even_size

@@ -22,7 +22,7 @@ from tests.problems import hysteresis_reference, table1_impacts
 
 from impact.config.tables import DEFAULT_RTOL
 from impact.contact.models import find
-from impact.contact.outputs import collide
+from impact.contact.output_formulas import collide
 
 MODELS = ("gharib-hurmuzlu-2012", "exact-hysteresis")
 HEAD = (

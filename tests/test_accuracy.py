@@ -13,7 +13,7 @@ from impact.contact.closed_forms.hysteresis import damped_peak_indentation
 from impact.contact.impacts import Impacts
 from impact.contact.models import find
 from impact.contact.models.hysteresis import hysteresis
-from impact.contact.outputs import Outputs, collide
+from impact.contact.output_formulas import Outputs, collide
 from impact.contact.simulate import RecordedCollision, integrate_phases
 from impact.contact.status import Status
 from impact.contact.velocity_coordinates import STRONG_DAMPING

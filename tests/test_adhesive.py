@@ -11,7 +11,7 @@ import impact
 from impact.contact.closed_forms.adhesive import jkr_root
 from impact.contact.impacts import Impacts
 from impact.contact.models import find
-from impact.contact.outputs import Outputs, collide
+from impact.contact.output_formulas import Outputs, collide
 from impact.contact.status import Status
 
 from .problems import table1_impacts

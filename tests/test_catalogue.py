@@ -24,7 +24,7 @@ from impact.contact.closed_forms.hysteresis import WORK_SERIES_BELOW_CHI, approa
 from impact.contact.closed_forms.viscoelastic import pade_damping, pade_restitution
 from impact.contact.dimensionless import delivered
 from impact.contact.models import catalogue, find
-from impact.contact.outputs import collide
+from impact.contact.output_formulas import collide
 from impact.contact.status import Status
 from impact.exporters.registry import CODES
 

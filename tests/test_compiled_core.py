@@ -16,7 +16,7 @@ from impact.contact.impacts import Impacts
 from impact.contact.model import ForceModel
 from impact.contact.models import catalogue, find
 from impact.contact.numba.dispatch import is_installed, serves
-from impact.contact.outputs import Outputs, collide
+from impact.contact.output_formulas import Outputs, collide
 from impact.contact.status import FIRST_FAILURE
 from impact.contact.variables import OUTPUTS
 from impact.engine.plan import NUMBA_MIN_TRAJECTORIES
@@ -219,7 +219,7 @@ def test_the_core_of_a_law_depends_on_its_form_and_exponent(cli: Run) -> None:
 
 FORMS = """
 import numpy as np
-from impact.contact.outputs import collide
+from impact.contact.output_formulas import collide
 from impact.contact.models import find
 from tests.problems import table1_impacts
 for key in ("flores-2011", "exact-dashpot-no-tension", "gharib-hurmuzlu-2012-energetic"):

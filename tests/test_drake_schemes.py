@@ -10,9 +10,9 @@ import pytest
 from scipy.optimize import brentq
 
 import impact
+from impact.contact.fixed_step import LAWS_OF_SCHEME, collide_at_fixed_step, default_scheme, has_scheme
 from impact.contact.models import catalogue, find
 from impact.contact.status import Status
-from impact.contact.timestep import LAWS_OF_SCHEME, collide_at_fixed_step, default_scheme, has_scheme
 from impact.errors import ConfigError, UsageError
 
 from .conftest import Run, assert_refused

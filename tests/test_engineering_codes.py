@@ -14,7 +14,7 @@ from impact.contact.closed_forms.hysteresis import delivered_restitution
 from impact.contact.dimensionless import delivered
 from impact.contact.impulse import velocities_after
 from impact.contact.models import find
-from impact.contact.outputs import Outputs, collide
+from impact.contact.output_formulas import Outputs, collide
 from impact.contact.status import Status
 from impact.errors import ConfigError
 

@@ -11,7 +11,7 @@ import xarray as xr
 from hypothesis import HealthCheck, given, settings, strategies as st
 
 import impact
-from impact.contact.outputs import check_inputs
+from impact.contact.output_formulas import check_inputs
 from impact.contact.status import Status
 from impact.contact.variables import OUTPUTS
 from impact.engine.build_impacts import build_impacts

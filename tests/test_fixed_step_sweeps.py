@@ -16,8 +16,8 @@ import pytest
 import xarray as xr
 
 import impact
+from impact.contact.fixed_step import MAX_STEPS_PER_CONTACT, SCHEMES
 from impact.contact.status import Status
-from impact.contact.timestep import MAX_STEPS_PER_CONTACT, SCHEMES
 from impact.errors import ConfigError, UsageError
 from impact.plots.curves import Curve, CurveData
 from impact.plots.draw import get_plot_data

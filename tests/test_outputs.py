@@ -13,7 +13,7 @@ from impact.contact.closed_forms.hysteresis import delivered_restitution
 from impact.contact.impacts import Impacts
 from impact.contact.model import ForceModel, Parameter
 from impact.contact.models import find
-from impact.contact.outputs import Outputs, collide
+from impact.contact.output_formulas import Outputs, collide
 from impact.contact.status import FIRST_FAILURE, Status
 from impact.contact.variables import OUTPUTS
 from impact.errors import ConfigError

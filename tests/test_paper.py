@@ -14,7 +14,7 @@ from impact.contact.impacts import Impacts
 from impact.contact.impulse import velocities_after, velocities_at
 from impact.contact.materials import hertz_stiffness, sphere_radius
 from impact.contact.models import find
-from impact.contact.outputs import Outputs, collide
+from impact.contact.output_formulas import Outputs, collide
 from impact.contact.status import Status
 
 from .problems import LAWS, table1_impacts, with_parameters

@@ -6,7 +6,7 @@ a step of zero, from h and h/2 and again from h/2 and h/4. The code's own uncert
 extrapolations plus half the spread over the phases at h/4.
 
 At coarse steps a code delivers another restitution, which depends on the phase: it is that of the map of its
-scheme, `impact.contact.timestep`, at each phase.
+scheme, `impact.contact.fixed_step`, at each phase.
 
 `tests/peers` has a script for each code, which runs in a child process. The table at the end of `make test-peers`
 has the largest difference and the largest uncertainty over the collisions of an entry.
@@ -30,7 +30,7 @@ import pytest
 
 import impact
 from impact.contact.dimensionless import dimensionless_values
-from impact.contact.timestep import collide_at_fixed_step
+from impact.contact.fixed_step import collide_at_fixed_step
 from impact.engine.build_impacts import build_impacts
 from impact.results.sweep import prepare
 

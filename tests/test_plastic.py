@@ -9,7 +9,7 @@ import pytest
 from impact.contact.impacts import Impacts
 from impact.contact.model import ForceModel, Parameter
 from impact.contact.models import find
-from impact.contact.outputs import Outputs, collide
+from impact.contact.output_formulas import Outputs, collide
 from impact.contact.status import Status
 
 from .conftest import new_law

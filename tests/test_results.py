@@ -12,7 +12,7 @@ import xarray as xr
 import impact
 from impact.config.load import parse_config
 from impact.config.measurements import MEASURED_OUTPUTS
-from impact.contact.outputs import FORMULAS
+from impact.contact.output_formulas import FORMULAS
 from impact.contact.status import Status
 from impact.contact.variables import BY_DEFAULT, OUTPUTS
 from impact.engine.execute import integrate_ranges

@@ -12,7 +12,7 @@ import pytest
 
 import impact
 from impact.contact.models import find
-from impact.contact.outputs import collide
+from impact.contact.output_formulas import collide
 from impact.contact.status import Status
 
 from .conftest import Run

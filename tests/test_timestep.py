@@ -11,8 +11,8 @@ import pytest
 from numpy.typing import NDArray
 
 import impact
+from impact.contact.fixed_step import collide_at_fixed_step
 from impact.contact.models import find
-from impact.contact.timestep import collide_at_fixed_step
 
 from .conftest import Run, assert_refused, examples_of
 

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from .comparison.compare import compare as compare
     from .comparison.rerun import rerun as rerun
     from .comparison.verdict import Verdict as Verdict
-    from .config.library import materials as materials
+    from .config.material_library import materials as materials
     from .config.starter import init as init
     from .config.tables import schema as schema
     from .contact.checks import check_model as check_model
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from .contact.model import ForceModel as ForceModel, Parameter as Parameter
     from .contact.models.hysteresis import hysteresis as hysteresis
     from .contact.powers import power as power
-    from .engine.catalogue import models as models
+    from .engine.model_catalogue import models as models
     from .errors import ImpactError as ImpactError
     from .exporters.export import export as export, export_codes as export_codes
     from .inverse.calibrate import calibrate as calibrate
@@ -65,9 +65,9 @@ _MODULES = {
     "info": "results.info",
     "init": "config.starter",
     "load": "results.xarray_backend",
-    "materials": "config.library",
+    "materials": "config.material_library",
     "merge": "results.shards",
-    "models": "engine.catalogue",
+    "models": "engine.model_catalogue",
     "plot": "plots.draw",
     "plot_to_files": "plots.files",
     "power": "contact.powers",

@@ -35,7 +35,7 @@ def complete_code(incomplete: str) -> list[str]:
 
 def complete_scheme(incomplete: str) -> list[str]:
     """The schemes with a fixed step."""
-    from ..contact.timestep import SCHEMES
+    from ..contact.fixed_step import SCHEMES
 
     return _beginning_with(incomplete, SCHEMES)
 

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from ..config.input_names import is_input
-from ..contact.timestep import EXACT
+from ..contact.fixed_step import EXACT
 from ..contact.variables import OUTPUTS
 from ..errors import UsageError
 from ..formatting import number

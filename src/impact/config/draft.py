@@ -30,8 +30,8 @@ from .files import (
     to_plain_data,
 )
 from .input_names import InputName, input_values
-from .library import library
 from .lines import MAX_PROBLEM_LINES, key_lines, path_text
+from .material_library import library
 from .quantities import VALUE_FORMS, ConfigProblem, KeyPath
 from .tables import MATERIAL_KEYS, SWEEP_DEFAULTS, SWEEP_QUANTITIES, Loss, Noise, expand_models
 

@@ -10,10 +10,10 @@ from typing import Any, Literal
 
 from pydantic import ValidationError
 
+from ..contact.fixed_step import EXACT
 from ..contact.materials import Material
 from ..contact.model import ForceModel
 from ..contact.numba.dispatch import is_installed
-from ..contact.timestep import EXACT
 from ..contact.variables import BY_DEFAULT
 from . import measurements, quantities, tables
 from .columns import expand_cases, named_files, read_files
@@ -22,8 +22,8 @@ from .draft import Draft, Measurements, Setting, add_library_materials, open_con
 from .files import as_table, override_text, set_value
 from .grid import MAX_POINTS, Axis, build_grid, chunk_problems
 from .input_names import InputName
-from .library import library
 from .lines import validation_problems
+from .material_library import library
 from .quantities import Column, ConfigProblem, Distribution, FitRange, KeyPath
 from .rules import check_rules, materials_of
 

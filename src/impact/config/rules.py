@@ -7,10 +7,10 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 from ..contact.dimensionless import required_quantities
+from ..contact.fixed_step import EXACT, SCHEMES, has_scheme, law_problem
 from ..contact.formula_calls import argument_names
 from ..contact.materials import hertz_stiffness
 from ..contact.model import ForceModel, with_base_quantities
-from ..contact.timestep import EXACT, SCHEMES, has_scheme, law_problem
 from .draft import Draft, listed_names
 from .files import as_table
 from .quantities import ConfigProblem, Quantity

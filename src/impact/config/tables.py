@@ -24,9 +24,9 @@ from pydantic.dataclasses import dataclass
 from pydantic_core import PydanticCustomError
 
 from ..atomic import write_file
+from ..contact.fixed_step import EXACT, MAX_STEPS_PER_CONTACT, SCHEMES
 from ..contact.model import ForceModel
 from ..contact.models import built_in, catalogue
-from ..contact.timestep import EXACT, MAX_STEPS_PER_CONTACT, SCHEMES
 from ..contact.variables import OUTPUTS
 from ..errors import did_you_mean
 from .quantities import (

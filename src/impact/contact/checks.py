@@ -16,7 +16,7 @@ from ..formatting import number
 from .impacts import INPUTS, Impacts, stiffness
 from .materials import effective_mass, hertz_stiffness, sphere_radius
 from .model import QUANTITIES, ForceModel, Parameter
-from .outputs import Outputs, collide
+from .output_formulas import Outputs, collide
 from .status import FIRST_FAILURE, Status
 from .units import dimension
 from .variables import OUTPUTS

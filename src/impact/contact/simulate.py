@@ -24,13 +24,13 @@ from ..ode.state import Workspace
 from . import motion
 from .deduplicate import deduplicate
 from .dimensionless import LawValues, chi_of, exact_restitution, with_coefficients, with_units
+from .fixed_step import EXACT, MAX_CONTACTS, FixedStepResult, collide_at_fixed_step
 from .formula_calls import argument_names, describe_error
 from .model import ForceModel
 from .numba import dispatch
 from .piecewise import in_parts
 from .powers import distinct_values
 from .status import LIMIT, STATUS_OK, Status
-from .timestep import EXACT, MAX_CONTACTS, FixedStepResult, collide_at_fixed_step
 from .velocity_coordinates import VelocityCoordinate, is_strong
 
 # the status that belongs to each termination, by its number; no trajectory ends running

@@ -1,7 +1,7 @@
 """The table of variables: the outputs of a collision, its time history, and all that is known about each.
 
 Files, docs, configs, comparison and pictures follow from an entry. `impact.results.schema.SCHEMA` adds the
-variables of calibrations and sensitivity studies; `impact.contact.outputs.FORMULAS` computes the outputs.
+variables of calibrations and sensitivity studies; `impact.contact.output_formulas.FORMULAS` computes the outputs.
 """
 
 from __future__ import annotations

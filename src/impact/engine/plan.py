@@ -15,10 +15,10 @@ from .._version import __version__
 from ..config.input_names import InputName
 from ..config.load import Config
 from ..config.tables import Solver
+from ..contact.fixed_step import EXACT
 from ..contact.materials import Material
 from ..contact.model import ForceModel
 from ..contact.numba.dispatch import is_installed, serves
-from ..contact.timestep import EXACT
 from ..errors import UsageError
 from .build_impacts import exponents
 from .inputs import Inputs

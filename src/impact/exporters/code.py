@@ -99,7 +99,7 @@ class Code:
     tested : what was run, or what was read instead
     parameters : in the units and conventions of the code, by the code's own names
     damping : the parameter that sets the restitution, of laws without an e
-    scheme : see `impact.contact.timestep.SCHEMES`; None if its restitution at a time step is not predicted
+    scheme : see `impact.contact.fixed_step.SCHEMES`; None if its restitution at a time step is not predicted
     uncertainty : largest difference of e between the code and the map of its scheme
     rough : the same by law, where the code itself finds the damping only roughly
     law_for_version : the entry of the catalogue that holds in a version, from the key of another one and the

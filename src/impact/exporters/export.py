@@ -43,7 +43,7 @@ class Export(Displayed):
     Parameters
     ----------
     model : key of the law
-    scheme : name of the code's fixed-step scheme, see `impact.contact.timestep.SCHEMES`; None if unknown here
+    scheme : name of the code's fixed-step scheme, see `impact.contact.fixed_step.SCHEMES`; None if unknown here
     e : the requested e; NaN for a law without one
     e_continuous, contact_time : of the continuous law [-, s]
     at_dt : what the code delivers at its time step; its restitutions are NaN without a scheme, and where a

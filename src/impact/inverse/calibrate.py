@@ -22,7 +22,7 @@ from ..config.measurements import fitted_parameters
 from ..config.quantities import KeyPath, Quantity
 from ..config.tables import Solver
 from ..contact.model import ForceModel
-from ..contact.outputs import collide
+from ..contact.output_formulas import collide
 from ..contact.units import dimension
 from ..engine.build_impacts import build_impacts
 from ..engine.execute import WorkerContext, context_of, models_of_context

@@ -25,10 +25,10 @@ from ..config.grid import Axis
 from ..config.input_names import InputName
 from ..config.load import Config
 from ..config.tables import Output
+from ..contact.fixed_step import EXACT
 from ..contact.model import ForceModel, Parameter
 from ..contact.models import find
 from ..contact.status import Status
-from ..contact.timestep import EXACT
 from ..contact.units import with_numbers
 from ..contact.variables import OUTPUTS
 from ..display import Block, Displayed

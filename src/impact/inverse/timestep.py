@@ -1,7 +1,7 @@
 """What a code with a fixed time step delivers, how small a step has to be, and which e to ask for.
 
 A collision is integrated at every phase, the part of a step in which the contact begins, by the scheme of a code
-(`impact.contact.timestep`), in one batch over all steps and phases. The e to ask for is a root of the mean over
+(`impact.contact.fixed_step`), in one batch over all steps and phases. The e to ask for is a root of the mean over
 the phases: a scan over e brackets it, and the method of Chandrupatla (1997), Advances in Engineering Software 28,
 145-149, refines it. The number of steps needed is found by bisection.
 """
@@ -21,11 +21,7 @@ from scipy.optimize import elementwise
 from ..array_types import Array
 from ..config.load import Config
 from ..contact.dimensionless import dimensionless_values
-from ..contact.impacts import Impacts
-from ..contact.model import ForceModel
-from ..contact.outputs import collide
-from ..contact.status import FIRST_FAILURE, Status
-from ..contact.timestep import (
+from ..contact.fixed_step import (
     KICK_DRIFT,
     MAX_CONTACTS,
     MAX_STEPS_PER_CONTACT,
@@ -34,6 +30,10 @@ from ..contact.timestep import (
     collide_at_fixed_step,
     default_scheme,
 )
+from ..contact.impacts import Impacts
+from ..contact.model import ForceModel
+from ..contact.output_formulas import collide
+from ..contact.status import FIRST_FAILURE, Status
 from ..display import Block, Displayed, Table
 from ..engine.build_impacts import build_impacts
 from ..engine.plan import Plan
@@ -96,7 +96,7 @@ class TimestepResult(Displayed):
 
     Parameters
     ----------
-    scheme : name of the scheme, see `impact.contact.timestep.SCHEMES`
+    scheme : name of the scheme, see `impact.contact.fixed_step.SCHEMES`
     e : the e that is asked for; NaN for a law without one
     e_continuous, contact_time : of the continuous law [s]
     rows : one for each step
@@ -167,7 +167,7 @@ def timestep(
 
     The phase is the part of a step in which the contact begins: a code sees an overlap at its first step after it.
     The scheme "kick-drift" is that of LAMMPS, LIGGGHTS, YADE and MuJoCo, "drake-tamsi" and "drake-sap" are those
-    of Drake's discrete solvers; `impact.contact.timestep.SCHEMES` has what they do in a step.
+    of Drake's discrete solvers; `impact.contact.fixed_step.SCHEMES` has what they do in a step.
 
     Parameters
     ----------

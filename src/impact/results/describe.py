@@ -11,7 +11,7 @@ import xarray as xr
 
 from ..contact.model import ForceModel
 from ..display import Block, Displayed, Table
-from ..engine.catalogue import ModelDescription
+from ..engine.model_catalogue import ModelDescription
 from ..errors import UsageError
 from . import calibration, sensitivity
 from .attributes import read_attribute

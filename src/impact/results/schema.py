@@ -22,8 +22,8 @@ from ..config.grid import SAMPLE
 from ..config.input_names import InputName, is_foreign, is_input
 from ..config.load import Config
 from ..config.tables import MATERIAL_KEYS
+from ..contact.fixed_step import EXACT
 from ..contact.materials import effective_mass
-from ..contact.timestep import EXACT
 from ..contact.variables import AXES, BY_DEFAULT, HISTORY, OUTPUTS, Variable, by_name
 from ..engine.build_impacts import mass_at, restitution_at
 from ..engine.inputs import Index

@@ -22,15 +22,15 @@ from ..config.load import Config, build, inline_files
 from ..config.rules import has_other_stiffness
 from ..config.starter import STARTER_CONFIG
 from ..config.tables import MATERIAL_QUANTITIES, SWEEP_DEFAULTS, expand_models, model_quantities
+from ..contact.fixed_step import EXACT
 from ..contact.force_expressions import unload_to_residual, unload_with_stiffness
 from ..contact.history import History, integrate_history
 from ..contact.impacts import Impacts
 from ..contact.materials import Material
 from ..contact.model import ForceModel
 from ..contact.models import find
-from ..contact.outputs import collide
+from ..contact.output_formulas import collide
 from ..contact.status import FIRST_FAILURE, Status
-from ..contact.timestep import EXACT
 from ..contact.units import with_numbers
 from ..contact.variables import HISTORY, OUTPUTS
 from ..display import Block, Displayed, Table

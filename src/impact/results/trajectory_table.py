@@ -25,7 +25,7 @@ from ..config.input_names import InputName
 from ..config.tables import FIXED_STEP_INPUTS
 from ..contact.impacts import CHECKS, Impacts, check_inputs
 from ..contact.model import Law
-from ..contact.outputs import Outputs, outputs
+from ..contact.output_formulas import Outputs, outputs
 from ..contact.simulate import CollisionResult
 from ..contact.status import Status
 from ..contact.variables import Variable

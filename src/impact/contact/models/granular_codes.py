@@ -27,7 +27,7 @@ from .dashpot import (
     with_release,
 )
 from .multibody_codes import of_code
-from .rate_dependent import KUWABARA_KONO_AT_SPEED
+from .viscoelastic import KUWABARA_KONO_AT_SPEED
 
 TANGENT_DASHPOT = "F = K δ^(3/2) + 2 β √(m S) δ̇,  S = (3/2) K δ^(1/2)"
 # at this closing speed the linear spring absorbs as much energy as Hertz's

@@ -26,7 +26,7 @@ from .dashpot import (
     TSUJI_1992_NO_TENSION,
     dashpot,
 )
-from .rate_dependent import LEE_HERRMANN_1993, drag
+from .viscoelastic import LEE_HERRMANN_1993, drag
 
 # of the polynomial of α that LAMMPS calls tsuji and credits to Marshall (2009), equation 53, in powers of e
 TSUJI_POLYNOMIAL = (1.2728, -4.2783, 11.087, -22.348, 27.467, -18.022, 4.8218)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..array_types import Array, Mask
 from .dimensionless import dimensionless_values
+from .fixed_step import EXACT
 from .formula_calls import argument_names
 from .impacts import Impacts, check_inputs
 from .impulse import velocities_after
@@ -17,7 +18,6 @@ from .model import ForceModel, Law
 from .powers import all_within
 from .simulate import CollisionResult, simulate
 from .status import FIRST_FAILURE, LIMIT, NO_IMPACT, STATUS_OK
-from .timestep import EXACT
 from .variables import OUTPUTS
 
 Outputs = dict[str, NDArray[Any]]
@@ -73,7 +73,7 @@ def collide(
     max_steps : attempted steps per phase after which an impact fails
     collapse : integrate impacts that are equal in the contact's own units once; changes no bit of the results
     core : "numpy", or "numba" for the laws that it compiles; the results agree within the tolerance
-    integrator : "exact", the continuous law with error control, or one of `impact.contact.timestep.SCHEMES`
+    integrator : "exact", the continuous law with error control, or one of `impact.contact.fixed_step.SCHEMES`
     fixed_step : the phase and the step of a scheme by name, see `impact.contact.simulate.simulate`, of shape (n,)
     errors : receives a line for each distinct error of the law, see `impact.contact.formula_calls.describe_error`
     """
