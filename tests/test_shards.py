@@ -196,9 +196,8 @@ def test_a_folder_of_another_sweep_or_of_no_shard_is_refused(cli: Run, folder: P
 def test_an_invalid_shard_record_is_refused(cli: Run, folder: Path, text: str) -> None:
     (shard,) = run_shards(folder, "1/1")
     (shard / "shard.json").write_text(text)
-    completed = cli("merge", shard, cwd=folder)
-    assert completed.returncode == 2
-    assert "is not a shard; expected a work folder of impact sweep --shard K/N" in completed.stderr
+    message = "is not a shard; expected a work folder of impact sweep --shard K/N"
+    assert_refused(cli("merge", shard, cwd=folder), message)
 
 
 def test_repeated_blocks_are_counted_and_differing_ones_are_refused(cli: Run, folder: Path, whole: bytes) -> None:
@@ -226,18 +225,16 @@ def test_a_merge_needs_the_plug_in_of_the_shards(cli: Run, folder: Path) -> None
     (folder / "mine.py").write_text(PLUGIN.format(chi="1 - e"))
     (folder / "c.toml").write_text(CONFIG.replace('"hertz"', '"mine-2026"'))
     folders = run_shards(folder, "1/2", "2/2", plugins=["mine.py"])
-    completed = cli("merge", *folders, cwd=folder)
-    assert completed.returncode == 2
-    assert "made with mine-2026 of mine.py; give it again with --plugin FILE" in completed.stderr
+    message = "made with mine-2026 of mine.py; give it again with --plugin FILE"
+    assert_refused(cli("merge", *folders, cwd=folder), message)
     assert cli("merge", *folders, "--plugin", "mine.py", cwd=folder).returncode == 0
 
 
 def test_a_shard_of_another_sweep_is_not_continued_but_can_be_overwritten(cli: Run, folder: Path) -> None:
     run_shards(folder, "1/2")
     words = ("sweep", "c.toml", "--shard", "1/2", "--set", "sweep.v1=2.0", "--quiet")
-    completed = cli(*words, cwd=folder)
-    assert completed.returncode == 2
-    assert "results.h5.1-of-2.work: belongs to another sweep: scalars.v1: 1.0 there, 2.0 here" in completed.stderr
+    message = "results.h5.1-of-2.work: belongs to another sweep: scalars.v1: 1.0 there, 2.0 here"
+    assert_refused(cli(*words, cwd=folder), message)
     completed = cli(*words, "--overwrite", cwd=folder)
     assert (completed.returncode, completed.stderr) == (0, "")
 
