@@ -260,7 +260,7 @@ def _changed_values(name: str, new: xr.DataArray, baseline: xr.DataArray) -> Dif
 
 
 def _labels_agree(a: Labels, b: Labels, rounding: float = 0.0) -> bool:
-    """Whether all labels agree within their relative tolerance, and an absolute tolerance `rounding`."""
+    """Return whether all labels agree within their relative tolerance, and an absolute tolerance `rounding`."""
     if a.dtype.kind in NUMBER_DTYPE_KINDS and b.dtype.kind in NUMBER_DTYPE_KINDS:
         return bool(np.isclose(a, b, rtol=LABEL_RTOL, atol=rounding, equal_nan=True).all())
     return bool(np.all(a.astype(str) == b.astype(str)))

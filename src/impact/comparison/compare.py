@@ -218,7 +218,7 @@ def _attribute_notes(
 
 
 def _attributes_equal(a: Any, b: Any) -> bool:
-    """Whether two attributes, which may be arrays, are equal."""
+    """Return whether two attributes, which may be arrays, are equal."""
     return bool(np.array_equal(a, b))
 
 

@@ -60,7 +60,7 @@ def _failures(outcome: Verdict | NoVerdict) -> list[tuple[str, str]]:
 
 
 def as_junit(outcome: Verdict | NoVerdict) -> str:
-    """JUnit XML: a suite with a test for each kind of difference and each variable, named by what it claims."""
+    """Write JUnit XML: a suite with a test for each kind of difference and variable, named by what it claims."""
     tests = {
         claim: [fault.text for fault in outcome.faults if fault.kind == kind] for kind, claim in CLAIMS.items()
     }
@@ -92,7 +92,7 @@ def as_junit(outcome: Verdict | NoVerdict) -> str:
 
 
 def as_markdown(outcome: Verdict | NoVerdict) -> str:
-    """Markdown for a pull request or a job summary."""
+    """Write Markdown for a pull request or a job summary."""
     sign = {True: "✅", False: "❌", None: "⚠️"}[outcome.equal]
     new, baseline = (_escape_code(safe_text(name)) for name in (outcome.new, outcome.baseline))
     lines = [f"### {sign} {PROGRAM}: {_escape_markdown(outcome.headline)}", ""]
@@ -118,7 +118,7 @@ def as_markdown(outcome: Verdict | NoVerdict) -> str:
 
 
 def as_github(outcome: Verdict | NoVerdict) -> str:
-    """A workflow command of GitHub Actions: one annotation on the baseline, with the worst of what differs."""
+    """Write a workflow command of GitHub Actions: an annotation on the baseline, with the worst differences."""
     failures = _failures(outcome)
     lines = [outcome.headline]
     for text, command in failures[:MAX_ANNOTATED]:

@@ -82,5 +82,5 @@ def _check_tolerances(tolerances: Mapping[str, Any]) -> None:
 
 
 def _is_number(value: object) -> TypeGuard[float]:
-    """Whether a value is a real number."""
+    """Return whether a value is a real number."""
     return isinstance(value, int | float | np.number) and not isinstance(value, bool)

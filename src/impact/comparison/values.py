@@ -62,7 +62,7 @@ def representative_regions(variables: Sequence[Variable], aligned: Alignment) ->
 
 
 def _declares_dims(result: AlignedResult, name: str) -> bool:
-    """Whether the axes along which a variable varies are known."""
+    """Return whether the axes along which a variable varies are known."""
     variable = result.dataset.variables[name]
     return slabs.is_lazy(variable) and slabs.VARIES_ALONG in variable.encoding
 

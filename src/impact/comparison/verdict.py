@@ -196,7 +196,7 @@ class Verdict(Displayed):
         return tuple(lines)
 
     def rows(self) -> list[tuple[str, ...]]:
-        """A row of text for each variable that changed, the worst first, under VERDICT_HEADINGS."""
+        """Write a row of text for each variable that changed, the worst first, under VERDICT_HEADINGS."""
         return [
             (
                 variable.name,
@@ -235,7 +235,7 @@ class Verdict(Displayed):
         }
 
     def records(self) -> Sequence[Mapping[str, Any]]:
-        """The compared variables, those that differ first."""
+        """List the compared variables, those that differ first."""
         return [vars(variable) for variable in self.ranked]
 
     def sections(self, width: int) -> Iterator[Block]:
@@ -247,7 +247,7 @@ class Verdict(Displayed):
             yield Table(rows, VERDICT_HEADINGS, text=(0, 1))
 
     def replay(self, variable: VariableComparison) -> str:
-        """The command that runs the worst point of a variable again; empty if there is none."""
+        """Write the command that runs the worst point of a variable again; empty if there is none."""
         if not self.repeats or not variable.at:
             return ""
         return replay_command(self.repeats, variable.at)

@@ -102,11 +102,11 @@ class ContractResult(list[ClauseResult], Displayed):
         return all(result.holds for result in self)
 
     def as_dict(self) -> dict[str, Any]:
-        """The clauses as plain data."""
+        """Return the clauses as plain data."""
         return {"model": self.model.key, "holds": self.holds, "clauses": self.records()}
 
     def records(self) -> Sequence[Mapping[str, Any]]:
-        """The clauses."""
+        """List the clauses."""
         return [
             {"clause": result.clause, "holds": result.holds, "worst": result.worst, "bound": result.bound}
             for result in self

@@ -175,7 +175,7 @@ class _Contacts:
             self.branch = tuple(np.zeros_like(x) for _ in range(4))
 
     def force(self) -> Array:
-        """The force at the position and velocity before the step."""
+        """Compute the force at the position and velocity before the step."""
         law = self.law
         force = self._formula(law.model.force, self.params, {})
         unloading = law.model.unloading

@@ -12,7 +12,7 @@ MAX_FLOAT = float(np.finfo(float).max)
 
 
 def velocities_at(impacts: Impacts, impulse: Array) -> tuple[Array, Array]:
-    """Velocities v1, v2 [m/s] once an impulse tau [N s] has passed: equations (8) and (9), shape (n,).
+    """Compute v1, v2 [m/s] once an impulse tau [N s] has passed: equations (8) and (9), shape (n,).
 
     (9) as printed has a minus, an erratum. An infinite mass (a wall) keeps its velocity.
     """
@@ -20,7 +20,7 @@ def velocities_at(impacts: Impacts, impulse: Array) -> tuple[Array, Array]:
 
 
 def velocities_after(impacts: Impacts, e: Array) -> tuple[Array, Array]:
-    """Velocities v1+, v2+ [m/s] after an impact of restitution e: equations (6) and (7), shape (n,).
+    """Compute v1+, v2+ [m/s] after an impact of restitution e: equations (6) and (7), shape (n,).
 
     Balls that do not approach keep their velocities; an impulse that overflows gives NaN.
     """

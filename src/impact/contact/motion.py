@@ -188,12 +188,12 @@ def restitution_law(law: MotionLaw) -> MotionLaw:
 
 
 def start_of_approach(law: MotionLaw, params: Params, n: int) -> Array:
-    """Components at first contact, shape (2, n): s = 0, v = 1."""
+    """Make the components at first contact, shape (2, n): s = 0, v = 1."""
     return _components_at(law, params, np.zeros(1), 1.0, n)
 
 
 def start_of_restitution(law: MotionLaw, params: Params, recovered: Array) -> Array:
-    """Components at the peak, shape (2, n): s of the recovered indentation, shape (n,), and v = 0."""
+    """Make the components at the peak, shape (2, n): s of the recovered indentation, shape (n,), and v = 0."""
     return _components_at(law, params, power(recovered, 1.0 / law.model.coordinate_power), 0.0, recovered.size)
 
 

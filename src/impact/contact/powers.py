@@ -84,7 +84,7 @@ def all_within(values: Array, least: float, most: float) -> bool:
 
 
 def integer_power(base: Array, exponent: int) -> Array:
-    """`base` (of either sign) to a whole power >= 0, by repeated squaring.
+    """Raise `base` (of either sign) to a whole power >= 0, by repeated squaring.
 
     >>> integer_power(np.array([-2.0, 3.0]), 5)
     array([-32., 243.])

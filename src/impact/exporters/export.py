@@ -80,7 +80,7 @@ class Export(Displayed):
         return "\n".join([*comment_lines(self.header, *self.comment), *self.lines]) + "\n"
 
     def as_dict(self) -> dict[str, Any]:
-        """The result as plain data; numbers that do not apply are NaN."""
+        """Return the result as plain data; numbers that do not apply are NaN."""
         row = self.at_dt
         data: dict[str, Any] = {
             **{name: getattr(self, name) for name in EXPORT_FIELDS},
@@ -98,7 +98,7 @@ class Export(Displayed):
         return data
 
     def records(self) -> Sequence[Mapping[str, Any]]:
-        """The parameters of the code."""
+        """List the parameters of the code."""
         return [{"parameter": name, "value": value} for name, value in self.parameters.items()]
 
     def sections(self, width: int) -> Iterator[Block]:

@@ -48,7 +48,7 @@ class Verification(Displayed):
     uncertainty: float
 
     def as_dict(self) -> dict[str, Any]:
-        """The comparison as plain data."""
+        """Return the comparison as plain data."""
         return {
             "program": self.program,
             "agrees": self.agrees,
@@ -57,7 +57,7 @@ class Verification(Displayed):
         }
 
     def records(self) -> Sequence[Mapping[str, Any]]:
-        """A row for each time step and phase."""
+        """List a row for each time step and phase."""
         columns = zip(self.dt, self.phases, self.measured, self.predicted, strict=True)
         return [dict(zip(("dt", "phase", "measured", "predicted"), row, strict=True)) for row in columns]
 

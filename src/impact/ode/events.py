@@ -56,12 +56,12 @@ def event_offset(g: Array, dg: Array, g_before: Array, dg_before: Array, h: Arra
 
 
 def is_event_ahead(g: Array, dg: Array, h_next: Array) -> Mask:
-    """Whether the event lies before the end of the next step, by linear extrapolation."""
+    """Find whether the event lies before the end of the next step, by linear extrapolation."""
     return smaller(h_next * dg + g, g) < 0.0
 
 
 def before_event(offset: Array, certain: Mask, h: Array, h_next: Array) -> tuple[Mask, Array]:
-    """Whether the event is near the end of a step, and the length of the next step, at most up to the event."""
+    """Find whether the event is near the end of a step, and the length of the next step, at most to the event."""
     near = np.abs(offset) <= NEAR_EVENT * h + EVENT_ATOL
     return near, choose(certain & (offset < h_next), offset, h_next)
 
@@ -69,7 +69,7 @@ def before_event(offset: Array, certain: Mask, h: Array, h_next: Array) -> tuple
 def at_event(
     near: Mask, remaining: Array, g: Array, offset: Array, h: Array, h_next: Array
 ) -> tuple[Mask, Mask, Array]:
-    """Whether the event is located, whether the step crossed it instead, and the length of the next step.
+    """Find whether the event is located, whether the step crossed it instead, and the length of the next step.
 
     `remaining` is the offset after a step of order two; g at the end of the step is negative where it crossed.
     """
@@ -110,7 +110,7 @@ def locate_event(
 def _step_to_event(
     problem: Problem, state: State, trial: TrialStep, positions: NDArray[np.intp], offset: Array
 ) -> tuple[Array, Array]:
-    """The rows at the event, by a step of order two and a linear one, and the offset of the linear step."""
+    """Compute the rows at the event, by steps of order two and one, and the offset of the linear step."""
     params = tuple(column[positions] for column in state.params)
     y, k = trial.y[:, positions], trial.k[:, positions]
     k_end = problem.rates(y[:N_COMPONENTS] + offset * k[:N_COMPONENTS], params)

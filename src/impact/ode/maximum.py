@@ -24,7 +24,7 @@ TakeStep = Callable[[NDArray[np.intp], Array, Array, Array], tuple[Array, Array]
 
 
 def begins_to_fall(value: Array, value_end: Array, best: Array) -> Mask:
-    """Whether the watched quantity falls over a step, from a value above the largest one so far."""
+    """Find whether the watched quantity falls over a step, from a value above the largest one so far."""
     return (value_end < value) & (value > best)
 
 

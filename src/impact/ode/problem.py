@@ -73,14 +73,14 @@ class Step:
 
     @classmethod
     def of(cls, start: Array, length: Array, stages: list[Array], end: Array) -> Step:
-        """A copy of a step; missing rows of a stage are zero, since they have no weight."""
+        """Copy a step; missing rows of a stage are zero, since they have no weight."""
         rows = np.zeros((len(stages), *start.shape))
         for target, stage in zip(rows, stages, strict=True):
             target[: len(stage)] = stage[:N_INTEGRATED]
         return cls(start.copy(), length, rows, end)
 
     def at(self, theta: float | Array) -> Array:
-        """The integrated rows (4, n) at a fraction of the step, by the interpolant of order four."""
+        """Interpolate the integrated rows (4, n) at a fraction of the step, with order four."""
         total = np.zeros_like(self.start)
         for weights, stage in zip(DENSE_WEIGHTS, self.stages, strict=True):
             factor = theta * (weights[0] + theta * (weights[1] + theta * (weights[2] + theta * weights[3])))

@@ -37,7 +37,7 @@ NestedWeights = tuple[tuple[int, Array], ...]
 
 
 def _nested_weights(row: tuple[Fraction, ...]) -> NestedWeights:
-    """A row of weights for `_weighted`: each relative to the next, zeros left out."""
+    """Write a row of weights for `_weighted`: each relative to the next, zeros left out."""
     stages = [stage for stage, weight in enumerate(row) if weight]
     next_weights = [*(row[stage] for stage in stages[1:]), Fraction(1)][: len(stages)]
     ratios = (float(row[stage] / other) for stage, other in zip(stages, next_weights, strict=True))
@@ -137,7 +137,7 @@ def _advance(problem: Problem, state: State, rtol: float, record: bool) -> Step 
 def rk_step(
     problem: Problem, y: Array, k: Array, h: Array, params: Params, workspace: Workspace
 ) -> tuple[Array, list[Array]]:
-    """A step of length h from rows y with rates k: rows at its end and the seven stages, in the workspace."""
+    """Take a step of length h from rows y with rates k: rows at its end and the seven stages, in the workspace."""
     stages, slopes = [k], [k[:N_COMPONENTS]]
     part, y_end, start = workspace.part, workspace.y_end, y[:N_COMPONENTS]
     for weights, rows in zip(STAGE_WEIGHTS[:-1], workspace.stages[:-1], strict=True):
@@ -165,7 +165,7 @@ def _weighted_sum(weights: NestedWeights, stages: list[Array], total: Array) -> 
 def local_error(
     problem: Problem, stages: list[Array], y: Array, y_end: Array, h: Array, workspace: Workspace
 ) -> Array:
-    """The norm of the local error of a step, shape (n,)."""
+    """Compute the norm of the local error of a step, shape (n,)."""
     error = workspace.part
     _weighted_sum(ERROR_WEIGHTS, [stage[:N_COMPONENTS] for stage in stages], error)
     np.multiply(error, h, error)
@@ -218,14 +218,14 @@ def step_factor(error: Array, rtol: float, exponent: int) -> Array:
 
 
 def next_step(h: Array, error: Array, rtol: float) -> Array:
-    """The length of the next step by the controller."""
+    """Choose the length of the next step by the controller."""
     factor = step_factor(error, rtol, CONTROLLER_EXPONENT)
     factor = choose(factor < MAX_FACTOR, factor, MAX_FACTOR)
     return h * choose(factor > MIN_FACTOR, factor, MIN_FACTOR)
 
 
 def first_step(problem: Problem, rtol: float) -> float:
-    """The length of the first step, which is accepted in ordinary impacts."""
+    """Choose the length of the first step, which is accepted in ordinary impacts."""
     return problem.step_at_unit_error * float(step_factor(np.ones(1), rtol, FIRST_STEP_EXPONENT)[0])
 
 

@@ -33,7 +33,7 @@ class PeakCandidate:
 
     @classmethod
     def of(cls, start: Array) -> PeakCandidate:
-        """The starts of all trajectories, without adjacent steps."""
+        """Begin with the starts of all trajectories, without adjacent steps."""
         return cls(start.copy(), np.zeros(start.shape[1]), np.zeros(start.shape[1]))
 
     def put(self, positions: NDArray[np.intp], y: Array, behind: Array, ahead: Array | float) -> None:
@@ -55,21 +55,21 @@ class Workspace:
 
     @classmethod
     def of(cls, n: int) -> Workspace:
-        """For n trajectories, in one block of memory."""
+        """Allocate for n trajectories, in one block of memory."""
         rows = (N_INTEGRATED, WATCHED_ROW + 1, *STAGE_ROWS[1:], N_INTEGRATED, N_COMPONENTS)
         block = np.empty((sum(rows), n))
         y, k, *stages, y_end, part = np.split(block, np.cumsum(rows)[:-1])
         return cls(y, k, stages, y_end, part)
 
     def narrow(self, n: int) -> Workspace:
-        """The same memory for fewer trajectories."""
+        """Use the same memory for fewer trajectories."""
         stages = [_narrow(stage, n) for stage in self.stages]
         ends = (_narrow(rows, n) for rows in (self.y_end, self.part))
         return Workspace(_narrow(self.y, n), _narrow(self.k, n), stages, *ends)
 
 
 def _narrow(rows: Array, n: int) -> Array:
-    """The memory of an array of rows, for rows of length n."""
+    """Narrow the memory of an array of rows, for rows of length n."""
     return rows.reshape(-1)[: len(rows) * n].reshape(len(rows), n)
 
 
@@ -96,7 +96,7 @@ class State:
 
     @classmethod
     def begin(cls, problem: Problem, start: Array, params: Params, workspace: Workspace, h: float) -> State:
-        """All trajectories at their start; missing rows of the start are zero."""
+        """Set all trajectories to their start; missing rows of the start are zero."""
         n = start.shape[1]
         y, k = workspace.y, workspace.k
         y[: len(start)], y[len(start) :] = start, 0.0
@@ -128,7 +128,7 @@ class State:
         solution.steps[index], solution.termination[index] = self.steps[ended], termination
 
     def compacted(self) -> State:
-        """The running trajectories, in the same memory: they are moved into the spare array of each pair."""
+        """Keep the running trajectories, in the same memory: they are moved into the spare array of each pair."""
         running = np.flatnonzero(self.termination == RUNNING)
         workspace = self.workspace.narrow(running.size)
         y = self.y.take(running, 1, workspace.y_end, "clip")
