@@ -49,11 +49,6 @@ def test_a_fit_at_a_bound_is_ranked_last_and_has_no_weight(drops: xr.Dataset) ->
     assert last["weight"] == 0.0
 
 
-def test_the_stored_core_is_the_one_of_fits_where_a_sweep_would_use_numba(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("impact.engine.plan.NUMBA_MIN_TRAJECTORIES", 1)
-    assert impact.calibrate(LINEAR).attrs["core"] == "numpy"
-
-
 def test_curves_and_bands_pass_through_the_predictions(drops: xr.Dataset) -> None:
     law = drops.isel(model=0, output_name=0)
     at_points = np.interp(drops["v1"], drops["grid"], law["curve"])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
@@ -20,7 +20,6 @@ from ..config.input_names import InputName
 from ..config.load import Config, parse_config, read_config
 from ..config.measurements import fitted_parameters
 from ..config.quantities import KeyPath, Quantity
-from ..config.tables import Solver
 from ..contact.model import ForceModel
 from ..contact.output_formulas import collide
 from ..contact.units import dimension
@@ -132,7 +131,9 @@ def prediction(
     assert config.data is not None
     outputs = tuple(config.data.outputs)
     scalars = {name: value for name, value in config.scalars.items() if name not in (*names, *inputs)}
-    solver = fit_solver(config)
+    solver = config.solver
+    # fits are integrated by NumPy unless the config names numba
+    core = "numba" if solver.core == "numba" else "numpy"
 
     def predict(rows: Array) -> Array:
         columns = {name: np.tile(values, len(rows)) for name, values in inputs.items()}
@@ -143,7 +144,7 @@ def prediction(
         swept = Inputs(scalars, (axis,), config.materials)
         impacts = build_impacts(swept, model, swept.index()).broadcast()
         collisions = collide(
-            model, impacts, rtol=solver.rtol, max_steps=solver.max_steps, core=solver.core, names=outputs
+            model, impacts, rtol=solver.rtol, max_steps=solver.max_steps, core=core, names=outputs
         )
         # a law on which no column has an effect has one trajectory
         shape = len(rows) * points
@@ -152,11 +153,6 @@ def prediction(
         )
 
     return predict
-
-
-def fit_solver(config: Config) -> Solver:
-    """Choose the core of fits: NumPy, unless the config names numba."""
-    return replace(config.solver, core="numba" if config.solver.core == "numba" else "numpy")
 
 
 def _fit_remotely(key: str, text: str, overrides: Sequence[str], context: WorkerContext) -> FittedLaw:
@@ -355,8 +351,7 @@ def _calibration_dataset(config: Config, plugins: Plugins, laws: Mapping[str, Fi
     fits = [laws[key].fit for key in keys]
     parameters = list(config.fits)
     varied = varied_input(config.data.inputs)
-    fitted = replace(config, solver=fit_solver(config))
-    dataset = calibration_template(fitted, [models[key] for key in keys], plugins, varied)
+    dataset = calibration_template(config, [models[key] for key in keys], plugins, varied)
     shape = (len(keys), len(parameters))
     arrays = {name: np.full(shape, np.nan) for name in ("estimate", "lower", "upper")}
     covariance = np.full((*shape, len(parameters)), np.nan)
