@@ -11,7 +11,7 @@ import numpy as np
 from impact.contact.evidence import count_states
 from impact.contact.model import ForceModel, Parameter
 from impact.contact.models import catalogue
-from impact.text import with_year
+from impact.formatting import with_year
 from models_deviations import deviations
 from models_restitution import BALLS, BOUNDS, DAMPING, MATERIAL, SPEEDS, error, restitution_curves
 from models_tables import cell, formula, largest, number, short, table, within

@@ -22,7 +22,7 @@ from impact.contact.materials import Material
 from impact.contact.model import Parameter
 from impact.contact.models import catalogue
 from impact.errors import ConfigError
-from impact.text import escape_controls, safe_text
+from impact.formatting import escape_controls, safe_text
 
 from .conftest import ROOT, new_law, problems_of
 from .test_schema_agrees import SCHEMA

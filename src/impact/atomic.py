@@ -17,7 +17,7 @@ from secrets import token_hex
 from typing import Any
 
 from .errors import StoreError, UsageError
-from .text import safe_text
+from .formatting import safe_text
 
 try:
     import fcntl

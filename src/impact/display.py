@@ -14,8 +14,7 @@ from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING, Any, NamedTuple, TextIO, TypeAlias
 
-from .formatting import number
-from .text import safe_text
+from .formatting import number, safe_text
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -20,7 +20,7 @@ from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 from types import MappingProxyType
 
-from .text import escape_controls, safe_text
+from .formatting import escape_controls, safe_text
 
 # characters of a problem; a longer one is cut in its middle, since its end says what was expected
 MAX_PROBLEM = 2000

@@ -19,7 +19,7 @@ from typing import TextIO
 from typer import TyperException
 
 from ..errors import ImpactError, Interruption, InUseError, StoreError, UnfinishedError
-from ..text import escape_controls, safe_text
+from ..formatting import escape_controls, safe_text
 
 # a shell reports 130 and 143 for a process that SIGINT or SIGTERM ended
 EXIT_OK, EXIT_NOT_EQUAL, EXIT_USAGE, EXIT_POINTS_FAILED, EXIT_STORAGE, EXIT_IN_USE = 0, 1, 2, 3, 4, 5

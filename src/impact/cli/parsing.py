@@ -7,7 +7,7 @@ from typing import NamedTuple, TypeVar
 
 import typer
 
-from ..text import safe_text
+from ..formatting import safe_text
 
 
 class Setting(NamedTuple):

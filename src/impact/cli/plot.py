@@ -12,8 +12,8 @@ import impact
 
 from ..display import dump
 from ..errors import UsageError
+from ..formatting import safe_text
 from ..plots.kinds import KINDS, WIDTHS
-from ..text import safe_text
 from . import exits
 from .completion import complete_axis, complete_kind, complete_output
 from .options import JsonOption, ModelOption, OverwriteOption, PluginOption, SelectOption

@@ -12,11 +12,10 @@ import xarray as xr
 from ..array_types import Array
 from ..config.input_names import InputName, is_input
 from ..contact.variables import OUTPUTS
-from ..formatting import number
+from ..formatting import number, safe_text
 from ..results.attributes import read_attribute
 from ..results.schema import MODEL_METADATA, columns_along, is_case
 from ..results.selection import LABEL_RTOL, NUMBER_DTYPE_KINDS, IndexArray, Labels, match_labels
-from ..text import safe_text
 from .verdict import Difference, DifferenceKind
 
 MAX_NAMED_LABELS = 3  # labels of one side that a message lists

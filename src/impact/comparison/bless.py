@@ -12,10 +12,10 @@ import xarray as xr
 
 from ..atomic import check_output
 from ..errors import ResultError, UsageError
+from ..formatting import safe_text
 from ..results.replay_command import command_start, describe_point, inputs_of_model
 from ..results.summary import summarize
 from ..results.xarray_backend import load, save_with_attributes
-from ..text import safe_text
 from .compare import check_comparable, compare
 from .tolerances import Tolerances, effective_tolerances
 from .verdict import Verdict

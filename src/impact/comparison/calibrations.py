@@ -9,10 +9,10 @@ import xarray as xr
 
 from ..array_types import Array
 from ..config.input_names import is_input
+from ..formatting import safe_text
 from ..results.attributes import read_attribute
 from ..results.calibration import fit_status
 from ..results.schema import CALIBRATION
-from ..text import safe_text
 from .align import AlignedResult, Alignment
 from .verdict import Difference
 

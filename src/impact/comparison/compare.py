@@ -13,13 +13,12 @@ from ..config.input_names import is_input
 from ..contact.fixed_step import EXACT
 from ..contact.variables import OUTPUTS
 from ..errors import UsageError
-from ..formatting import number
+from ..formatting import number, safe_text
 from ..results.attributes import read_attribute
 from ..results.kinds import is_calibration, kind_of, require_sweep
 from ..results.replay_command import command_start
 from ..results.schema import MODEL_METADATA, SCHEMA, SCHEMA_VERSION, is_case
 from ..results.xarray_backend import load
-from ..text import safe_text
 from .align import MODEL_COORDINATES, Alignment, align_sweeps
 from .calibrations import align_calibrations, fit_notes
 from .tolerances import ALL_VARIABLES, Tolerances, calibration_tolerances, effective_tolerances

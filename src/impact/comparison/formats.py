@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 from xml.etree import ElementTree
 
-from ..formatting import number
-from ..text import safe_text
+from ..formatting import number, safe_text
 from .verdict import Difference, VariableComparison, Verdict, by_kind
 
 PROGRAM = "impact compare"

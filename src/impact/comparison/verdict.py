@@ -11,9 +11,8 @@ import xarray as xr
 
 from ..contact.status import Status
 from ..display import Block, Displayed, Table
-from ..formatting import number
+from ..formatting import number, safe_text
 from ..results.replay_command import describe_point, replay_command
-from ..text import safe_text
 
 DifferenceKind = Literal["nothing in common", "physics config", "labels", "units", "missing variable", "values"]
 # in the order of a verdict: kinds that explain others first

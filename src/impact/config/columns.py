@@ -21,7 +21,7 @@ from pydantic_core import PydanticCustomError
 
 from ..contact.variables import OUTPUTS
 from ..errors import ConfigError, did_you_mean
-from ..text import safe_text
+from ..formatting import safe_text
 from .draft import Draft
 from .files import as_table, read_text, set_value
 from .input_names import InputName, input_values

@@ -18,7 +18,7 @@ from pydantic_core import PydanticCustomError
 from ..contact.model import ForceModel
 from ..contact.models import catalogue
 from ..errors import ConfigError
-from ..text import safe_text
+from ..formatting import safe_text
 from .files import (
     as_table,
     override_text,

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import ConfigError
-from ..text import safe_text
+from ..formatting import safe_text
 from .lines import BARE_KEY
 from .quantities import ConfigProblem, KeyPath, as_text
 

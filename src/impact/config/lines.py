@@ -10,7 +10,7 @@ from pydantic import ValidationError
 
 from ..contact.model import ForceModel
 from ..errors import did_you_mean
-from ..text import safe_text
+from ..formatting import safe_text
 from . import quantities
 from .quantities import VALUE_FORMS, Column, ConfigProblem, KeyPath, as_text
 from .tables import (

@@ -11,8 +11,7 @@ from pydantic_core import PydanticCustomError
 from ..contact.model import ForceModel, with_base_quantities
 from ..contact.variables import OUTPUTS
 from ..errors import ConfigError, did_you_mean
-from ..formatting import number
-from ..text import safe_text
+from ..formatting import number, safe_text
 from .columns import Cells, Columns, contains_path, read_cells, read_csv_of
 from .draft import Draft, Measurements
 from .files import set_value

@@ -35,7 +35,7 @@ from pydantic_core.core_schema import CoreSchema, with_info_plain_validator_func
 from ..contact.model import ForceModel
 from ..contact.units import dimension, names_in
 from ..errors import did_you_mean
-from ..text import safe_text
+from ..formatting import safe_text
 
 # keys and indices from the top of a config to a value
 KeyPath: TypeAlias = tuple[str | int, ...]

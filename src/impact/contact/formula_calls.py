@@ -12,7 +12,7 @@ import numpy as np
 
 from ..array_types import Array
 from ..errors import NOT_OF_A_PLUGIN, ModelError
-from ..text import safe_text
+from ..formatting import safe_text
 
 # frames of a traceback in these folders do not show where a formula is wrong
 LIBRARIES = (Path(__file__).parents[1], Path(np.__file__).parent)

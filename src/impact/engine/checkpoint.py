@@ -22,7 +22,7 @@ from filelock import FileLock, Timeout
 from ..atomic import atomic_write, sync_folder
 from ..contact.simulate import TABLE_COLUMNS, CollisionResult
 from ..errors import ImpactError, InUseError, StoreError, UsageError
-from ..text import safe_text
+from ..formatting import safe_text
 from .plan import Plan
 from .run import Run
 from .trajectories import RANGE_TRAJECTORIES, TrajectoryRange

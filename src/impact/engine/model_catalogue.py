@@ -18,8 +18,7 @@ from ..contact.models import catalogue
 from ..contact.numba.dispatch import serves
 from ..display import Block, Displayed, Styled, Table, Wrapped, html_of
 from ..errors import ModelError, UsageError, did_you_mean
-from ..formatting import decimals, number
-from ..text import with_year
+from ..formatting import decimals, number, with_year
 from .plugins import read_plugins
 
 # requested e of which a table of the catalogue shows the delivered restitution

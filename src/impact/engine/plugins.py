@@ -27,7 +27,7 @@ from ..config.quantities import as_text
 from ..contact.model import ForceModel
 from ..contact.models import catalogue
 from ..errors import NOT_OF_A_PLUGIN, ImpactError, ModelError, UsageError
-from ..text import safe_text
+from ..formatting import safe_text
 
 ENTRY_POINT_GROUP = "impact.models"
 # characters of the error message of a plug-in: a message that lists all known names is long

@@ -14,10 +14,9 @@ from ..atomic import check_outputs, write_file
 from ..contact.status import Status
 from ..display import Block, Displayed
 from ..errors import UsageError
-from ..formatting import decimals, number, quantity
+from ..formatting import decimals, number, quantity, safe_text
 from ..inverse.timestep import TimestepRow, needed_steps, time_steps, timestep_rows
 from ..results.single_impact import ConfigSource
-from ..text import safe_text
 from .code import Collision, Parameters
 from .problem import ExportProblem, prepare_export
 from .registry import CODES, find_code

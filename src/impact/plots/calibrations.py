@@ -9,10 +9,9 @@ import numpy as np
 from ..array_types import Array
 from ..contact.variables import OUTPUTS
 from ..errors import UsageError, did_you_mean
-from ..formatting import decimals
+from ..formatting import decimals, safe_text
 from ..results.calibration import calibration_title, fit_status
 from ..results.kinds import is_calibration
-from ..text import safe_text
 from .curves import CurveData, Panel, curve_of, x_axis_fields
 from .data import SIGMA, Points
 from .kinds import Choice, Kind

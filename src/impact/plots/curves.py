@@ -19,8 +19,7 @@ from matplotlib.patches import Patch
 from numpy.typing import ArrayLike
 
 from ..errors import UsageError
-from ..formatting import heading
-from ..text import NO_BREAK
+from ..formatting import NO_BREAK, heading
 from .data import MEASURED, SIGMA, Points
 from .kinds import Choice
 from .labels import label_axis, pretty_conditions, symbol, words_of

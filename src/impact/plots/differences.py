@@ -14,8 +14,7 @@ from matplotlib.lines import Line2D
 
 from ..comparison.verdict import VariableComparison, Verdict
 from ..errors import UsageError
-from ..formatting import number
-from ..text import safe_text
+from ..formatting import number, safe_text
 from .labels import axis_text, escape_mathtext, words_of
 from .layout import Picture
 from .slices import unit_of

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any
 from ..config.grid import SAMPLE
 from ..contact.model import ForceModel
 from ..errors import UsageError
-from ..formatting import quantity
-from ..text import safe_text
+from ..formatting import quantity, safe_text
 from .draw import plot
 from .kinds import STUDIES, default_kind, find_kind, kinds_of, source_of
 from .slices import unit_of, x_axis

@@ -14,8 +14,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormat
 from ..config.input_names import InputName
 from ..contact.variables import HISTORY, OUTPUTS
 from ..errors import UsageError
-from ..formatting import scaled_unit, typographic
-from ..text import NO_BREAK, safe_text, with_year
+from ..formatting import NO_BREAK, safe_text, scaled_unit, typographic, with_year
 from .slices import parameter_text, scalars_of
 
 if TYPE_CHECKING:

@@ -21,8 +21,7 @@ from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
 from ..errors import UsageError, did_you_mean
-from ..formatting import heading, percentage
-from ..text import safe_text
+from ..formatting import heading, percentage, safe_text
 from .data import Points
 from .kinds import Choice, Kind
 from .labels import REFERENCE, label_axis, model_label, number_axis, pretty_conditions, symbol, words_of

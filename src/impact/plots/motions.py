@@ -13,10 +13,10 @@ from ..array_types import Array
 from ..config.tables import SWEEP_QUANTITIES
 from ..contact.models import catalogue
 from ..errors import UsageError
+from ..formatting import safe_text
 from ..results.attributes import read_attribute
 from ..results.kinds import has_fixed_steps
 from ..results.schema import exponent_text
-from ..text import safe_text
 from .curves import Curve, CurveData, Mark, Panel, curve_of
 from .kinds import Choice, Kind
 from .labels import REFERENCE, law_text, words_of

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import UsageError
-from ..formatting import label as number_label
-from ..text import safe_text
+from ..formatting import label as number_label, safe_text
 from .curves import Curve, CurveData, Panel, curve_of, x_axis_fields
 from .kinds import Choice, Kind
 from .labels import REFERENCE, model_label

@@ -11,10 +11,9 @@ from ..config.grid import SAMPLE
 from ..config.input_names import InputName, is_input
 from ..contact.units import with_numbers
 from ..errors import UsageError, did_you_mean
-from ..formatting import quantity
+from ..formatting import NO_BREAK, quantity, safe_text
 from ..results.schema import exponents_of, plain_unit
 from ..results.selection import model_positions, select
-from ..text import NO_BREAK, safe_text
 from .kinds import Choice
 
 if TYPE_CHECKING:

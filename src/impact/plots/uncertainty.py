@@ -11,9 +11,9 @@ import numpy as np
 from ..config.grid import SAMPLE
 from ..contact.variables import OUTPUTS
 from ..errors import UsageError
+from ..formatting import safe_text
 from ..results.selection import select
 from ..results.sensitivity import distribution_texts
-from ..text import safe_text
 from .curves import Curve, CurveData, Panel, curve_of, x_axis_fields
 from .kinds import Choice, Kind
 from .labels import model_label

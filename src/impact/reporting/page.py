@@ -24,7 +24,7 @@ from ..config.tables import MATERIAL_QUANTITIES
 from ..contact.model import ForceModel
 from ..contact.models import catalogue
 from ..errors import UsageError
-from ..formatting import label, number
+from ..formatting import label, number, safe_text, with_year
 from ..plots.slices import unit_of, varying_inputs
 from ..results.attributes import read_attribute
 from ..results.calibration import (
@@ -43,7 +43,6 @@ from ..results.sensitivity import INDEX_HEADINGS, describe_design, describe_stud
 from ..results.slabs import MAX_SUMMARY_POINTS, is_large
 from ..results.summary import Summary, extremes_of, summarize
 from ..results.xarray_backend import load
-from ..text import safe_text, with_year
 from .figures import at_text, coordinate_text, figures_of
 
 if TYPE_CHECKING:

@@ -18,8 +18,7 @@ from ..contact.model import ForceModel
 from ..contact.variables import OUTPUTS
 from ..engine.plan import Plan
 from ..engine.plugins import Plugins
-from ..formatting import decimals, number
-from ..text import safe_text
+from ..formatting import decimals, number, safe_text
 from . import schema
 
 # probability of chi2 below which a law is called rejected

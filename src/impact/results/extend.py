@@ -30,7 +30,7 @@ from ..engine.plugins import Plugins, read_plugins
 from ..engine.run import ProgressCallback, Run, ignore, never
 from ..engine.trajectories import TrajectoryMap, TrajectoryRange
 from ..errors import ResultError, UsageError
-from ..text import safe_text
+from ..formatting import safe_text
 from .attributes import read_attribute
 from .kinds import require_sweep
 from .layouts import FillSlab

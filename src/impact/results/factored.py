@@ -32,8 +32,7 @@ from ..engine.build_impacts import Stiffness, has_stiffness_rule, mass_at, value
 from ..engine.inputs import Index, Inputs
 from ..engine.trajectories import TrajectoryMap
 from ..errors import ResultError, UsageError
-from ..formatting import number
-from ..text import safe_text
+from ..formatting import number, safe_text
 from .attributes import LawRecord, SummaryRecord, read_attribute
 from .netcdf import RegionValues
 from .schema import attributes_of, count_points, derived_names, scale_of

@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 from ..errors import ResultError
-from ..text import safe_text
+from ..formatting import safe_text
 from .seal import HDF5_MAGIC, USER_BLOCK_BYTES
 
 # returns bytes of a file: `read(address, size)`

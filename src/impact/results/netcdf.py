@@ -24,7 +24,7 @@ from xarray.core import indexing
 from ..atomic import Sink
 from ..config.tables import Output
 from ..errors import ResultError
-from ..text import safe_text
+from ..formatting import safe_text
 from .hdf5_structure import ReadBytes, check_object
 from .schema import SCHEMA_VERSION
 from .seal import USER_BLOCK_BYTES

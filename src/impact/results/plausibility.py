@@ -9,8 +9,7 @@ from ..contact.status import Status
 from ..engine.build_impacts import smaller_radius_at
 from ..engine.trajectories import axes_of_arrays, probe_index
 from ..errors import ModelError, ResultError
-from ..formatting import number
-from ..text import safe_text
+from ..formatting import number, safe_text
 from .factored import read_inputs
 from .schema import parts_of_models
 from .slabs import MAX_SUMMARY_POINTS, is_computed, over_varying_dims, slabs

@@ -13,7 +13,7 @@ from ..config.grid import MAX_POINTS
 from ..config.load import Config, Purpose, build
 from ..engine.plugins import Plugins
 from ..errors import ResultError, UsageError
-from ..text import safe_text
+from ..formatting import safe_text
 from .attributes import PluginRecord, read_attribute
 from .selection import match_labels
 

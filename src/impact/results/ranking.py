@@ -17,8 +17,7 @@ from ..config.input_names import InputName
 from ..contact.status import FIRST_FAILURE, Status
 from ..display import Block, Displayed, Table, html_of
 from ..errors import UsageError
-from ..formatting import label, number, percentage
-from ..text import safe_text
+from ..formatting import label, number, percentage, safe_text
 from .kinds import require_sweep
 from .replay_command import describe_point
 from .schema import columns_along, foreign_dims

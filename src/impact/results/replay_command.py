@@ -9,8 +9,7 @@ from typing import TypeVar
 import xarray as xr
 
 from ..config.input_names import InputName
-from ..formatting import number
-from ..text import safe_text
+from ..formatting import number, safe_text
 from .attributes import read_attribute
 
 InputValue = TypeVar("InputValue")

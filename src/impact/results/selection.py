@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from ..array_types import Mask
 from ..errors import UsageError, did_you_mean
-from ..formatting import label
-from ..text import safe_text
+from ..formatting import label, safe_text
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -13,8 +13,7 @@ from ..config.input_names import InputName
 from ..contact.units import with_numbers
 from ..contact.variables import OUTPUTS
 from ..engine.plan import Plan
-from ..formatting import decimals, number
-from ..text import NO_BREAK, safe_text
+from ..formatting import NO_BREAK, decimals, number, safe_text
 from .attributes import read_attribute
 from .schema import SENSITIVITY, plan_coordinates, provenance_attributes, template
 

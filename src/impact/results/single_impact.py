@@ -38,8 +38,7 @@ from ..engine.build_impacts import build_impacts, fixed_steps_at
 from ..engine.plan import Plan
 from ..engine.plugins import Plugins, read_plugins
 from ..errors import UsageError, did_you_mean
-from ..formatting import number, quantity
-from ..text import safe_text
+from ..formatting import number, quantity, safe_text
 from .kinds import require_sweep
 from .provenance import changed_plugins, stored_draft, unknown_plugins
 from .schema import SCHEMA_VERSION, attributes_of, is_case, plain_unit

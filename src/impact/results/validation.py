@@ -17,7 +17,7 @@ from ..contact.simulate import TABLE_COLUMNS
 from ..contact.status import STATUSES
 from ..contact.variables import AXES, OUTPUTS
 from ..errors import ResultError
-from ..text import safe_text
+from ..formatting import safe_text
 from .attributes import ATTRIBUTE_TYPES, read_attribute
 from .kinds import kind_of
 from .schema import CALIBRATION_TEXTS, FIT_STATUSES, MODEL_METADATA, SCHEMA, STUDY_COORDINATES, is_case

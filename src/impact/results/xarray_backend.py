@@ -18,7 +18,7 @@ from ..config.files import RESULT_MAGIC
 from ..config.grid import MAX_POINTS
 from ..config.tables import Output
 from ..errors import ResultError, UnfinishedError, UsageError
-from ..text import safe_text
+from ..formatting import safe_text
 from .hdf5_structure import byte_reader, check_root
 from .kinds import require_sweep
 from .layouts import LAYOUTS
