@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import json
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -16,8 +17,6 @@ from impact.config.tables import (
     Data,
     Design,
     MaterialTable,
-    Output,
-    Solver,
     Sweep,
     quantities_of,
 )
@@ -89,21 +88,20 @@ def config_page() -> str:
         quantities = quantities_of(table)
         for key, field in table.model_fields.items():
             quantity = quantities.get(key)
-            meaning = quantity.about if quantity else field.description or ""
+            meaning = quantity.description if quantity else field.description or ""
             default = {**SWEEP_DEFAULTS, **FIXED_STEP_DEFAULTS}.get(key) if name == "sweep" else None
             values = (quantity.expected if quantity else "") + (
                 f"; default {default:g}" if default is not None else ""
             )
             lines.append(f"| `{key}` | {meaning} | {values} |")
-    for name, settings in (("solver", Solver), ("output", Output)):
-        lines += ["", f"## [{name}]", "", "```text", *_parameters_of(settings.__doc__ or ""), "```"]
+    for name, table in (("solver", "Solver"), ("output", "Output")):
+        lines += ["", f"## [{name}]", "", "| key | meaning | values |", "|---|---|---|"]
+        for key, field in impact.schema()["$defs"][table]["properties"].items():
+            values = [json.dumps(value) for value in field.get("enum", ())]
+            if "default" in field:
+                values.append(f"default {json.dumps(field['default'])}")
+            lines.append(f"| `{key}` | {field['description']} | {', '.join(values)} |")
     return "\n".join(lines) + "\n"
-
-
-def _parameters_of(docstring: str) -> list[str]:
-    """The lines of the section of parameters of a docstring."""
-    _, _, after = docstring.partition("----------\n")
-    return [line.removeprefix("    ") for line in after.rstrip().splitlines()]
 
 
 def api_page() -> str:
