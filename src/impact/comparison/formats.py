@@ -42,7 +42,7 @@ class NoVerdict:
         return "; ".join(self.error.splitlines())
 
     def replay(self, variable: VariableComparison) -> str:
-        """There is no point to run again."""
+        """Return an empty text: there is no point to run again."""
         return ""
 
     def as_dict(self) -> dict[str, Any]:

@@ -52,7 +52,7 @@ class Columns:
     is_text: bool = True  # text without a unit may be a number
 
     def problem(self, message: str, column: str = "", row: int | None = None) -> str:
-        """Say where a problem is."""
+        """Prefix a message with the place of the problem: source, line and column."""
         line = self.header if row is None else self.lines[row]
         place = f"{self.source}:{line}" if line else self.source
         return ": ".join(part for part in (place, safe_text(column, 60), message) if part)

@@ -21,7 +21,7 @@ from .tables import LOSSES, MAX_MEASURED, MIN_SIGMA, NOISES, SWEEP_QUANTITIES
 
 SIGMA, SPECIMEN = "sigma", "specimen"
 SPECIMEN_EXPECTED = "got nothing, expected the name of a specimen"
-# intervals of measured values; a fraction may be below 0 or above 1 by its noise, farther off it is no fraction
+# intervals of measured values; noise may move a fraction below 0 or above 1, but not farther than this
 _INTERVALS: dict[str, dict[str, Any]] = {
     "any": {"least": -MAX_MEASURED, "most": MAX_MEASURED},
     "positive": {"least": 0.0, "above": True, "most": MAX_MEASURED},

@@ -376,7 +376,7 @@ Names: TypeAlias = str | tuple[str, ...] | Column
 
 
 def value_form(value: object) -> str:
-    """Tell the form of a value: a number or text, a list, a range, a column, a fit or a distribution."""
+    """Name the form of a value: a number or text, a list, a range, a column, a fit or a distribution."""
     match value:
         case list():
             return LIST

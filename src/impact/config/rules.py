@@ -49,7 +49,7 @@ def _models_using(draft: Draft, *quantities: str) -> str:
 
 
 def _exclusion_hint(draft: Draft, model: ForceModel) -> str:
-    """Say how to exclude a model that was selected by "all", a family or a pattern; empty for a named model."""
+    """Describe how to exclude a model that "all", a family or a pattern selected; empty for a named model."""
     is_named = model.key in listed_names(draft.data.get("models"))
     return "" if is_named or len(draft.models) == 1 else f'; or models = [..., "!{model.key}"]'
 

@@ -131,7 +131,7 @@ class ContractResult(list[ClauseResult], Displayed):
         yield from self.notes()
 
     def notes(self) -> list[str]:
-        """Say what was not checked."""
+        """List what was not checked."""
         if any(result.clause == CLOSED_FORM for result in self):
             return []
         return [f"{self.model.key}: has no oracle, so that its restitution was compared with no closed form"]

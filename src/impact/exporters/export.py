@@ -27,7 +27,7 @@ from .verification import Verification, verify_scripts
 STEPS_PER_CONTACT = 50.0
 # the time step that is advised keeps every phase within this relative tolerance
 ADVISED_TOL = 0.01
-# a continuous law that delivers another e than it is asked for, by more than this, is warned about
+# a larger difference between the requested e and that of the continuous law is a warning
 ASKED_TOL = 0.005
 # fields of an export that its plain data begin with
 EXPORT_FIELDS = ("code", "version", "model", "scheme", "e", "e_continuous", "contact_time")
@@ -263,7 +263,7 @@ def _row(problem: ExportProblem, dt: float) -> TimestepRow:
 
 
 def _failure(problem: ExportProblem, row: TimestepRow) -> str:
-    """Say why the code delivers no restitution at a time step."""
+    """Explain why the code delivers no restitution at a time step."""
     status = row.status.replace("_", " ")
     return f"{status} at {row.failed} of {problem.law.phases} phases, {Status[row.status.upper()].meaning}"
 

@@ -51,7 +51,7 @@ SCAN_RTOL, SCAN_MAX_STEPS = 1e-7, 400
 SCAN_TOLERANCE = 1e-3
 # a value of the scan is a root within this multiple of the tolerance of the integration
 TARGET_TOLERANCE = 10.0
-# a smaller difference of neighbours of the scan is no extremum
+# a smaller difference between neighbours of the scan does not count as an extremum
 SCAN_NOISE = 1e-6
 # an extremum is refined until the output differs by less, relative to itself; absolute for a restitution
 EXTREMUM_TOLERANCE = 1e-10
@@ -157,7 +157,7 @@ def solve(
 
     Raises
     ------
-    UsageError : the law has no such parameter, or the target is no output
+    UsageError : the law has no such parameter, or the target is not an output
     ConfigError, ModelError : see `sweep`
 
     The law of Gharib and Hurmuzlu delivers less than it is asked for, and never 0.6:
@@ -250,7 +250,7 @@ class _SolveProblem:
             axes=(Axis(columns, numbered="trial"),),
             scalars={name: value for name, value in self.config.scalars.items() if name not in replaced},
             output=Output(layout="full"),
-            # the number of fixed steps of a scheme is no choice
+            # the number of steps of a fixed-step scheme is given by its step
             solver=replace(solver, rtol=max(solver.rtol, SCAN_RTOL), max_steps=SCAN_MAX_STEPS)
             if is_scan and solver.integrator == EXACT
             else solver,
@@ -282,7 +282,7 @@ class _SolveProblem:
         if math.isfinite(lower) and math.isfinite(upper):
             values.append(np.linspace(lower, upper, SCAN_BETWEEN_BOUNDS))
         all_values: Array = np.unique(np.concatenate(values))
-        # a stiffness of zero is no contact
+        # with a stiffness of zero there is no contact
         is_allowed = (all_values > 0.0) | (self.unknown.name != "K")
         return all_values[is_allowed & (all_values >= lower) & (all_values <= upper)]
 

@@ -97,7 +97,7 @@ class TimestepResult(Displayed):
     Parameters
     ----------
     scheme : name of the scheme, see `impact.contact.fixed_step.SCHEMES`
-    e : the e that is asked for; NaN for a law without one
+    e : the requested e; NaN for a law without one
     e_continuous, contact_time : of the continuous law [s]
     rows : one for each step
     needed : for `tol`; None without one, or if no number of steps up to `MAX_STEPS_PER_CONTACT` is enough
@@ -233,7 +233,7 @@ class FixedStepLaw:
 
     @property
     def e(self) -> float:
-        """The e that is asked for; NaN for a law without one."""
+        """The requested e; NaN for a law without one."""
         return float(self.impact.e[0]) if self.has_e else math.nan
 
     def restitution(self, dt: Array, e: Array | None = None) -> Array:

@@ -37,7 +37,7 @@ def explore(dataset: xr.Dataset, *, plugins: Sequence[ForceModel | str | Path] =
 
     Raises
     ------
-    UsageError : it is no result with models, or ipywidgets is not installed
+    UsageError : it is not a result with models, or ipywidgets is not installed
 
     >>> import impact
     >>> controls = impact.explore(impact.sweep("configs/figure6.toml"))

@@ -138,7 +138,7 @@ def find_kind(name: str) -> Kind:
 
 
 def source_of(dataset: xr.Dataset) -> str:
-    """Tell what a dataset holds: its kind, see `impact.results.kinds`, or "samples" of uncertain inputs."""
+    """Find what a dataset holds: its kind, see `impact.results.kinds`, or "samples" of uncertain inputs."""
     from ..config.grid import SAMPLE
     from ..results.kinds import kind_of
 

@@ -111,7 +111,7 @@ def take_plane(dataset: xr.Dataset, kind: str, choice: Choice) -> Plane:
     dataset = _select(dataset, choice)
     along = [x_axis(dataset, name) for name in (choice.x, choice.y) if name is not None]
     dims = [dataset[name].dims[0] for name in along]
-    # the default is no axis of a single value, and no coordinate that varies along several axes
+    # the default is neither an axis of a single value nor a coordinate that varies along several axes
     plain = dataset.drop_vars([name for name, coordinate in dataset.coords.items() if coordinate.ndim > 1])
     while len(along) < 2:
         taken = [dim for dim, size in plain.sizes.items() if dim != "model" and (size == 1 or dim in dims)]

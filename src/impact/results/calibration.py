@@ -64,7 +64,7 @@ def _estimate_texts(parameter: xr.Dataset) -> tuple[str, str]:
 
 
 def unidentified_notes(dataset: xr.Dataset) -> list[str]:
-    """Say for each law what the data do not determine of it."""
+    """List for each law the parameters that the data do not determine."""
     notes = []
     for key in map(str, dataset["model"].values):
         law = dataset.sel(model=key)
@@ -78,7 +78,7 @@ def unidentified_notes(dataset: xr.Dataset) -> list[str]:
 
 
 def fit_notes(dataset: xr.Dataset) -> list[str]:
-    """Say what a reader has to know besides the table, one line for each note."""
+    """List what a reader has to know besides the table, one line for each note."""
     best = dataset.isel(model=0)
     notes = [*_noise_notes(dataset)]
     if (
@@ -153,7 +153,7 @@ def calibration_title(dataset: xr.Dataset) -> str:
 
 
 def describe_data(dataset: xr.Dataset) -> str:
-    """Say what the laws were fitted to, in a sentence without a full stop."""
+    """Describe the data to which the laws were fitted, in a sentence without a full stop."""
     laws, points = dataset.sizes["model"], dataset.sizes["point"]
     plural = "" if laws == 1 else "s"
     return f"{laws} law{plural}, {points} measured values, noise {dataset.attrs['noise']}; the best law first"

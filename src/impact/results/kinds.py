@@ -12,7 +12,7 @@ Kind = Literal["sweep", "history", "calibration", "sensitivity study"]
 
 
 def kind_of(dataset: xr.Dataset) -> Kind:
-    """Tell the kind of a dataset by its dimensions."""
+    """Find the kind of a dataset by its dimensions."""
     if "t" in dataset.dims:
         return "history"
     if "parameter" in dataset.dims:

@@ -73,7 +73,7 @@ def _unit_of_input(name: str) -> str:
 
 
 def describe_design(dataset: xr.Dataset) -> str:
-    """Say how the samples of a result were drawn, in a sentence without a full stop; "" without samples."""
+    """Describe how the samples of a result were drawn, in a sentence without a full stop; "" without samples."""
     design = read_attribute(dataset.attrs, "design")
     if not design:
         return ""

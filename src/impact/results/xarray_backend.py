@@ -66,7 +66,7 @@ def save(
 
     Raises
     ------
-    UsageError : the file exists, its folder cannot be written to, or the dataset is no result
+    UsageError : the file exists, its folder cannot be written to, or the dataset is not a result
     StoreError : the disk is full or failed
     UnfinishedError : writing was stopped; nothing was written
 
@@ -211,7 +211,7 @@ def expand(
     Raises
     ------
     ResultError : the file is not a readable result
-    UsageError : it is no result of a sweep, it has more than `max_points` points, or the output exists
+    UsageError : it is not the result of a sweep, it has more than `max_points` points, or the output exists
     StoreError : the disk is full or failed
 
     >>> import impact, tempfile

@@ -63,7 +63,7 @@ def sensitivity(
 
     Raises
     ------
-    ConfigError : with one line for each problem; there is no design, or its n is no power of two from 2 on
+    ConfigError : with one line for each problem; there is no design, or its n is not a power of two >= 2
     UsageError, StoreError : there is no such output, or the file exists or cannot be written
 
     The peak force of Hertz' law is proportional to K^0.4 v^1.2:
