@@ -6,6 +6,7 @@ import json
 import math
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ import impact
 from impact.contact.models import find
 from impact.contact.output_formulas import collide
 from impact.contact.status import Status
+from impact.errors import UsageError
 
 from .conftest import Run
 from .problems import EACH_LAW, LAWS, table1_impacts, with_parameters
@@ -296,3 +298,17 @@ def test_values_of_numpy_are_values() -> None:
     assert roots[0] == roots[1] != ()
     with pytest.raises(impact.ImpactError, match=r"^--at e=1\.5: sweep\.e: got 1\.5, expected"):
         impact.run(model="bilinear", at={"e": np.float64(1.5)})
+
+
+@pytest.mark.parametrize(
+    "values", [(0.2, 0.3), [0.2, 0.3], np.array([0.2, 0.3]), {"linspace": [0, 1, 3]}], ids=repr
+)
+def test_several_values_of_an_input_are_refused_in_one_line(values: Any) -> None:
+    with pytest.raises(UsageError, match=r"^--at e=[^\n]*: got several values, expected one$"):
+        impact.run(model="hertz", at={"e": values})
+
+
+@pytest.mark.parametrize("name", ["materials..v1", "materials..E"])
+def test_a_property_of_no_material_is_an_unknown_input(name: str) -> None:
+    with pytest.raises(UsageError, match=f'^no input "{name}" here'):
+        impact.run(model="hertz", at={name: 0.3})

@@ -218,6 +218,7 @@ def columns_of_table(table: Any, source: str) -> Columns:
         range(1, len(table) + 1),
         {name: unit or units.get(name, "") for name, unit in cells},
         {name: values for (name, _), values in cells.items()},
+        is_text=False,
     )
 
 

@@ -33,7 +33,7 @@ class InputName:
         """Read a config name; "model." before the key of a model may be omitted."""
         # the key of a model has no dot, the name of a material may have one
         owner, _, key = str(text).removeprefix("model.").rpartition(".")
-        if owner.startswith("materials."):
+        if owner.startswith("materials.") and owner != "materials.":
             return cls("materials", owner.removeprefix("materials."), key)
         return cls("model", owner, key) if owner else cls("sweep", "", str(text))
 

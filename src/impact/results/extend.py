@@ -143,9 +143,9 @@ def _extend_into(output: Path, source: Path, overrides: Sequence[str], plugins: 
     also where a point of the result had the same one.
     """
     name, before = str(source), open_result(source)
-    table = table_of_result(before)
-    require_sweep(before, "extend")
     with before:
+        table = table_of_result(before)
+        require_sweep(before, "extend")
         config = stored_config(before.attrs, [], plugins, name, run.max_points)
         old = Plan(config, plugins.of(config.models))
         _check_whole(before, old, name)

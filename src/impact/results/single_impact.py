@@ -10,6 +10,7 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import xarray as xr
 
 from .._version import __version__
@@ -421,6 +422,9 @@ def single_point(
     over : values of an input, as in a config, that stay an axis
     """
     draft, fixed = source.draft, {str(InputName.parse(name)): value for name, value in (at or {}).items()}
+    for name, value in fixed.items():
+        if isinstance(value, Mapping) or np.ndim(value):
+            raise UsageError(f"--at {name}={value}: got several values, expected one")
     if {"e", "alpha"} <= fixed.keys():
         raise UsageError("--at alpha: got alpha and e, expected one of the two")
     law = None if model is None else find(model, source.plugins.models)
