@@ -93,11 +93,15 @@ def did_you_mean(word: str, choices: Sequence[str], synonyms: Mapping[str, str] 
 
     >>> did_you_mean("Hetrz", ["hertz", "bilinear"]), did_you_mean("masss1", ["m1", "v1"], {"mass1": "m1"})
     ('did you mean "hertz"?', 'did you mean "m1"?')
+    >>> did_you_mean("E1", ["e", "m1"])
+    'known: e, m1'
     """
     if not choices:
         return "none are defined"
     spellings = {name.lower(): name for name in choices[:1000]}
     spellings |= {synonym: name for synonym, name in synonyms.items() if name in choices}
-    matches = get_close_matches(word[:64].lower(), spellings, n=1, cutoff=0.6)
+    # a name of one or two letters is near to many others: only its case may differ
+    cutoff = 0.6 if len(word) > 2 else 1.0
+    matches = get_close_matches(word[:64].lower(), spellings, n=1, cutoff=cutoff)
     all_choices = f"known: {', '.join(sorted(choices[:1000]))}"
     return safe_text(f'did you mean "{spellings[matches[0]]}"?' if matches else all_choices, 800)

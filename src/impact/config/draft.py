@@ -218,7 +218,8 @@ def _library_setting(name: str, without: Iterable[str] = ()) -> Setting:
 def open_config(source: Path | Mapping[str, object], plugins: Sequence[ForceModel] = ()) -> Draft:
     """Open the config of a TOML file or a mapping, in which names of files are relative to its folder."""
     if not isinstance(source, Mapping):
-        return replace(open_text(read_text(source), str(source), plugins), folder=source.parent)
+        path = Path(source)
+        return replace(open_text(read_text(path), str(path), plugins), folder=path.parent)
     data, problems = to_plain_data(source)
     text = "" if problems else json.dumps(data, separators=(",", ":"), default=str)
     return Draft(data, text, "config", catalogue(plugins), Path(), problems=tuple(problems))
