@@ -8,10 +8,9 @@ indentation or zero force, as the law declares. For the coordinates see `impact.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +29,7 @@ from .model import ForceModel
 from .numba import dispatch
 from .piecewise import in_parts
 from .powers import distinct_values
+from .records import Positions, Record, positions
 from .status import LIMIT, STATUS_OK, Status
 from .velocity_coordinates import VelocityCoordinate, is_strong
 
@@ -47,19 +47,12 @@ STEPS_PER_CONTACT, STEP, PHASE = "sweep.steps_per_contact", "sweep.dt", "sweep.p
 # the contact time of a linear spring, in the contact's unit of time
 LINEAR_CONTACT_TIME = np.pi
 
-# positions of impacts; a slice for all of them, so that nothing is copied
-Positions = NDArray[np.intp] | slice
 # arrays that a law needs, by name, in the contact's own units
 ValueArrays = Mapping[str, Array]
 
 
-def positions(mask: NDArray[np.bool_]) -> Positions:
-    """Find the positions at which the mask is True."""
-    return slice(None) if mask.all() else np.flatnonzero(mask)
-
-
 @dataclass(frozen=True)
-class CollisionResult:
+class CollisionResult(Record):
     """The collisions of impacts by a law, in the contact's own units; arrays of shape (n,).
 
     `approach_work` and `restitution_work` are twice the works done against the force in the two phases, 1 and
@@ -79,40 +72,11 @@ class CollisionResult:
     chi: Array
     exact: Array
 
-    @classmethod
-    def blank(cls, n: int) -> CollisionResult:
-        """n impacts without values, with status OK and no steps."""
-        arrays: dict[str, NDArray[Any]] = {field.name: np.full(n, np.nan) for field in fields(cls)}
-        arrays |= {"steps": np.zeros(n, np.int32), "status": np.full(n, Status.OK, np.int8)}
-        return cls(**arrays)
-
-    def put(self, rows: Positions | NDArray[np.bool_], part: CollisionResult) -> None:
-        """Write the arrays of a part to its positions."""
-        for field in fields(self):
-            getattr(self, field.name)[rows] = getattr(part, field.name)
-
-    @classmethod
-    def joined(
-        cls, n: int, status: NDArray[np.int8], parts: Sequence[tuple[Positions, CollisionResult]]
-    ) -> CollisionResult:
-        """n impacts, composed of parts at their positions; impacts in no part have only a status."""
-        if parts and isinstance(parts[0][0], slice):
-            return parts[0][1]
-        result = cls.blank(n)
-        result.status[:] = status
-        for rows, part in parts:
-            result.put(rows, part)
-        return result
-
-    def take(self, rows: Positions) -> CollisionResult:
-        """Select the impacts at some positions."""
-        return CollisionResult(**{field.name: getattr(self, field.name)[rows] for field in fields(self)})
-
 
 # integrates impacts with the same n: the model, n, the values and the number of impacts, and `collapse`
 SimulatePart = Callable[..., CollisionResult]
 # columns of the trajectory table
-TABLE_COLUMNS = tuple(field.name for field in fields(CollisionResult))
+TABLE_COLUMNS = CollisionResult.columns()
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,61 @@
+"""Records of trajectories: arrays by name with one entry per trajectory, joined, taken and stored alike."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .status import Status
+
+# positions of trajectories; a slice for all of them, so that nothing is copied
+Positions = NDArray[np.intp] | slice
+# columns of integers; the others are floating-point numbers
+INTEGERS = {"steps": np.int32, "slip_changes": np.int32, "status": np.int8, "regime": np.int8}
+
+
+def positions(mask: NDArray[np.bool_]) -> Positions:
+    """Find the positions at which the mask is True."""
+    return slice(None) if mask.all() else np.flatnonzero(mask)
+
+
+@dataclass(frozen=True)
+class Record:
+    """The base of results that have one entry per trajectory: every field is an array of shape (n,)."""
+
+    @classmethod
+    def columns(cls) -> tuple[str, ...]:
+        """List the names of the arrays."""
+        return tuple(field.name for field in fields(cls))
+
+    @classmethod
+    def blank(cls, n: int) -> Self:
+        """n trajectories without values, with status OK and no steps."""
+        arrays: dict[str, Any] = {
+            name: np.zeros(n, INTEGERS[name]) if name in INTEGERS else np.full(n, np.nan) for name in cls.columns()
+        }
+        arrays["status"][:] = Status.OK
+        return cls(**arrays)
+
+    def put(self, rows: Positions | NDArray[np.bool_], part: Self) -> None:
+        """Write the arrays of a part to its positions."""
+        for name in self.columns():
+            getattr(self, name)[rows] = getattr(part, name)
+
+    @classmethod
+    def joined(cls, n: int, status: NDArray[np.int8], parts: Sequence[tuple[Positions, Self]]) -> Self:
+        """n trajectories, composed of parts at their positions; those in no part have only a status."""
+        if parts and isinstance(parts[0][0], slice):
+            return parts[0][1]
+        result = cls.blank(n)
+        vars(result)["status"][:] = status
+        for rows, part in parts:
+            result.put(rows, part)
+        return result
+
+    def take(self, rows: Positions) -> Self:
+        """Select the trajectories at some positions."""
+        return type(self)(**{name: getattr(self, name)[rows] for name in self.columns()})
