@@ -1,4 +1,4 @@
-"""The status of a point: below 10 it has a result, from 10 on its result is NaN."""
+"""The status of a point, and of its friction: below 10 it has a result, from 10 on its result is NaN."""
 
 from __future__ import annotations
 
@@ -38,7 +38,41 @@ MEANINGS = {
     Status.MODEL_ERROR: "the force raised an error or returned the wrong shape",
     Status.UNSTABLE: "the step is too long for the scheme: the balls rebound faster than twice their approach",
 }
+
+
+class FrictionStatus(IntEnum):
+    """The status of the tangential motion of a point with a friction law; `meaning` describes it.
+
+    From 10 to 17 the numbers are those of `Status`, of the normal or of the tangential integration.
+    """
+
+    OK = 1
+    NO_IMPACT = 2
+    LIMIT = 3
+    SLOW_LIMIT = 4
+    NOT_SEPARATED = 10
+    MAX_STEPS = 11
+    STEP_UNDERFLOW = 12
+    NOT_FINITE = 13
+    INVALID_PARAMETER = 14
+    OUT_OF_RANGE = 15
+    MODEL_ERROR = 16
+    UNSTABLE = 17
+    NOT_COMBINABLE = 18
+
+    @property
+    def meaning(self) -> str:
+        return FRICTION_MEANINGS.get(self) or MEANINGS[Status(self)]
+
+
+FRICTION_MEANINGS = {
+    FrictionStatus.NO_IMPACT: "the balls do not approach: tangential velocities and spins unchanged",
+    FrictionStatus.LIMIT: "the contact force is at its limit, where only rigid Coulomb friction has values",
+    FrictionStatus.SLOW_LIMIT: "friction drives the slip from the start, which fixed steps approach slowly",
+    FrictionStatus.NOT_COMBINABLE: "the contact force has not what the friction law needs",
+}
 STATUSES = tuple(map(int, Status))
+FRICTION_STATUSES = tuple(map(int, FrictionStatus))
 # an array is compared with a plain number eight times as fast as with a member of an enum
 STATUS_OK, NO_IMPACT, LIMIT, FIRST_FAILURE = map(
     int, (Status.OK, Status.NO_IMPACT, Status.LIMIT, Status.NOT_SEPARATED)

@@ -52,8 +52,9 @@ class TangentialResult(Record):
     """Tangential trajectories, in the contact's own units; arrays of shape (n,).
 
     `slip` is G at the end for a positive G0; works are in units of mu^2 (m v0)^2/m_t; `sliding_impulse` is the
-    integral of the limiting normal force, Lambda; `exact` is `slip` in closed form, NaN without one. For the kind
-    "coulomb" there is only `sliding_impulse`, and the slip follows from it.
+    integral of the limiting normal force, Lambda; `exact` is `slip` in closed form, NaN without one; `stiffness`
+    is kappa', NaN for a kind without a spring. For the kind "coulomb" there is only `sliding_impulse`, and the
+    slip follows from it.
     """
 
     slip: Array
@@ -65,5 +66,6 @@ class TangentialResult(Record):
     regime: NDArray[np.int8]
     slip_changes: NDArray[np.int32]
     exact: Array
+    stiffness: Array
     steps: NDArray[np.int32]
     status: NDArray[np.int8]
