@@ -1,20 +1,19 @@
 """An independent reference for the slip under friction: one trajectory at a time, slowly, by another method.
 
 Nothing here is shared with `impact.contact.tangential`. Normal motion, slip and spring are integrated together by
-scipy's DOP853 in short steps; between them the margin of the friction limit is sampled inside each step, and each
-switch is found to rounding by integrating up to it. `kick_drift` is a second check: the time steps of a code, which
-knows no events at all.
+scipy's DOP853 in short steps, inside of which the margin of the friction limit is sampled; each switch is found to
+rounding by integrating up to it. `kick_drift` is a second check: the time steps of a code, which know no events.
 
-The contact's own units apply, K = m = v0 = 1; mu, m_t and g0 are left as they are, so that the groups of the fast
-solver are tested, too. The normal motion is in s with x = residual + s^4 and dt = 4 s^3 dσ, in which half and quarter
-powers of x are smooth; the spring is in z with f_e = k^r z.
+The contact's own units apply, K = m = v0 = 1; mu, m_t and g0 are not scaled away, so that the groups of the fast
+solver are tested, too. The normal motion is in s with x = residual + s^4 and dt = 4 s^3 dσ, in which half and
+quarter powers of x are smooth; the spring is in z with f_e = k^r z.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -41,9 +40,9 @@ Force = Callable[[float, float], float]
 class NormalLaw:
     """A normal law: the force of (x, v) on approach, and of (x, v, peak, force_at_peak) on restitution.
 
-    `leading` are the coefficients and powers of x of the force at the first touch, where v = 1, all of order below
-    the correction by the change of v; `damping` is (C, q) of the declared form x^n + C x^q v. `residual` is a
-    function of the peak and the force there; `breakpoints` are indentations at which the approach's formula changes.
+    `leading` are the coefficients and powers of x of the force at the first touch, where v = 1; `damping` is
+    (C, q) of the form x^n + C x^q v. `residual` is a function of the peak and the force there; `breakpoints` are
+    indentations at which the formula of the approach changes.
     """
 
     force: Force
@@ -227,9 +226,7 @@ class Phase:
 
     def third_force(self, sign: int, s: float, v: float) -> float:
         """f in the third regime."""
-        rate = directional(
-            lambda s, v: self.steady_slip(sign, s, v), s, v, v, -self.weight(s) * self.force(s, v)
-        )
+        rate = directional(lambda s, v: self.steady_slip(sign, s, v), s, v, v, -self.weight(s) * self.force(s, v))
         return -self.friction.m_t * rate / self.weight(s)
 
     def forces(self, y: np.ndarray, mode: int) -> tuple[float, float, float]:
@@ -455,13 +452,12 @@ class Trajectory:
             name = "release" if self.is_back and self.normal.release == "force" else "zero"
             result[name] = lambda y: sign * phase.force(y[S], y[V]) if y[S] > 0.0 else math.inf
         for number, point in enumerate(self.points):
-            side = 1.0 if self.is_back else -1.0
-            result[f"breakpoint {number}"] = lambda y, point=point: side * (phase.x(y[S]) - point)
+            result[f"breakpoint {number}"] = lambda y, point=point: (
+                (phase.x(y[S]) - point) * (1.0 if self.is_back else -1.0)
+            )
         if f.kind == "dashpot":
             viscous = 1.0 if self.mode == STICK else -1.0
-            result["kink"] = lambda y: viscous * (
-                phase.limit(y[S], y[V]) - phase.damping(y[S]) * abs(y[G])
-            )
+            result["kink"] = lambda y: viscous * (phase.limit(y[S], y[V]) - phase.damping(y[S]) * abs(y[G]))
         if f.kind == "spring":
             if self.mode == STICK:
                 result["slip"] = phase.stick_margin
@@ -690,18 +686,16 @@ def solve(normal: NormalLaw, friction: Friction, g0: float) -> Outcome:
 
 def kick_drift(normal: NormalLaw, f: Friction, g0: float, h: float, phase: float = 0.5) -> float:
     """The slip after time steps as codes take them, from x = phase h; the classic scheme, with memory and cap."""
-    x, u, g, memory, old_k, f_m = phase * h, 1.0, g0, 0.0, 0.0, 0.0
+    x, u, g, memory, old_k = phase * h, 1.0, g0, 0.0, 0.0
     peak = at_peak = residual = 0.0
-    force, displacement, rescaled = normal.force, f.memory[0] == 1.0, f.memory[1] > f.memory[0]
+    displacement, rescaled = f.memory[0] == 1.0, f.memory[1] > f.memory[0]
     while True:
         if u <= 0.0 and not peak:
             peak, at_peak = x, normal.force(x, 0.0)
             residual = normal.residual(peak, at_peak) if normal.residual else 0.0
-            if normal.unloading is not None:
-                force = lambda x, v: normal.unloading(x, v, peak, at_peak)  # noqa: E731
         if x <= residual and u < 0.0:
             return g
-        push = force(x, u)
+        push = normal.unloading(x, u, peak, at_peak) if peak and normal.unloading else normal.force(x, u)
         if normal.release == "force" and push <= 0.0 and u < 0.0:
             return g
         limit = f.mu * (max(push, 0.0) if f.positive else abs(push))
@@ -728,7 +722,3 @@ def kick_drift(normal: NormalLaw, f: Friction, g0: float, h: float, phase: float
 
 def beta(outcome: Outcome, g0: float) -> float:
     return -outcome.g / g0
-
-
-def with_mu(friction: Friction, mu: float) -> Friction:
-    return replace(friction, mu=mu)
