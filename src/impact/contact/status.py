@@ -25,6 +25,28 @@ class Status(IntEnum):
         return MEANINGS[self]
 
 
+class FrictionStatus(IntEnum):
+    """The status of the tangential motion of a point; `meaning` describes it. Numbers are shared with `Status`."""
+
+    OK = 1
+    NO_IMPACT = 2
+    LIMIT = 3
+    SLOW_LIMIT = 4
+    NOT_SEPARATED = 10
+    MAX_STEPS = 11
+    STEP_UNDERFLOW = 12
+    NOT_FINITE = 13
+    INVALID_PARAMETER = 14
+    OUT_OF_RANGE = 15
+    MODEL_ERROR = 16
+    UNSTABLE = 17
+    NOT_COMBINABLE = 18
+
+    @property
+    def meaning(self) -> str:
+        return FRICTION_MEANINGS[self]
+
+
 MEANINGS = {
     Status.OK: "integrated to the end of the contact",
     Status.NO_IMPACT: "the balls do not approach (v1 <= v2): velocities unchanged",
@@ -38,7 +60,14 @@ MEANINGS = {
     Status.MODEL_ERROR: "the force raised an error or returned the wrong shape",
     Status.UNSTABLE: "the step is too long for the scheme: the balls rebound faster than twice their approach",
 }
-STATUSES = tuple(map(int, Status))
+FRICTION_MEANINGS = {
+    **{FrictionStatus(status): meaning for status, meaning in MEANINGS.items()},
+    FrictionStatus.NO_IMPACT: "the balls do not approach (v1 <= v2): velocities and spins unchanged",
+    FrictionStatus.LIMIT: "the normal motion is at a limit, where only Coulomb's friction has an answer",
+    FrictionStatus.SLOW_LIMIT: "the limit of small steps, which a code with fixed steps reaches slowly",
+    FrictionStatus.NOT_COMBINABLE: "the contact force lacks what the friction law needs",
+}
+STATUSES, FRICTION_STATUSES = tuple(map(int, Status)), tuple(map(int, FrictionStatus))
 # an array is compared with a plain number eight times as fast as with a member of an enum
 STATUS_OK, NO_IMPACT, LIMIT, FIRST_FAILURE = map(
     int, (Status.OK, Status.NO_IMPACT, Status.LIMIT, Status.NOT_SEPARATED)
