@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from ..array_types import Array, Mask
 from ..ode.problem import Margins, Params, Problem
 from . import motion
+from .formula_calls import Formula
 from .velocity_coordinates import signed_power
 
 FrictionKind = Literal["coulomb", "spring", "dashpot", "regularized"]
@@ -41,8 +42,11 @@ MODE_MARGIN, SIGN_MARGIN = 0, 1
 MARGIN_TOLERANCE = 1e-12
 # a force within this part of the limit is at the limit where the formulas change
 CAP_TOLERANCE = 1e-9
-# s at which leading powers of x are compared at first contact, and the least s for what is singular at s = 0
-START_S, LEAST_S = 1e-5, 1e-10
+# s at which leading powers of x are compared at first contact, and their rates; and the least s for what
+# is singular at s = 0
+START_S, RATE_S, LEAST_S = 1e-7, 1e-4, 1e-10
+# step of the central difference quotient there, relative to s; it sees the rate of N beside a force that jumps
+RATE_STEP = 1e-2
 
 
 @dataclass(frozen=True)
@@ -56,6 +60,8 @@ class TangentialForm:
     memory : r on loading and on unloading; while the contact grows or shrinks, 0 keeps the force, 1 the
         displacement
     cap : what mu N limits, the "total" force, or that of the "spring" alone
+    coefficient : of kind "regularized": the coefficient of friction over mu as a formula of y, which is
+        `SLIP_SCALE` abs(G), and of other values of the problem, by their names without `PREFIX`
     """
 
     kind: FrictionKind
@@ -63,6 +69,7 @@ class TangentialForm:
     damping_power: float = 0.0
     memory: tuple[float, float] = (0.0, 0.0)
     cap: Literal["total", "spring"] = "total"
+    coefficient: Formula | None = None
 
 
 class Columns(NamedTuple):
@@ -268,7 +275,8 @@ class SlipPhase:
         return out
 
     def _power(self, s: Array, exponent: float) -> Array | float:
-        return signed_power(s, exponent) if exponent else 1.0
+        power: Array | float = signed_power(s, exponent) if exponent else 1.0
+        return power
 
     def _energy(self, s: Array, force: Array, columns: Columns) -> Array:
         """Compute the energy of a spring of this force, over G0^2; zero without a spring."""
@@ -298,13 +306,12 @@ class SlipPhase:
         """Compute the rate of the trial force if the contact sticks, at a force phi and one of the spring."""
         s = _away_from_zero(y[0])
         growth = k[0] / s
-        drag_rate = self.drag_power * growth * local.drag - columns.damping * self._power(s, self.drag_power) * (
-            local.weight * phi
-        )
+        drag_per_slip = columns.damping * self._power(s, self.drag_power)
+        drag_rate: Array = self.drag_power * growth * local.drag - drag_per_slip * (local.weight * phi)
         if self.form.kind == "dashpot":
             return drag_rate
         stiffness = columns.root * columns.root * local.weight * self._power(y[0], self.stiffness_power)
-        rate = self.memory * self.stiffness_power * growth * spring_force + stiffness * y[SLIP_ROW]
+        rate: Array = self.memory * self.stiffness_power * growth * spring_force + stiffness * y[SLIP_ROW]
         return rate + drag_rate if self.is_total else rate
 
     # ---- the switch
@@ -351,6 +358,8 @@ class SlipPhase:
         direction = np.sign(np.where(turned, rate, local.trial))
         new = self._mode_at_limit(direction * rate - dN, direction, y, k, other)
         new = np.where(~turned & (np.abs(old) == 1.0), 0.0, new)
+        capped_drag = local.drag if self.is_total else 0.0
+        spring_force = np.where(~turned & (old == 0.0), direction * local.N - capped_drag, spring_force)
         return self._enter(index, old, new, sign, local.spring_force, spring_force, y, params)
 
     def _mode_at_limit(self, growth: Array, direction: Array, y: Array, k: Array, columns: Columns) -> Array:
@@ -429,11 +438,10 @@ class SlipPhase:
     def _at_contact(self, y: Array, params: Params, index: NDArray[np.intp]) -> tuple[Array, Params]:
         """Find the modes at first contact, where leading powers of x decide whether the trial force is below N."""
         form, columns, n = self.form, self.columns(params), y.shape[1]
-        near = np.array([np.full(n, START_S), np.empty(n), *y[2:]])
-        near[1] = self.law.coordinate.of(near[0], 1.0, self.law.strength(params))
-        twice = near.copy()
-        twice[0] *= 2.0
-        twice[1] = self.law.coordinate.of(twice[0], 1.0, self.law.strength(params))
+        near, twice = (
+            self._rows_near_contact(y, params, START_S),
+            self._rows_near_contact(y, params, 2.0 * START_S),
+        )
         k = self.rates(near[:TIME_ROW], params)
         force, twice_force = k[FORCE_ROW], self.rates(twice[:TIME_ROW], params)[FORCE_ROW]
         order = np.log2(twice_force / force) / self.law.model.coordinate_power
@@ -459,17 +467,34 @@ class SlipPhase:
         if form.kind == "dashpot":
             new = np.where(below, 0.0, 1.0)
         else:
-            growth = self.trial_rate(near, k, columns, local, spring_force, local.N) - local.dN
+            growth = self._growth_at_contact(y, params)
             if self.is_total and kp * self.memory == form.damping_power > 0.0:
                 # the leading powers cancel
                 growth = np.where(capped_drag >= local.N, columns.root**2 * columns.G0 - 1.0, growth)
             new = np.where(below, 0.0, np.where(growth > 0.0, 1.0, 0.0))
             if self.is_total and self.memory == 1.0 and form.damping_power < kp:
-                self.track.is_slow[index] = ~below
-                new = np.where(below, 0.0, -1.0)
+                self.track.is_slow[index] = is_slow = local.drag > local.N
+                new = np.where(is_slow, -1.0, new)
         near, params = self._enter(index, new, new, sign, np.zeros(n), spring_force, near, params)
         y[SPRING_ROW] = near[SPRING_ROW]
         return y, params
+
+    def _rows_near_contact(self, y: Array, params: Params, s: float) -> Array:
+        """Make rows at an indentation so small that the velocities are those at first contact."""
+        near = y.copy()
+        near[0], near[1] = s, self.law.coordinate.of(np.full(y.shape[1], s), 1.0, self.law.strength(params))
+        return near
+
+    def _growth_at_contact(self, y: Array, params: Params) -> Array:
+        """Compute by how much the trial force at the limit grows more than the limit, near first contact."""
+        near = self._rows_near_contact(y, params, RATE_S)
+        columns, k = self.columns(params), self.rates(near[:TIME_ROW], params)
+        small = RATE_STEP * RATE_S * k[:TIME_ROW]
+        ahead, behind = (self.rates(near[:TIME_ROW] + step, params)[FORCE_ROW] for step in (small, -small))
+        dN: Array = columns.press / columns.G0 * (ahead - behind) / (2.0 * RATE_STEP * RATE_S)
+        local = self.local(near, k, params)
+        spring_force = local.N - (local.drag if self.is_total else 0.0)
+        return self.trial_rate(near, k, columns, local, spring_force, local.N) - dN
 
     def finish(self, y: Array, params: Params) -> None:
         """Note the state of friction at the end of a part, from its rows."""

@@ -48,12 +48,11 @@ from .status import LIMIT, STATUS_OK, FrictionStatus, Status
 __all__ = ["FrictionKind", "TangentialForm", "TangentialResult", "simulate_friction"]
 
 # names of the values of a tangential problem, which no value of a law has: the size of the slip at first contact,
-# stiffness and damping of the tangential spring per power of x, and 1 where only a pressing force limits friction
-SLIP, TANGENTIAL_STIFFNESS, TANGENTIAL_DAMPING, LIMIT_POSITIVE = (
-    "friction.G0",
-    "friction.k",
-    "friction.c",
-    "friction.positive",
+# stiffness and damping of the tangential spring per power of x, 1 where only a pressing force limits friction, and
+# the factor from G to the slip y of a coefficient of friction that depends on it
+PREFIX = "friction."
+SLIP, TANGENTIAL_STIFFNESS, TANGENTIAL_DAMPING, LIMIT_POSITIVE, SLIP_SCALE = (
+    f"{PREFIX}{name}" for name in ("G0", "k", "c", "positive", "slip_scale")
 )
 # contact regimes, 0 where they are not defined
 STICKS, SLIDES, BOTH = 1, 2, 3
@@ -139,9 +138,8 @@ def _simulate_distinct(
     status = check_coefficients(model, law_values, values, count)
     zero = np.zeros(count)
     slip = np.ones(count) if form.kind == "coulomb" else np.abs(values[SLIP])
-    stiffness = values[TANGENTIAL_STIFFNESS] if form.kind == "spring" else zero
-    damping = values[TANGENTIAL_DAMPING] if form.kind in ("spring", "dashpot") else zero
-    is_positive = np.broadcast_to(values[LIMIT_POSITIVE], count)
+    stiffness, damping = values.get(TANGENTIAL_STIFFNESS, zero), values.get(TANGENTIAL_DAMPING, zero)
+    is_positive = values.get(LIMIT_POSITIVE, zero)
     is_trivial = (slip == 0.0) | ~np.isfinite(slip)
     for array in (stiffness, damping):
         status[(status == STATUS_OK) & ~is_trivial & ~np.isfinite(array)] = Status.OUT_OF_RANGE

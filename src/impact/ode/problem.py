@@ -40,7 +40,7 @@ class Rates(Protocol):
 class Switch(Protocol):
     """Changes of the formulas within an integration: the mode of a trajectory is part of its params.
 
-    The change must not make the rates jump: an error d of its time is then one of order d^2 in the solution.
+    A step ends near enough to the change that an error of its time is negligible, also where the rates jump.
     """
 
     def margins(self, y: Array, k: Array, params: Params, /) -> Margins:

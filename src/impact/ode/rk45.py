@@ -3,7 +3,8 @@
 A trajectory is an initial value problem that ends where an event function falls through zero. Quadratures, whose
 rates depend on the components alone, are integrated with the same weights, and the maximum of one watched quantity
 is located. All arithmetic is elementwise and in a fixed order, so that a trajectory has the same bits alone, in
-any batch and in any order. The pair and its interpolant are those of `impact.ode.tableau` (Dormand and Prince 1980, Shampine 1986); an event ends a trajectory inside a step, see `impact.ode.events`.
+any batch and in any order. The pair and its interpolant are those of `impact.ode.tableau` (Dormand and Prince
+1980, Shampine 1986); an event ends a trajectory inside a step, see `impact.ode.events`.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Switches: changes of the formulas within an integration, where a margin of the present mode vanishes.
 
 A step across the zero of a margin is rejected and tried again with the length to it, as for an event that ends the
-trajectory. The rates are continuous there, so that an error d of the time of a change is one of order d^2 in the
-solution, and the change takes place at the end of a step near enough to the zero.
+trajectory. The change takes place at the end of a step near enough to the zero: an error of its time is one of
+second order in the solution where the rates are continuous, and of first order where they jump.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from .problem import Problem, Switch
 from .state import RUNNING, State, TrialStep
 
 # a mode changes at the end of a step within this part of the last two steps, or within this time, of the zero
-SWITCH_RTOL, SWITCH_ATOL = 1e-5, 1e-9
+SWITCH_RTOL, SWITCH_ATOL = 1e-8, 1e-12
 # a step ends at the least value of a margin in its inside if that is less than this part of those at its ends, and
 # not as near to the start as the second number, in steps
 LOW_MARGIN, NEAR_START = 0.05, 0.01
