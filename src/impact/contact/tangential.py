@@ -19,6 +19,7 @@ from ..ode.problem import Params, Problem, Solution
 from ..ode.rk45 import integrate
 from . import motion
 from .dimensionless import with_coefficients, with_units
+from .formula_calls import argument_names
 from .model import ForceModel
 from .piecewise import in_parts
 from .records import Record
@@ -143,7 +144,11 @@ def _simulate_distinct(
     is_trivial = (slip == 0.0) | ~np.isfinite(slip)
     for array in (stiffness, damping):
         status[(status == STATUS_OK) & ~is_trivial & ~np.isfinite(array)] = Status.OUT_OF_RANGE
-    columns = (slip, stiffness, damping, is_positive)
+    names = _coefficient_arguments(form)
+    coefficient = (
+        (values[SLIP_SCALE] * slip, *(values[PREFIX + name] for name in names)) if form.coefficient else ()
+    )
+    columns = (slip, stiffness, damping, is_positive, *coefficient)
     chosen = (status == STATUS_OK) & ~is_trivial
     parts = [
         (problems.rows, _integrate(form, problems, rtol, max_steps).take(problems.row_of_impact))
@@ -156,11 +161,16 @@ def _simulate_distinct(
     return result
 
 
+def _coefficient_arguments(form: TangentialForm) -> tuple[str, ...]:
+    """Name the arguments of the coefficient of friction besides y."""
+    return tuple(name for name in argument_names(form.coefficient) if name != "y")
+
+
 def _integrate(form: TangentialForm, problems: DistinctProblems, rtol: float, max_steps: int) -> TangentialResult:
     """Integrate distinct problems through both phases."""
     law = problems.law
-    slip, stiffness, damping, is_positive = (np.array(column, float) for column in problems.columns)
-    n = slip.size
+    slip, stiffness, damping, is_positive, *coefficient = (np.array(column, float) for column in problems.columns)
+    n, names = slip.size, _coefficient_arguments(form)
     track = Track.of(n)
     unset = np.zeros(n)
     base = Columns(*(unset,) * 7, np.arange(n, dtype=float), np.sqrt(stiffness), damping, slip, is_positive, unset)
@@ -170,13 +180,13 @@ def _integrate(form: TangentialForm, problems: DistinctProblems, rtol: float, ma
         law: motion.MotionLaw, problem: Problem, start: Array, params: Params, recovery: Recovery | None
     ) -> Solution:
         if recovery is None:
-            columns, rows = base, np.vstack([start, np.ones(n), np.zeros(n)])
+            columns, rows = (*base, *coefficient), np.vstack([start, np.ones(n), np.zeros(n)])
         else:
-            columns = Columns(*(column[recovery.rows] for column in base))
+            columns = tuple(column[recovery.rows] for column in (*base, *coefficient))
             rows = np.vstack([start, states[0][2:, recovery.rows]])
         residual = None if recovery is None else recovery.residual
         params, breakpoints = motion.breakpoints(law, params, rows, residual)
-        phase = SlipPhase(form, law, problem, len(params), form.memory[recovery is not None], track)
+        phase = SlipPhase(form, law, problem, len(params), form.memory[recovery is not None], track, names)
 
         def run(problem: Problem, start: Array, params: Params) -> Solution:
             y, params = phase.begin(start, params)
