@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ..config.grid import MAX_POINTS
-from ..contact.simulate import CollisionResult
+from ..contact.records import Record
 from ..contact.status import FIRST_FAILURE
 from ..errors import StoreError, UnfinishedError, UsageError
 from .executors import SERIAL, ExecutorSpec
@@ -94,7 +94,7 @@ class ProgressCounter:
         """Whether all trajectories are integrated."""
         return self.progress.trajectories == self.progress.of_trajectories
 
-    def count(self, trajectory_range: TrajectoryRange, collisions: CollisionResult) -> None:
+    def count(self, trajectory_range: TrajectoryRange, collisions: Record) -> None:
         """Add a finished range."""
         failed = int(np.count_nonzero(collisions.status >= FIRST_FAILURE))
         self.progress = replace(

@@ -19,7 +19,7 @@ from ..config.grid import MAX_POINTS
 from ..config.input_names import InputName
 from ..config.load import read_config
 from ..contact.model import ForceModel
-from ..contact.simulate import TABLE_COLUMNS, CollisionResult
+from ..contact.records import Record
 from ..engine import checkpoint
 from ..engine.execute import FindReused, integrate_ranges, reuse_nothing
 from ..engine.executors import SERIAL, ExecutorSpec, choose_executor
@@ -230,7 +230,7 @@ def prepare(
 def sweep_in_memory(plan: Plan, run: Run = DEFAULT_RUN) -> xr.Dataset:
     """Run a plan; a small result is in memory, a large one is computed when it is indexed."""
     check_labels(plan)
-    finished: dict[TrajectoryRange, CollisionResult] = {}
+    finished: dict[TrajectoryRange, Record] = {}
     counter = ProgressCounter.start(plan.ranges, plan.points, run)
     try:
         integrate(plan, plan.ranges, finished.__setitem__, counter, run)
@@ -252,7 +252,7 @@ def sweep_into(
     few = plan.stored_points <= NO_CHECKPOINT_POINTS or plan.layout == "factored"
     folder = checkpoint.work_folder_of(output)
     if plan.trajectories <= RANGE_TRAJECTORIES and few and not os.path.lexists(folder):
-        finished: dict[TrajectoryRange, CollisionResult] = {}
+        finished: dict[TrajectoryRange, Record] = {}
         # so short that it is neither stopped nor reported
         counter = ProgressCounter.start(plan.ranges, plan.points, DEFAULT_RUN)
         integrate(plan, plan.ranges, finished.__setitem__, counter, DEFAULT_RUN, extension.find_reused)
@@ -303,7 +303,7 @@ def complete_ranges(
 def integrate(
     plan: Plan,
     ranges: Sequence[TrajectoryRange],
-    store: Callable[[TrajectoryRange, CollisionResult], None],
+    store: Callable[[TrajectoryRange, Record], None],
     counter: ProgressCounter,
     run: Run,
     find_reused: FindReused = reuse_nothing,
@@ -317,7 +317,7 @@ def integrate(
         raise UnfinishedError
 
 
-def reload_range(work_folder: checkpoint.WorkFolder, trajectory_range: TrajectoryRange) -> CollisionResult:
+def reload_range(work_folder: checkpoint.WorkFolder, trajectory_range: TrajectoryRange) -> Record:
     """Load a finished range, or raise a `StoreError` if it is damaged."""
     collisions = work_folder.load(trajectory_range)
     if collisions is None:
@@ -358,7 +358,8 @@ def find_finished(path: Path, plan: Plan) -> SweepOutcome | None:
         dataset.close()
         return None
     axes = dict(zip((axis.name for axis in plan.config.axes), plan.shape, strict=True))
-    if dict(dataset.sizes) != {"model": len(plan.models), **axes}:
+    frictions = {"friction": len(plan.frictions)} if plan.frictions else {}
+    if dict(dataset.sizes) != {"model": len(plan.models), **frictions, **axes}:
         dataset.close()
         return None
     return SweepOutcome(dataset, summarize(dataset), plan.trajectories, is_new=False, output=path)
@@ -369,7 +370,7 @@ def _missing_space(error: Exception, output: Path, plan: Plan, counter: Progress
     cause = error.__cause__
     if not isinstance(cause, OSError) or cause.errno not in (errno.ENOSPC, errno.EDQUOT):
         return []
-    row = sum(getattr(CollisionResult.blank(1), name).nbytes for name in TABLE_COLUMNS)
+    row = max(trajectory_map.record.row_bytes() for trajectory_map in plan.maps)
     result = counter.progress.of_trajectories * row if plan.layout == "factored" else dataset_template(plan).nbytes
     needed = result + OVERHEAD_BYTES + (counter.progress.of_trajectories - counter.progress.trajectories) * row
     free = shutil.disk_usage(output.parent).free
