@@ -12,7 +12,7 @@ import numpy as np
 import impact
 from impact.array_types import Array
 from impact.contact.dimensionless import delivered
-from impact.contact.impacts import dimensionless_exponents, stiffness
+from impact.contact.impacts import own_unit_exponents, stiffness
 from impact.contact.materials import effective_mass, hertz_stiffness, sphere_radius
 from impact.contact.model import ForceModel
 from impact.contact.models import catalogue
@@ -108,7 +108,7 @@ def curve_params(model: ForceModel) -> dict[str, float]:
     defaults = {parameter.name: parameter.default for parameter in model.parameters}
     known = {"n": n, **{name: default for name, default in defaults.items() if default is not None}}
     for parameter in model.parameters:
-        exponents = dimensionless_exponents(model, parameter.name, known)
+        exponents = own_unit_exponents(parameter.unit, known)
         unit = np.prod([units[name] ** exponent for name, exponent in exponents.items()])
         # depths are the peak indentation of the elastic impact
         value = (0.5 * (n + 1)) ** (1 / (n + 1)) if parameter.unit == "m" else DAMPING

@@ -1,17 +1,76 @@
-"""A friction law as data, and its pair with a contact force model."""
+"""A friction law as data, and its pair with a contact force model.
+
+A friction law is combined with any contact force model that has what it needs. The tangential problem of the
+pair, in the contact's own units, has the slip G = (m_t/m) g/(mu v0) and a stiffness k' = (k/k_unit)(m/m_t) per
+power of x; a damping likewise.
+"""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
+from typing import Literal
 
+import numpy as np
+from numpy.typing import NDArray
+
+from ..array_types import Array
+from ..errors import ModelError
+from .closed_forms.dashpot import gap_damping
+from .dimensionless import LawValues, required_quantities, with_coefficients, with_units
 from .evidence import Evidence
+from .force_expressions import spring
+from .formula_calls import Formula, argument_names, call_by_name
+from .impacts import Impacts
+from .materials import effective_shear_modulus
 from .model import NOT_VERIFIED, ForceModel, Parameter
-from .tangential import FrictionKind, TangentialForm
+from .powers import distinct_values
+from .rigid import ObliqueImpacts
+from .status import FrictionStatus
+from .tangential import (
+    LIMIT_POSITIVE,
+    PREFIX,
+    SLIP,
+    SLIP_SCALE,
+    TANGENTIAL_DAMPING,
+    TANGENTIAL_STIFFNESS,
+    FrictionKind,
+    TangentialForm,
+)
+
+Mask = NDArray[np.bool_]
+# how the stiffness of the tangential spring is chosen, where the user sets no kt_over_kn: a constant k_t;
+# Mindlin's 8 G* a, or k_t sqrt(x); as LIGGGHTS does, 8 G* a for n = 3/2 and K for n = 1
+StiffnessRule = Literal["", "constant", "mindlin", "liggghts"]
+# how the damping is chosen: xt times that of the contact force; as LIGGGHTS does; as YADE does, by betas; c_t
+DampingRule = Literal["", "xt", "liggghts", "betas", "c_t"]
+HERTZ = 1.5
+# the parameters that set the stiffness of the tangential spring
+STIFFNESS_PARAMETERS = ("k_t", "kt_over_kn")
 
 
 @dataclass(frozen=True, repr=False)
 class FrictionLaw:
-    """A friction law, which is combined with any contact force model; mu is an input, as e is."""
+    """A friction law, which is combined with any contact force model; mu is an input, as e is.
+
+    Parameters
+    ----------
+    key : kebab-case name, unique in the catalogue
+    title, year, reference, doi : name, year and source of the law
+    equation : the law in one line of Unicode
+    kind : "coulomb", f = mu N; "spring", a spring and a dashpot limited by mu N; "dashpot", limited by mu N; or
+        "regularized", f = mu(g) N
+    evidence : where the law and the DOI were read or derived, or that they were not verified
+    parameters : parameters that the user sets in `[friction.KEY]`
+    same_as : key of the law that this one is another name for, or ""
+    stiffness, damping : how the stiffness of the spring, and the damping, are chosen; "" for none
+    memory, cap, coefficient : see `impact.contact.tangential.TangentialForm`
+
+    Raises
+    ------
+    ModelError : the key is not kebab-case, or a parameter that a rule needs is missing
+    """
 
     key: str
     title: str
@@ -23,9 +82,35 @@ class FrictionLaw:
     evidence: Evidence = NOT_VERIFIED
     parameters: tuple[Parameter, ...] = ()
     same_as: str = ""
+    stiffness: StiffnessRule = ""
+    damping: DampingRule = ""
+    memory: tuple[float, float] = (0.0, 0.0)
+    cap: Literal["total", "spring"] = "total"
+    coefficient: Formula | None = None
+
+    def __post_init__(self) -> None:
+        if not re.fullmatch(r"[a-z0-9]+(-[a-z0-9]+)*", self.key):
+            raise ModelError(f'friction key "{self.key}": expected kebab-case, such as "coulomb-1785"')
 
     def __repr__(self) -> str:
         return f"<FrictionLaw {self.key}>"
+
+    @property
+    def default_limit(self) -> str:
+        """The word that `limit` has where the user sets none."""
+        limit = next(parameter for parameter in self.parameters if parameter.name == "limit")
+        return limit.choices[int(limit.default or 0.0)]
+
+
+@dataclass(frozen=True)
+class Dashpot:
+    """The damping of a force K x^n + C x^q v: q, and the coefficient that is C in the contact's own units.
+
+    The name "" is that of a force without damping.
+    """
+
+    power: float
+    coefficient: str
 
 
 @dataclass(frozen=True)
@@ -40,6 +125,313 @@ class Pair:
         """Its name in messages, such as "hertz with coulomb-1785"."""
         return f"{self.model.key} with {self.friction.key}"
 
+    @property
+    def keys(self) -> tuple[str, str]:
+        """The keys of the contact force model and of the friction law."""
+        return self.model.key, self.friction.key
+
     def form(self, n: float) -> TangentialForm:
         """Find the form of its tangential problems at an exponent n."""
-        return TangentialForm(self.friction.kind)
+        law = self.friction
+        stiffness_power = _stiffness_power(law, n)
+        dashpot = declared_dashpot(self.model, n)
+        normal_power = 0.0 if dashpot is None else dashpot.power
+        damping_power = {
+            "": 0.0,
+            "xt": normal_power,
+            "liggghts": 0.5 * stiffness_power if n == HERTZ else normal_power,
+            "betas": 0.5 * stiffness_power,
+            "c_t": 0.0,
+        }[law.damping]
+        return TangentialForm(law.kind, stiffness_power, damping_power, law.memory, law.cap, law.coefficient)
+
+
+def declared_dashpot(model: ForceModel, n: float) -> Dashpot | None:
+    """Find the damping of a law that declares the form K x^n + C x^q v for the whole contact; None for others.
+
+    The hysteresis laws K x^n (1 + chi v/v0) have q = n and C = chi K/v0; an elastic law has no damping.
+
+    >>> from impact.contact.models import find
+    >>> declared_dashpot(find("tsuji-1992"), 1.5), declared_dashpot(find("bilinear"), 1.0)
+    (Dashpot(power=0.25, coefficient='c'), None)
+    """
+    if model.unloading is not None:
+        return None
+    if model.velocity_coordinate == "force":
+        return Dashpot(float(call_by_name(model.coefficients["q"], {"n": n})), "c")
+    if model.velocity_coordinate == "log":
+        return Dashpot(n, "chi")
+    return Dashpot(0.0, "") if model.force is spring else None
+
+
+def friction_values(pair: Pair, oblique: ObliqueImpacts) -> dict[str, Array]:
+    """Compute the values of the tangential problems of a pair, by the names of `impact.contact.tangential`.
+
+    Returns
+    -------
+    dict : arrays that broadcast to the shape of the impacts, of length one along axes on which they do not depend.
+        The kind "coulomb" has no `SLIP`: one trajectory of it is that of every slip
+    """
+    law, impacts, mu = pair.friction, oblique.impacts, oblique.mu
+    values = {LIMIT_POSITIVE: _value(law, oblique, "limit")}
+    if law.kind == "coulomb":
+        return values
+    with np.errstate(all="ignore"):
+        values[SLIP] = np.abs(oblique.G0)
+        if law.stiffness and law.kind == "spring":
+            values[TANGENTIAL_STIFFNESS] = _stiffness(pair, oblique) / oblique.mass_ratio
+        if law.damping:
+            values[TANGENTIAL_DAMPING] = _damping(pair, oblique) / oblique.mass_ratio
+        if law.kind == "regularized":
+            dynamic = _parameter(law, oblique, "mu_d")
+            speed = _value(law, oblique, next(p.name for p in law.parameters if p.unit == "m/s"))
+            values[SLIP_SCALE] = mu / oblique.mass_ratio * (impacts.v0 / speed)
+            values[f"{PREFIX}ratio"] = _ones(impacts) if dynamic is None else dynamic / mu
+            if "viscous" in argument_names(law.coefficient):
+                values[f"{PREFIX}viscous"] = _value(law, oblique, "mu_v") * speed / mu
+    return values
+
+
+def check_friction(pair: Pair, oblique: ObliqueImpacts) -> NDArray[np.int8]:
+    """Check what a pair and the inputs of friction need; the normal motion is checked by `check_inputs`.
+
+    Returns the status before integration, of a shape that broadcasts to that of the impacts: NOT_COMBINABLE for
+    the reasons of `friction_problems`, INVALID_PARAMETER for a dynamic friction above the static one, a viscous
+    one without it, and an e outside [0, 1] from which a damping is computed, OUT_OF_RANGE where a stiffness or a
+    damping is not finite.
+    """
+    law = pair.friction
+    values = friction_values(pair, oblique)
+    status = np.full((1,) * max(1, len(oblique.impacts.shape)), FrictionStatus.OK, np.int8)
+    for name in (TANGENTIAL_STIFFNESS, TANGENTIAL_DAMPING):
+        if name in values:
+            status = _where(~(values[name] >= 0.0) | np.isinf(values[name]), FrictionStatus.OUT_OF_RANGE, status)
+    for mask in _invalid(law, oblique):
+        status = _where(mask, FrictionStatus.INVALID_PARAMETER, status)
+    for mask, _ in _problems(pair, oblique):
+        status = _where(mask, FrictionStatus.NOT_COMBINABLE, status)
+    return status
+
+
+def friction_problems(pair: Pair, oblique: ObliqueImpacts) -> list[str]:
+    """List why impacts of a pair have the status NOT_COMBINABLE, a line each, without the name of the pair."""
+    return [reason for mask, reason in _problems(pair, oblique) if np.any(mask)]
+
+
+def parameter_problem(
+    law: FrictionLaw, given: Collection[str], *, n: float | None = None, has_stiffness: bool = False
+) -> str:
+    """Name what is wrong with the choice of the tangential stiffness, or return "".
+
+    Parameters
+    ----------
+    given : the names of the parameters that the user sets
+    n : the exponent of the contact force, if it is known
+    has_stiffness : whether K is set, and not computed from the materials
+    """
+    chosen = [name for name in STIFFNESS_PARAMETERS if name in given]
+    names = [name for name in STIFFNESS_PARAMETERS if any(p.name == name for p in law.parameters)]
+    if len(chosen) == 2:
+        return "k_t: set together with kt_over_kn, expected one of the two"
+    if chosen or not law.stiffness:
+        return ""
+    if law.stiffness == "constant":
+        return "k_t: missing, expected a stiffness [N/m], such as 1e6; or kt_over_kn"
+    if has_stiffness and not (law.stiffness == "liggghts" and n == 1.0):
+        return f"{names[0]}: missing, expected {' or '.join(names)}: K is set, so that 8 G* a may not belong to it"
+    return ""
+
+
+def required_inputs(law: FrictionLaw, given: Collection[str], exponents: Collection[float]) -> frozenset[str]:
+    """Find which of the inputs e, E1, nu1, E2 and nu2 a law needs, besides those of the contact force.
+
+    `given` are the names of the parameters that the user sets, `exponents` those of the contact forces.
+    """
+    is_hertz = law.stiffness == "mindlin" or (law.stiffness == "liggghts" and HERTZ in exponents)
+    has_stiffness = any(name in given for name in STIFFNESS_PARAMETERS)
+    of_materials = ("E1", "nu1", "E2", "nu2") if is_hertz and not has_stiffness else ()
+    is_of_e = "betas" not in given if law.damping == "betas" else law.damping == "liggghts" and is_hertz
+    return frozenset((*of_materials, *(("e",) if is_of_e else ())))
+
+
+# ---- the values
+
+
+def _ones(impacts: Impacts) -> Array:
+    """1, of length one along all axes of the impacts."""
+    return np.ones((1,) * max(1, len(impacts.shape)))
+
+
+def _where(mask: Mask, value: FrictionStatus, otherwise: NDArray[np.int8]) -> NDArray[np.int8]:
+    """Replace a status where a mask is True; the shape grows only if it is True somewhere."""
+    return np.where(mask, np.int8(value), otherwise) if np.any(mask) else otherwise
+
+
+def _parameter(law: FrictionLaw, oblique: ObliqueImpacts, name: str) -> Array | None:
+    """Find the values of a parameter, or its default; None where the law lacks it, or the user does not set it."""
+    parameter = next((parameter for parameter in law.parameters if parameter.name == name), None)
+    if parameter is None:
+        return None
+    values = oblique.parameters.get(name)
+    if values is not None and not np.isnan(values).all():
+        return np.asarray(values)
+    return None if parameter.default is None else _ones(oblique.impacts) * parameter.default
+
+
+def _value(law: FrictionLaw, oblique: ObliqueImpacts, name: str) -> Array:
+    """Return the values of a parameter, NaN where there are none."""
+    values = _parameter(law, oblique, name)
+    return _ones(oblique.impacts) * np.nan if values is None else values
+
+
+def _stiffness_power(law: FrictionLaw, n: float) -> float:
+    return {"": 0.0, "constant": 0.0, "mindlin": 0.5, "liggghts": n - 1.0}[law.stiffness]
+
+
+def _stiffness(pair: Pair, oblique: ObliqueImpacts) -> Array:
+    """Compute k of the spring force k x^kp per displacement, in the contact's own units."""
+    law, impacts, n = pair.friction, oblique.impacts, oblique.impacts.n
+    ratio = _parameter(law, oblique, "kt_over_kn")
+    if ratio is not None:
+        # k_n is n K x^(n-1)
+        return ratio * n
+    if law.stiffness == "constant":
+        return _in_own_units(_value(law, oblique, "k_t"), "N/m", 1.0, impacts)
+    if _parameter(law, oblique, "k_t") is not None:
+        return _in_own_units(_value(law, oblique, "k_t"), "N/m^1.5", HERTZ, impacts)
+    G_eff = effective_shear_modulus(impacts.E1, impacts.nu1, impacts.E2, impacts.nu2)
+    # K is 4/3 E* sqrt(R*), unless the contact force has a rule of its own
+    own_rule = pair.model.stiffness is not None
+    mindlin = 8.0 * G_eff * np.sqrt(impacts.R_eff) / impacts.K if own_rule else 6.0 * G_eff / impacts.E_eff
+    if law.stiffness == "mindlin" or (n == HERTZ).all():
+        return mindlin
+    linear = np.where(_value(law, oblique, "tangential_reduce") > 0.0, 2.0 / 7.0, 1.0)
+    return linear if (n == 1.0).all() else np.where(n == HERTZ, mindlin, linear)
+
+
+def _in_own_units(k_t: Array, unit: str, n: float, impacts: Impacts) -> Array:
+    """Convert k_t, of the unit of K for an exponent n; in units of K where that is the exponent of the force."""
+    is_of_force = impacts.n == n
+    if is_of_force.all():
+        return k_t / impacts.K
+    return np.where(is_of_force, k_t / impacts.K, impacts.in_own_units(k_t, unit))
+
+
+def _damping(pair: Pair, oblique: ObliqueImpacts) -> Array:
+    """Compute c of the damping force c x^q g, in the contact's own units."""
+    law, impacts = pair.friction, oblique.impacts
+    match law.damping:
+        case "c_t":
+            return impacts.in_own_units(_value(law, oblique, "c_t"), "N s/m")
+        case "xt":
+            return _product(_value(law, oblique, "xt"), _normal_damping(pair.model, impacts))
+        case "betas":
+            betas = _parameter(law, oblique, "betas")
+            beta = gap_damping(impacts.e) if betas is None else betas
+            return 2.0 * beta * np.sqrt(_stiffness(pair, oblique))
+    is_on, is_hertz = _value(law, oblique, "tangential_damping"), impacts.n == HERTZ
+    if not is_hertz.any():
+        return _product(is_on, _normal_damping(pair.model, impacts))
+    c = 2.0 * np.sqrt(5.0 / 6.0) * gap_damping(impacts.e) * np.sqrt(_stiffness(pair, oblique))
+    if not is_hertz.all():
+        c = np.where(is_hertz, c, _normal_damping(pair.model, impacts))
+    return _product(is_on, c)
+
+
+def _product(factor: Array, c: Array) -> Array:
+    """factor c; 0 where the factor is, whatever c is."""
+    return np.where(factor == 0.0, 0.0, factor * c)
+
+
+def _normal_damping(model: ForceModel, impacts: Impacts) -> Array:
+    """Compute C of the force K x^n + C x^q v, in the contact's own units; NaN where a law has no such force."""
+    damping = _ones(impacts) * np.nan
+    exponents = distinct_values(impacts.n)
+    for n in exponents.tolist():
+        dashpot = declared_dashpot(model, n)
+        if dashpot is not None:
+            c = _coefficient(model, dashpot.coefficient, impacts, n)
+            damping = c if exponents.size == 1 else np.where(impacts.n == n, c, damping)
+    return damping
+
+
+def _coefficient(model: ForceModel, name: str, impacts: Impacts, n: float) -> Array:
+    """Compute a coefficient of a law, of the shape of the quantities that its coefficients depend on; "" is 0."""
+    if not name:
+        return 0.0 * _ones(impacts)
+    arguments = {argument for formula in model.coefficients.values() for argument in argument_names(formula)}
+    values, shape = _law_values(model, arguments, impacts, n)
+    return np.asarray(values[name]).reshape(shape)
+
+
+def _law_values(
+    model: ForceModel, names: Collection[str], impacts: Impacts, n: float
+) -> tuple[LawValues, tuple[int, ...]]:
+    """Compute some quantities and all coefficients of a law, in one dimension, and the shape that they have."""
+    values = {name: impacts.dimensionless(model, name) for name in required_quantities(model) if name in names}
+    shape = np.broadcast_shapes(_ones(impacts).shape, *(value.shape for value in values.values()))
+    flat = {name: np.broadcast_to(value, shape).reshape(-1) for name, value in values.items()}
+    count = int(np.prod(shape))
+    return with_coefficients(model, with_units(flat, n), count), shape
+
+
+# ---- what a pair lacks
+
+
+def _problems(pair: Pair, oblique: ObliqueImpacts) -> Iterator[tuple[Mask, str]]:
+    """Find where a pair is not combinable, and why."""
+    law, model, n = pair.friction, pair.model, oblique.impacts.n
+    if model.family == "adhesive":
+        yield from _adhesion_problems(pair, oblique)
+    if _parameter(law, oblique, "kt_over_kn") is not None:
+        is_other = (
+            ~np.isin(n, (1.0, HERTZ)) if law.stiffness == "liggghts" else n != 1.0 + _stiffness_power(law, 1.0)
+        )
+        expected = {"constant": "1", "mindlin": "1.5", "liggghts": "1 or 1.5"}[law.stiffness]
+        yield is_other, f"kt_over_kn needs a contact force of n = {expected}"
+    elif law.stiffness in ("mindlin", "liggghts") and _parameter(law, oblique, "k_t") is None:
+        is_linear = n == 1.0 if law.stiffness == "liggghts" else np.zeros_like(n, bool)
+        numbers = "1 or 1.5" if law.stiffness == "liggghts" else "1.5; set k_t"
+        yield ~(is_linear | (n == HERTZ)), f"8 G* a needs a contact force of n = {numbers}"
+        if model.unloading is not None or model.is_permanent:
+            yield (
+                n == HERTZ,
+                "8 G* a needs a contact force without permanent indentation and without unloading branch",
+            )
+    if law.damping in ("xt", "liggghts"):
+        factor = _value(law, oblique, "xt" if law.damping == "xt" else "tangential_damping")
+        others = [
+            exponent for exponent in distinct_values(n).tolist() if declared_dashpot(model, exponent) is None
+        ]
+        is_needed = (factor != 0.0) & (law.damping == "xt" or n != HERTZ)
+        off = "xt = 0" if law.damping == "xt" else 'tangential_damping = "off"'
+        yield (
+            np.isin(n, others) & is_needed,
+            f"the contact force has no dashpot C x^q v for the damping; set {off}",
+        )
+
+
+def _adhesion_problems(pair: Pair, oblique: ObliqueImpacts) -> Iterator[tuple[Mask, str]]:
+    """Find where a contact force pulls from the start and friction is not Coulomb's, of a pressing force."""
+    model, impacts = pair.model, oblique.impacts
+    try:
+        n = float(impacts.n.flat[0])
+        values, shape = _law_values(model, model.quantities, impacts, n)
+        start = call_by_name(model.force, {**values, "x": 0.0, "v": 1.0, "elastic": 0.0})
+    except ModelError:
+        # the integration reports it
+        return
+    pulls = np.broadcast_to(start < 0.0, int(np.prod(shape))).reshape(shape)
+    is_allowed = (pair.friction.kind == "coulomb") & (_value(pair.friction, oblique, "limit") > 0.0)
+    yield pulls & ~is_allowed, 'the contact force pulls from the start: expected coulomb-1785, limit = "positive"'
+
+
+def _invalid(law: FrictionLaw, oblique: ObliqueImpacts) -> Iterator[Mask]:
+    """Find where a value that friction needs is out of its range."""
+    impacts, mu = oblique.impacts, oblique.mu
+    given = [name for name, values in oblique.parameters.items() if not np.isnan(values).all()]
+    if "e" in required_inputs(law, given, distinct_values(impacts.n).tolist()):
+        is_off = law.damping == "liggghts" and _value(law, oblique, "tangential_damping") == 0.0
+        yield ~((impacts.e >= 0.0) & (impacts.e <= 1.0)) & ~np.asarray(is_off)
+    yield _value(law, oblique, "mu_d") > mu
+    yield (mu == 0.0) & (_value(law, oblique, "mu_v") > 0.0)

@@ -127,11 +127,13 @@ class Impacts:
 
     def dimensionless(self, model: ForceModel, name: str) -> Array:
         """Compute a quantity or parameter in the contact's own units, in which K = m = v0 = 1."""
-        value = self.quantity(name)
-        exponents = dimensionless_exponents(model, name, {"n": self.n, **self.parameters})
-        for unit, exponent in exponents.items():
+        return self.in_own_units(self.quantity(name), model.unit_of(name))
+
+    def in_own_units(self, value: Array, unit: str) -> Array:
+        """Convert a value from a unit, such as "N/m^n", to the contact's own units."""
+        for own_unit, exponent in own_unit_exponents(unit, {"n": self.n, **self.parameters}).items():
             if np.any(exponent):
-                value = value / powers(getattr(self, unit), np.asarray(exponent))
+                value = value / powers(getattr(self, own_unit), np.asarray(exponent))
         # adding zero turns -0.0 into 0.0, which is the same physics
         return value + 0.0
 
@@ -140,16 +142,13 @@ class Impacts:
 INPUTS = tuple(field.name for field in fields(Impacts) if field.name != "parameters")
 
 
-def dimensionless_exponents(
-    model: ForceModel, name: str, exponent_values: Mapping[str, Array | float]
-) -> dict[str, Array | float]:
-    """Compute the exponents of m, length and v0 in the contact's own unit of a quantity or parameter.
+def own_unit_exponents(unit: str, exponent_values: Mapping[str, Array | float]) -> dict[str, Array | float]:
+    """Compute the exponents of m, length and v0 in the contact's own unit of what has a unit in SI.
 
-    >>> from impact.contact.models import find
-    >>> dimensionless_exponents(find("hertz"), "E1", {"n": 1.5})
+    >>> own_unit_exponents("Pa", {})
     {'m': 1.0, 'length': -3.0, 'v0': 2.0}
     """
-    mass, length, time = dimension(model.unit_of(name), exponent_values)
+    mass, length, time = dimension(unit, exponent_values)
     return {"m": mass + 0.0, "length": length + time + 0.0, "v0": 0.0 - time}
 
 

@@ -52,6 +52,16 @@ def effective_compliance(E1: Array, nu1: Array, E2: Array, nu2: Array) -> Array:
     return (1.0 - nu1 * nu1) / E1 + (1.0 - nu2 * nu2) / E2
 
 
+def effective_shear_modulus(E1: Array, nu1: Array, E2: Array, nu2: Array) -> Array:
+    """G* [Pa] of Mindlin's tangential stiffness 8 G* a: 1/((2 - nu1)/G1 + (2 - nu2)/G2), G = E/(2(1 + nu)).
+
+    >>> print(effective_shear_modulus(np.array(2.6), np.array(0.3), np.array(2.6), np.array(0.3)).round(12))
+    0.294117647059
+    """
+    compliance1, compliance2 = (2.0 * (2.0 - nu) * (1.0 + nu) / E for E, nu in ((E1, nu1), (E2, nu2)))
+    return np.asarray(1.0 / (compliance1 + compliance2))
+
+
 def hertz_stiffness(E1: Array, nu1: Array, E2: Array, nu2: Array, R1: Array, R2: Array) -> Array:
     """Compute K [N/m^1.5] of the contact of two spheres: Gharib and Hurmuzlu (2012), equations (12), (13).
 

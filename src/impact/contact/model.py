@@ -67,8 +67,9 @@ class Parameter:
     """A parameter that the user sets for a model, besides the restitution.
 
     `unit` is an SI unit, whose exponents may contain n ("N/m^n") and dimensionless parameters; `least` and `most`
-    are the closed interval of its values; `default` is None where the user has to set it; `typical` is a value
-    in that unit for checks, where the contact's own units are no measure of it.
+    are the closed interval of its values; `default` is None where the user has to set it, unless it is `optional`;
+    `typical` is a value in that unit for checks, where the contact's own units are no measure of it. A parameter
+    with `choices` is one of these words; its values, and its default, are their positions.
 
     >>> Parameter("c", "N s/m", "damping constant", default=100.0, least=0.0).unit
     'N s/m'
@@ -81,6 +82,8 @@ class Parameter:
     least: float = float("-inf")
     most: float = float("inf")
     typical: float | None = None
+    optional: bool = False
+    choices: tuple[str, ...] = ()
 
 
 class Law(Protocol):

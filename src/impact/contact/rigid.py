@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
@@ -16,6 +17,9 @@ from .materials import effective_mass
 @dataclass(frozen=True)
 class ObliqueImpacts:
     """The tangential inputs of impacts; arrays that broadcast with those of the impacts.
+
+    Friction -f acts on ball 1 and f on ball 2, along the tangent, at the contact point; P is the integral of f. An
+    infinite mass (a wall) has no tangential motion and no spin; a plane, of infinite radius, has no spin.
 
     Parameters
     ----------
@@ -40,10 +44,21 @@ class ObliqueImpacts:
     parameters: Mapping[str, Array] = field(default_factory=dict)
 
     @cached_property
+    def mass_ratio(self) -> Array:
+        """m_t/m [-]; of the same bits for all masses against a wall, and for balls of the same inertia factor."""
+        m1, m2 = self.impacts.m1, self.impacts.m2
+        share1, share2 = (1.0 + 1.0 / self._inertia_factor(ball) for ball in ("1", "2"))
+        if np.isinf(m1).any() or np.isinf(m2).any():
+            share1, share2 = np.where(np.isinf(m1), share2, share1), np.where(np.isinf(m2), share1, share2)
+        is_equal = share1 == share2
+        if is_equal.all():
+            return 1.0 / share1
+        return np.where(is_equal, 1.0 / share1, effective_mass(m1 / share1, m2 / share2) / self.impacts.m)
+
+    @cached_property
     def m_t(self) -> Array:
         """Effective tangential mass [kg]: 1/((1 + 1/q1)/m1 + (1 + 1/q2)/m2)."""
-        share1, share2 = (1.0 + 1.0 / q for q in (self.inertia_factor1, self.inertia_factor2))
-        return effective_mass(self.impacts.m1 / share1, self.impacts.m2 / share2)
+        return self.mass_ratio * self.impacts.m
 
     @cached_property
     def slip_ratio(self) -> Array:
@@ -56,12 +71,32 @@ class ObliqueImpacts:
     @cached_property
     def G0(self) -> Array:
         """The slip before the impact in units in which friction of mu changes it at the rate of the force."""
-        return self.m_t / self.impacts.m * self.slip_ratio / self.mu
+        return self.mass_ratio * self.slip_ratio / self.mu
 
     @cached_property
     def slip(self) -> Array:
         """Slip speed of the contact points before the impact [m/s], g0 = (u1 + R1 omega1) - (u2 - R2 omega2)."""
         return (self.u1 + _rim(self.impacts.R1, self.omega1)) - (self.u2 - _rim(self.impacts.R2, self.omega2))
+
+    def spin_after(self, ball: Literal["1", "2"], impulse: Array) -> Array:
+        """Compute the spin of a ball after an impulse P [N s]: omega - P/(q m R) [rad/s].
+
+        It is NaN where a ball turns whose radius is unknown.
+        """
+        omega, mass, R = getattr(self, f"omega{ball}"), getattr(self.impacts, f"m{ball}"), self._radius(ball)
+        inertia = self._inertia_factor(ball) * mass
+        # R is not read where nothing turns, since it may be unknown there
+        return np.asarray(omega - np.where(np.isinf(inertia), 0.0, impulse / (inertia * R)))
+
+    def _radius(self, ball: Literal["1", "2"]) -> Array:
+        return np.asarray(getattr(self.impacts, f"R{ball}"))
+
+    def _inertia_factor(self, ball: Literal["1", "2"]) -> Array:
+        """q, infinite for a plane."""
+        q, is_plane = np.asarray(getattr(self, f"inertia_factor{ball}")), np.isinf(self._radius(ball))
+        # a plane of infinite mass is a wall, of which no inertia matters
+        is_plane = is_plane & np.isfinite(getattr(self.impacts, f"m{ball}"))
+        return np.where(is_plane, np.inf, q) if is_plane.any() else q
 
 
 def _rim(radius: Array, omega: Array) -> Array:

@@ -13,17 +13,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..array_types import Array
+from .formula_calls import Formula
 from .records import Record
 
 FrictionKind = Literal["coulomb", "spring", "dashpot", "regularized"]
 
 # names of the values of a tangential problem, which no value of a law has: the size of the slip at first contact,
-# stiffness and damping of the tangential spring per power of x, and 1 where only a pressing force limits friction
-SLIP, TANGENTIAL_STIFFNESS, TANGENTIAL_DAMPING, LIMIT_POSITIVE = (
-    "friction.G0",
-    "friction.k",
-    "friction.c",
-    "friction.positive",
+# stiffness and damping of the tangential spring per power of x, 1 where only a pressing force limits friction, and
+# the factor from G to the slip y of a coefficient of friction that depends on it
+PREFIX = "friction."
+SLIP, TANGENTIAL_STIFFNESS, TANGENTIAL_DAMPING, LIMIT_POSITIVE, SLIP_SCALE = (
+    f"{PREFIX}{name}" for name in ("G0", "k", "c", "positive", "slip_scale")
 )
 
 
@@ -38,6 +38,8 @@ class TangentialForm:
     memory : r on loading and on unloading; while the contact grows or shrinks, 0 keeps the force, 1 the
         displacement
     cap : what mu N limits, the "total" force, or that of the "spring" alone
+    coefficient : of kind "regularized": the coefficient of friction over mu as a formula of y, which is
+        `SLIP_SCALE` abs(G), and of other values of the problem, by their names without `PREFIX`
     """
 
     kind: FrictionKind
@@ -45,6 +47,7 @@ class TangentialForm:
     damping_power: float = 0.0
     memory: tuple[float, float] = (0.0, 0.0)
     cap: Literal["total", "spring"] = "total"
+    coefficient: Formula | None = None
 
 
 @dataclass(frozen=True)

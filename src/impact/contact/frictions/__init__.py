@@ -1,1 +1,33 @@
-"""The catalogue of friction laws."""
+"""The catalogue: every `FrictionLaw` that is a variable, or in a tuple, of a module of this package."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+
+from ..catalogue import by_key, declared_laws, look_up
+from ..friction import FrictionLaw
+
+# the order of a list of friction laws, by what they remember
+KINDS = ("coulomb", "spring", "dashpot", "regularized")
+
+
+@cache
+def frictions() -> Mapping[str, FrictionLaw]:
+    """Collect the friction laws by key.
+
+    >>> list(frictions())[:2]
+    ['coulomb-1785', 'cundall-strack-1979']
+    """
+    laws = declared_laws(__name__, __path__, FrictionLaw)
+    return by_key(sorted(laws, key=lambda law: (KINDS.index(law.kind), law.year, law.key)), "friction law")
+
+
+def find_friction(key: str) -> FrictionLaw:
+    """Find the friction law of a key.
+
+    Raises
+    ------
+    ModelError : no friction law has this key; the message names the nearest one
+    """
+    return look_up(frictions(), key, "friction law")

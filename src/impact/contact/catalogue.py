@@ -1,0 +1,49 @@
+"""Catalogues: the laws that the modules of a package declare, by key."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from importlib import import_module
+from pkgutil import iter_modules
+from types import MappingProxyType
+from typing import Protocol, TypeVar
+
+from ..errors import ModelError, did_you_mean
+
+
+class Keyed(Protocol):
+    """What has a key."""
+
+    @property
+    def key(self) -> str: ...
+
+
+Law = TypeVar("Law", bound=Keyed)
+
+
+def declared_laws(package: str, path: Iterable[str], kind: type[Law]) -> list[Law]:
+    """Find each instance of a type that is a variable, or in a tuple, of a module of a package."""
+    # a module imports the laws that it renames: each is collected once
+    laws: dict[int, Law] = {}
+    for module in iter_modules(path):
+        for value in vars(import_module(f"{package}.{module.name}")).values():
+            candidates = value if isinstance(value, tuple) else (value,)
+            laws.update((id(law), law) for law in candidates if isinstance(law, kind))
+    return list(laws.values())
+
+
+def by_key(laws: Iterable[Law], noun: str) -> Mapping[str, Law]:
+    """Index laws by their keys; two of the same key are an error, which calls them by the noun."""
+    indexed: dict[str, Law] = {}
+    for law in laws:
+        if law.key in indexed:
+            raise ModelError(f"{noun} {law.key}: two {noun}s have this key")
+        indexed[law.key] = law
+    return MappingProxyType(indexed)
+
+
+def look_up(laws: Mapping[str, Law], key: str, noun: str) -> Law:
+    """Return the law of a key; the error for an unknown one names the nearest key."""
+    if key not in laws:
+        raise ModelError(f'no {noun} "{key}"; {did_you_mean(key, list(laws))}')
+    return laws[key]

@@ -1,0 +1,176 @@
+"""Friction laws of LAMMPS, LIGGGHTS and YADE, with the names that these codes have for them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from ..evidence import Evidence
+from ..friction import FrictionLaw
+from ..model import Parameter
+from ..models.cited_sources import LIGGGHTS, YADE_2025
+from .parameters import CONSTANT_STIFFNESS, KT_OVER_KN, MINDLIN_STIFFNESS, XT, choice, limit
+
+# ---- LAMMPS
+
+LAMMPS = "lammps/lammps, src/GRANULAR/gran_sub_mod_tangential.cpp @079d233c (2026)"
+LAMMPS_REFERENCE = "LAMMPS, pair style granular, tangential"
+YEAR_NOT_SEEN = "its first year was not seen"
+LAMMPS_LIMIT = "|f| ≤ μ |F|, where it slips the spring takes what the dashpot leaves"
+
+LAMMPS_LINEAR_HISTORY = FrictionLaw(
+    key="lammps-linear-history",
+    title="LAMMPS linear_history",
+    year=2019,
+    equation=f"f = k_t ξ + xₜ c_n g,  ξ̇ = g,  {LAMMPS_LIMIT}",
+    reference=f"{LAMMPS_REFERENCE} linear_history",
+    kind="spring",
+    evidence=Evidence("seen", LAMMPS, note=YEAR_NOT_SEEN),
+    parameters=(*CONSTANT_STIFFNESS, XT, limit("abs")),
+    stiffness="constant",
+    damping="xt",
+)
+
+LAMMPS_MINDLIN = FrictionLaw(
+    key="lammps-mindlin",
+    title="LAMMPS mindlin",
+    year=2019,
+    equation=f"f = 8 G* a ξ + xₜ c_n g,  ξ̇ = g,  a = √(R* δ),  {LAMMPS_LIMIT}",
+    reference=f"{LAMMPS_REFERENCE} mindlin, whose coefficient [Pa] is k_t/√R*, NULL for 8 G*",
+    kind="spring",
+    evidence=Evidence("seen", f"{LAMMPS}, and gran_sub_mod.cpp @07b704ca (2026)", note=YEAR_NOT_SEEN),
+    parameters=(*MINDLIN_STIFFNESS, XT, limit("abs")),
+    stiffness="mindlin",
+    damping="xt",
+    memory=(1.0, 1.0),
+)
+
+
+def lammps_mindlin(option: str, key: str, equation: str, memory: tuple[float, float]) -> FrictionLaw:
+    """Make a variant of Mindlin's law in LAMMPS, by its name there."""
+    return replace(
+        LAMMPS_MINDLIN,
+        key=key,
+        title=f"LAMMPS {option}",
+        equation=f"{equation},  {LAMMPS_LIMIT}",
+        reference=LAMMPS_MINDLIN.reference.replace("mindlin", option),
+        memory=memory,
+    )
+
+
+LAMMPS_MINDLIN_VARIANTS = (
+    lammps_mindlin(
+        "mindlin/force", "lammps-mindlin-force", "f = f_e + xₜ c_n g,  ḟ_e = 8 G* a g,  a = √(R* δ)", (0.0, 0.0)
+    ),
+    lammps_mindlin(
+        "mindlin_rescale",
+        "lammps-mindlin-rescale",
+        "f = 8 G* a ξ + xₜ c_n g,  ξ̇ = g,  and ξ ∝ a on unloading,  a = √(R* δ)",
+        (1.0, 2.0),
+    ),
+    lammps_mindlin(
+        "mindlin_rescale/force",
+        "lammps-mindlin-rescale-force",
+        "f = f_e + xₜ c_n g,  ḟ_e = 8 G* a g,  and f_e ∝ a on unloading,  a = √(R* δ)",
+        (0.0, 1.0),
+    ),
+)
+
+LAMMPS_LINEAR_NOHISTORY = FrictionLaw(
+    key="lammps-linear-nohistory",
+    title="LAMMPS linear_nohistory",
+    year=2019,
+    equation="f = min(xₜ c_n |g|, μ |F|) sgn g",
+    reference=f"{LAMMPS_REFERENCE} linear_nohistory",
+    kind="dashpot",
+    evidence=Evidence("seen", LAMMPS, note=YEAR_NOT_SEEN),
+    parameters=(XT, limit("abs")),
+    damping="xt",
+)
+
+# ---- LIGGGHTS
+
+LIGGGHTS_DAMPING = "c = 2√(5/6) b √(8 G* a m), b = −ln e/√(π² + ln² e) for n = 3/2, c_n for n = 1"
+LIGGGHTS_NORMAL_MODELS = "normal_model_hertz.h, normal_model_hooke.h and global_properties.cpp"
+DAMPING_SWITCH = choice("tangential_damping", "whether there is a tangential damping", ("off", "on"), "on")
+
+LIGGGHTS_HISTORY = FrictionLaw(
+    key="liggghts-history",
+    title="LIGGGHTS history (3.8.0)",
+    year=2014,
+    equation="f = k ξ + c g,  k = 8 G* a for n = 3/2, K for n = 1,  ξ̇ = g,  |k ξ| ≤ μ |F|, where it slips "
+    f"f = μ |F|,  {LIGGGHTS_DAMPING}",
+    reference="LIGGGHTS-PUBLIC, tangential history",
+    kind="spring",
+    evidence=Evidence(
+        "seen",
+        f"{LIGGGHTS}tangential_model_history.h, {LIGGGHTS_NORMAL_MODELS}",
+        note="also @25fc3965; tangential_reduce is ktToKnUser there, with the number 0.285714286",
+    ),
+    parameters=(
+        KT_OVER_KN,
+        DAMPING_SWITCH,
+        choice("tangential_reduce", "whether k is 2K/7 for n = 1", ("off", "on"), "off"),
+        limit("abs"),
+    ),
+    stiffness="liggghts",
+    damping="liggghts",
+    memory=(1.0, 1.0),
+    cap="spring",
+)
+
+LIGGGHTS_NO_HISTORY = FrictionLaw(
+    key="liggghts-no-history",
+    title="LIGGGHTS no_history (3.8.0)",
+    year=2014,
+    equation=f"f = min(c |g|, μ |F|) sgn g,  {LIGGGHTS_DAMPING}",
+    reference="LIGGGHTS-PUBLIC, tangential no_history",
+    kind="dashpot",
+    evidence=Evidence("seen", f"{LIGGGHTS}tangential_model_no_history.h, {LIGGGHTS_NORMAL_MODELS}"),
+    parameters=(KT_OVER_KN, DAMPING_SWITCH, limit("abs")),
+    stiffness="liggghts",
+    damping="liggghts",
+)
+
+# ---- YADE
+
+YADE_LIMIT = "|f_e| ≤ μ max(F, 0), where it slips f = μ max(F, 0)"
+
+YADE_MINDLIN = FrictionLaw(
+    key="yade-mindlin",
+    title="YADE HertzMindlin (state of 2025)",
+    year=2010,
+    equation=f"f = f_e + c g,  ḟ_e = 8 G* a g,  c = 2 β_s √(8 G* a m),  {YADE_LIMIT}",
+    reference="YADE, Law2_ScGeom_MindlinPhys_Mindlin, without adhesion",
+    kind="spring",
+    evidence=Evidence(
+        "seen",
+        f"{YADE_2025}, HertzMindlin.cpp",
+        note="betas is by default −ln e/√(π² + ln² e) here, in YADE the betan of its contact force",
+    ),
+    parameters=(
+        *MINDLIN_STIFFNESS,
+        Parameter("betas", "1", "damping ratio β_s of the tangential stiffness", least=0.0, optional=True),
+        limit("positive"),
+    ),
+    stiffness="mindlin",
+    damping="betas",
+    cap="spring",
+)
+
+YADE_VISCOELASTIC = FrictionLaw(
+    key="yade-viscoelastic",
+    title="YADE viscoelastic (since January 2014)",
+    year=2014,
+    equation=f"f = k_t ξ + c_t g,  ξ̇ = g,  {YADE_LIMIT.replace('f_e', 'k_t ξ')}",
+    reference="YADE, Law2_ScGeom_ViscElPhys_Basic, ks and cs",
+    kind="spring",
+    evidence=Evidence("seen", f"{YADE_2025}, ViscoelasticPM.cpp"),
+    parameters=(
+        *CONSTANT_STIFFNESS,
+        Parameter("c_t", "N s/m", "tangential damping", default=0.0, least=0.0),
+        limit("positive"),
+    ),
+    stiffness="constant",
+    damping="c_t",
+    cap="spring",
+)
