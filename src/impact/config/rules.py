@@ -14,7 +14,7 @@ from ..contact.model import ForceModel, with_base_quantities
 from .draft import Draft, listed_names
 from .files import as_table
 from .quantities import ConfigProblem, Quantity
-from .tables import FIXED_STEP_INPUTS, MATERIAL_QUANTITIES, SWEEP_QUANTITIES, model_quantities
+from .tables import FIXED_STEP_INPUTS, MATERIAL_QUANTITIES, SWEEP_QUANTITIES, law_quantities
 
 
 def _sets_stiffness(draft: Draft, model: ForceModel) -> bool:
@@ -183,7 +183,7 @@ def _parameter_problems(draft: Draft) -> Iterable[ConfigProblem]:
         table = as_table(draft.table("model").get(model.key))
         for parameter in model.parameters:
             if parameter.default is None and parameter.name not in table:
-                message = _missing(model_quantities(model)[parameter.name])
+                message = _missing(law_quantities(model)[parameter.name])
                 yield ("model", model.key, parameter.name), message + _exclusion_hint(draft, model)
 
 
