@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import impact
+from impact.contact.dimensionless import dimensionless_values
 from impact.contact.friction import (
     FrictionLaw,
     Pair,
@@ -36,6 +37,7 @@ from impact.contact.tangential import (
 from impact.contact.units import dimension
 from impact.errors import ModelError, UsageError
 
+from . import friction_reference as reference
 from .conftest import Run
 
 # m/m_t of solid spheres
@@ -502,3 +504,60 @@ def test_a_wall_a_plane_an_unknown_radius_and_an_infinite_inertia() -> None:
     fixed = oblique_of(impacts_of(R1=[np.nan]), inertia_factor1=[np.inf], inertia_factor2=[np.inf])
     assert fixed.mass_ratio.item() == 1.0
     assert fixed.spin_after("1", P).item() == 0.0
+
+
+# ---- the values and forms, integrated by the independent solver
+
+ZETA = 0.1128084507
+HERTZ_KAPPA = 2 * (1 - NU) / (2 - NU)
+LINEAR_GAP = ("anagnostopoulos-1988", 1.0, 0.7)
+
+
+@pytest.mark.parametrize(
+    ("model", "friction", "parameters", "g0", "beta"),
+    [
+        (("hertz", 1.0, 1.0), "cundall-strack-1979", {"k_t": 0.8}, 1.0, 0.4769459935),
+        (LINEAR_GAP, "cundall-strack-1979", {"kt_over_kn": 2 / 7}, 1.0, 0.6169228848),
+        (LINEAR_GAP, "lammps-linear-history", {"k_t": 2 / 7}, 0.2, 0.3349560103),
+        (LINEAR_GAP, "liggghts-history", {"tangential_reduce": 1}, 0.2, 0.2843498352),
+        (LINEAR_GAP, "yade-viscoelastic", {"k_t": 2 / 7, "c_t": 2 * ZETA}, 0.2, 0.349907081229),
+        (LINEAR_GAP, "lammps-linear-nohistory", {}, 0.2, -0.0837190762),
+        (("bilinear", 1.0, 0.7), "cundall-strack-1979", {"k_t": 2 / 7}, 1.0, 0.7250747576),
+        (("hertz", 1.5, 1.0), "lammps-mindlin", {"kt_over_kn": HERTZ_KAPPA}, 0.6, 0.1381289427),
+        (("hertz", 1.5, 1.0), "lammps-mindlin-force", {"kt_over_kn": HERTZ_KAPPA}, 0.6, 0.0878103927),
+        (("hertz", 1.5, 1.0), "lammps-mindlin-rescale", {"kt_over_kn": HERTZ_KAPPA}, 0.6, 0.1460639875),
+        (("hertz", 1.5, 1.0), "lammps-mindlin-rescale-force", {"k_t": 1.5 * HERTZ_KAPPA}, 0.6, 0.0954038379),
+        (("hertz", 1.0, 1.0), "drake-regularized", {"v_s": 0.01}, 0.5, -0.0003627776),
+    ],
+)
+def test_a_pair_reaches_the_reference_numbers(
+    model: tuple[str, float, float], friction: str, parameters: dict[str, float], g0: float, beta: float
+) -> None:
+    key, n, e = model
+    impacts = impacts_of(n, K=[1.0], v1=[1.0], e=[e], m1=[1.0], m2=[np.inf], R2=[np.inf])
+    oblique = oblique_of(impacts, u1=[g0], parameters={name: [value] for name, value in parameters.items()})
+    pair = Pair(find(key), find_friction(friction))
+    assert check_friction(pair, oblique).tolist() == [FrictionStatus.OK]
+    values = {name: value.item() for name, value in friction_values(pair, oblique).items()}
+    form, coefficient = pair.form(n), pair.friction.coefficient
+    # G' = -phi is the motion of a mass 1 under a friction of mu 1
+    law = reference.Friction(
+        form.kind,
+        mu=1.0,
+        m_t=1.0,
+        k_t=values.get(TANGENTIAL_STIFFNESS, 0.0),
+        kp=form.stiffness_power,
+        memory=form.memory,
+        c_t=values.get(TANGENTIAL_DAMPING, 0.0),
+        q=form.damping_power,
+        cap=form.cap,
+        positive=values[LIMIT_POSITIVE] > 0,
+        coefficient=None
+        if coefficient is None
+        else lambda G: float(np.asarray(coefficient(values[SLIP_SCALE] * G, values["friction.ratio"]))),
+    )
+    of_law = {name: value.item() for name, value in dimensionless_values(pair.model, impacts).items()}
+    is_elastic = key == "hertz"
+    normal = reference.spring_dashpot(n) if is_elastic else reference.normal_law(pair.model, n, of_law)
+    outcome = reference.solve(normal, law, values[SLIP])
+    assert reference.beta(outcome, values[SLIP]) == pytest.approx(beta, abs=2e-9)
