@@ -333,7 +333,7 @@ def law_quantities(law: ForceModel | FrictionLaw) -> dict[str, Quantity]:
 
 
 def parameter_table(law: ForceModel | FrictionLaw) -> type[Table]:
-    """Create the type of [model.KEY] or [friction.KEY]; not every name of a parameter can name a field: aliases."""
+    """Create the type of [model.KEY] or [friction.KEY]; keys are aliases, as not every name can name a field."""
     parameters = {parameter.name: parameter for parameter in law.parameters}
     fields: dict[str, Any] = {}
     for index, (name, quantity) in enumerate(law_quantities(law).items()):
