@@ -37,9 +37,9 @@ SLIP_ROW, SPRING_ROW, STICK_MEMORY_ROW, TIME_ROW, SLIP_WORK_ROW, DAMPING_ROW, SL
 N_COMPONENTS = 4
 # those rows of the joint rates that a normal problem has; it does not use its work, the fourth
 NORMAL_ROWS = [0, 1, TIME_ROW, TIME_ROW, FORCE_ROW]
-# errors of Gamma and z are judged against 1, ten times as strictly as those of the normal motion; that of the
-# memory work is judged, too, which may grow fast where the contact area vanishes
-JOINT_FLOOR, STRICTNESS = (*motion.ERROR_FLOOR, 1.0, 1.0, 1.0), (10.0, 10.0, 1.0)
+# errors of Gamma, z and the memory work while sticking are judged against 1; the latter may grow fast where the
+# contact area vanishes
+JOINT_FLOOR = (*motion.ERROR_FLOOR, 1.0, 1.0, 1.0)
 # numbers of the margins: of the mode, and of the sign of the normal force
 MODE_MARGIN, SIGN_MARGIN = 0, 1
 # a margin counts as positive down to this part of the largest normal force, which is of the order of 1
@@ -270,7 +270,6 @@ class SlipPhase:
             step_at_unit_error=normal.step_at_unit_error,
             n_components=N_COMPONENTS,
             n_quadratures=FORCE_ROW - N_COMPONENTS,
-            strictness=STRICTNESS,
             switch=self,
         )
 
