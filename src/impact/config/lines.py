@@ -35,6 +35,8 @@ EXPECTED_BY_KEY = {
     **{name: str(info.description) for name, info in Column.model_fields.items()},
     "n": f"the number of {Design.model_fields['n'].description}, such as 1024",
 }
+# tables of inputs
+INPUT_TABLES: Mapping[str, type[quantities.Table]] = {"sweep": Sweep, "data": Data, "design": Design}
 # other words that users may write for a key
 KEY_SYNONYMS = {
     "restitution": "e",
@@ -207,7 +209,7 @@ def _unknown_key_hint(location: KeyPath, models: Mapping[str, ForceModel]) -> st
         case ():
             keys = Document.model_fields
         case ("sweep" | "data" | "design" as table,):
-            keys = {"sweep": Sweep, "data": Data, "design": Design}[table].model_fields
+            keys = INPUT_TABLES[table].model_fields
         case ("materials", _):
             keys = MaterialTable.model_fields
         case ("model",):

@@ -581,7 +581,7 @@ def number_type(quantity: Quantity) -> Any:
     if math.isfinite(quantity.least):
         bounds["gt" if quantity.above else "ge"] = quantity.least
     if math.isfinite(quantity.most):
-        bounds["le"] = quantity.most
+        bounds["lt" if quantity.below else "le"] = quantity.most
     bare: Any = Annotated[float, Field(**bounds)]
     if quantity.exponents <= {"n"}:
         number = rf"\s*[-+]?({_DIGITS}{'|inf' if quantity.infinite else ''})\s*"
