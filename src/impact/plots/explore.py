@@ -122,7 +122,7 @@ def axes_of(dataset: xr.Dataset) -> list[str]:
     """
     if source_of(dataset) in STUDIES:
         return []
-    return [str(dim) for dim in dataset.dims if dim not in ("model", SAMPLE) and dim in dataset.coords]
+    return [str(dim) for dim in dataset.dims if dim not in ("model", "friction", SAMPLE) and dim in dataset.coords]
 
 
 def _shown_values(coordinate: xr.DataArray) -> list[tuple[str, Any]]:

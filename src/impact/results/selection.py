@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,13 +28,18 @@ Labels = NDArray[Any]
 IndexArray = NDArray[np.intp]
 
 
-def model_positions(models: Sequence[str], dataset: xr.Dataset) -> list[int]:
-    """Find the positions of models along `model`, in the order of the keys; repeated keys count once."""
-    keys = [str(key) for key in dataset["model"].values]
-    for key in models:
+def law_positions(
+    laws: Sequence[str], dataset: xr.Dataset, dim: Literal["model", "friction"] = "model"
+) -> list[int]:
+    """Find the positions of models or friction laws, in the order of the keys; repeated keys count once."""
+    noun = "friction law" if dim == "friction" else dim
+    if dim not in dataset.dims:
+        raise UsageError(f'no {noun} "{laws[0]}" in this result, which has none; sweep a config with {dim}s')
+    keys = [str(key) for key in dataset[dim].values]
+    for key in laws:
         if key not in keys:
-            raise UsageError(f'no model "{key}" in this result; {did_you_mean(key, keys)}')
-    return [keys.index(key) for key in dict.fromkeys(models)]
+            raise UsageError(f'no {noun} "{key}" in this result; {did_you_mean(key, keys)}')
+    return [keys.index(key) for key in dict.fromkeys(laws)]
 
 
 def select(dataset: xr.Dataset, sel: Mapping[str, float | str]) -> xr.Dataset:
