@@ -219,6 +219,7 @@ def curve_of(
     variable: str,
     end: str = "",
     band: Sequence[ArrayLike] = (),
+    friction: str = "",
 ) -> Curve:
     """Make a curve of arrays of the shape of x, or of one y everywhere; a band is two arrays."""
     shape = np.shape(x)
@@ -226,7 +227,7 @@ def curve_of(
         tuple(np.broadcast_to(np.asarray(array, float), shape).tolist()) if array is not None else ()
         for array in (x, y, *(band or (None, None)))
     )
-    return Curve(label, model, points, values, end, variable, least=least, largest=largest)
+    return Curve(label, model, points, values, end, variable, least=least, largest=largest, friction=friction)
 
 
 def x_axis_fields(coordinate: xr.DataArray, choice: Choice) -> dict[str, Any]:

@@ -35,11 +35,14 @@ MATH_SYMBOLS = {
     "E2": "E_2",
     "dt": r"h",
     "phase": "s",
+    "angle": r"\theta",
+    "inertia_factor1": "q_1",
+    "inertia_factor2": "q_2",
 }
 # name of the impulse-momentum solution in the paper
 REFERENCE = "Impulse-momentum"
 # distances of ticks of angles [deg], of which the first with a suitable number of ticks is used
-ANGLE_STEPS, MIN_ANGLES, MAX_ANGLES = (5, 15, 30, 45, 90), 2.0, 8.0
+ANGLE_STEPS, MIN_ANGLES, MAX_ANGLES = (5, 15, 30, 45, 90), 1, 8
 
 
 @cache
@@ -200,7 +203,9 @@ class DegreeLocator(MaxNLocator):
 
     def tick_values(self, vmin: float, vmax: float) -> Any:
         low, high = math.degrees(vmin), math.degrees(vmax)
-        step = next((step for step in ANGLE_STEPS if MIN_ANGLES <= (high - low) / step <= MAX_ANGLES), None)
+        # as many as fit beside each other
+        most = min(max(MIN_ANGLES, self.axis.get_tick_space()), MAX_ANGLES) if self.axis else MAX_ANGLES
+        step = next((step for step in ANGLE_STEPS if MIN_ANGLES <= (high - low) / step <= most), None)
         if step is None:
             return np.radians(super().tick_values(low, high))
         return np.radians(np.arange(math.ceil(low / step), math.floor(high / step) + 1) * step)

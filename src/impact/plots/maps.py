@@ -147,7 +147,10 @@ class MapData:
             {
                 heading(self.x, unit=x_unit): points[self.x],
                 heading(self.y, unit=y_unit): points[self.y],
-                **{heading(self.variable, owner, unit): column for owner, column in zip(owners, columns)},
+                **{
+                    heading(self.variable, owner, unit): column
+                    for owner, column in zip(owners, columns, strict=True)
+                },
                 **{name: points[name] for name in ("closest", "abs_e_error") if self.closest},
             }
         )

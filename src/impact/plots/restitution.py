@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..contact.variables import OUTPUTS
 from ..errors import UsageError
 from ..formatting import label as number_label, safe_text
 from .curves import Curve, CurveData, Panel, curve_of, x_axis_fields
@@ -148,7 +149,11 @@ def read_line(dataset: xr.Dataset, choice: Choice, *names: str, keep: Sequence[s
     line = take_line(dataset, choice, keep)
     missing = [name for name in names if name not in dataset]
     if missing:
-        raise UsageError(f"this result has no {', '.join(missing)}; sweep without [output] variables, or add them")
+        is_requested = any(OUTPUTS[name].on_request for name in missing)
+        advice = (
+            "list them in [output] variables" if is_requested else "sweep without [output] variables, or add them"
+        )
+        raise UsageError(f"this result has no {', '.join(missing)}; {advice}")
     return line._replace(data=read(line.data, names))
 
 

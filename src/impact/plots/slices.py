@@ -247,10 +247,9 @@ def described_inputs(inputs: Mapping[str, object], units: Mapping[str, str], exp
         if InputName.parse(name).table in ("sweep", "materials"):
             n = inputs.get("n")
             unit = with_numbers(units[name], {"n": n}) if isinstance(n, float) else units[name]
-            # a degree is the unit of angles for people
-            is_angle = unit == "rad" and isinstance(value, float)
-            text = f"{number_label(math.degrees(value))}°" if is_angle else quantity(value, unit)
-            text = exponent if name == "n" and exponent else text
+            text = exponent if name == "n" and exponent else quantity(value, unit)
+            if unit == "rad" and isinstance(value, float):
+                text = f"{number_label(math.degrees(value))}°"
             parts.append(safe_text(f"{name} = {text}", 60).replace(" ", NO_BREAK))
     return ", ".join(parts)
 

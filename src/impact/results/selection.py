@@ -7,10 +7,13 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic_core import PydanticCustomError
 
 from ..array_types import Mask
+from ..config.quantities import Quantity
 from ..errors import UsageError, did_you_mean
 from ..formatting import label, safe_text
+from .schema import plain_unit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -51,7 +54,7 @@ def select(dataset: xr.Dataset, sel: Mapping[str, float | str]) -> xr.Dataset:
             raise UsageError(f'no axis "{name}" in this result; {did_you_mean(name, axes)}')
         (dim,) = dataset[name].dims
         values = dataset[name].values
-        same = _matches_value(values, value)
+        same = _matches_value(values, _in_si(dataset[name], value))
         if dim in masks and same.any():
             same &= masks[dim]
         if not same.any():
@@ -59,6 +62,17 @@ def select(dataset: xr.Dataset, sel: Mapping[str, float | str]) -> xr.Dataset:
             raise UsageError(f"no {name} = {value} in this result; {shown}")
         masks[dim] = same
     return dataset.isel({dim: _matching_positions(dataset[dim], same) for dim, same in masks.items()})
+
+
+def _in_si(coordinate: xr.DataArray, value: float | str) -> float | str:
+    """Convert a text with a unit, such as "30 deg", to a number in the unit of a coordinate, if it is one."""
+    unit = coordinate.attrs.get("units")
+    if not isinstance(value, str) or unit is None:
+        return value
+    try:
+        return Quantity(plain_unit(str(unit)), "").read(value)
+    except PydanticCustomError:
+        return value
 
 
 def _matching_positions(labels: xr.DataArray, same: Mask) -> int | IndexArray:
