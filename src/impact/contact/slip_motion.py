@@ -49,6 +49,8 @@ RATE_OF_LIMIT_STEP, RATE_OF_SLIP_STEP = 1e-5, 1e-3
 # s at which leading powers of x are compared at first contact, and their rates; and the least s for what
 # is singular at s = 0
 START_S, RATE_S, LEAST_S = 1e-7, 1e-4, 1e-10
+# s below which a mode does not change any more
+END_S = 1e-7
 # step of the central difference quotient there, relative to s; it sees the rate of N beside a force that jumps
 RATE_STEP = 1e-2
 
@@ -81,7 +83,7 @@ class Columns(NamedTuple):
 
     `limit`, `spring` and `dashpot` are the factors of F, X^r z and x^q Gamma in the force, zero in other modes;
     `memory_limit` is the factor of F in phi_e for the memory work. `press` is N/F: 1, and in tension -1 or 0;
-    `sign` is the sign of F. `root` is the root of kappa', `counted` is 1 where slips count for the memory work.
+    `sign` is the sign of F. `root` is the root of kappa'.
     """
 
     mode: Array
@@ -96,7 +98,6 @@ class Columns(NamedTuple):
     damping: Array
     G0: Array
     is_positive: Array
-    counted: Array
 
     def changed(self, mode: Array, sign: Array) -> Columns:
         """Make the columns of other modes and signs of the normal force."""
@@ -108,7 +109,7 @@ class Columns(NamedTuple):
             press=press,
             sign=sign,
             limit=np.where(np.abs(mode) == 1.0, limit, 0.0),
-            memory_limit=limit * self.counted,
+            memory_limit=limit,
             spring=np.where(sticks, self.root, 0.0),
             dashpot=np.where(sticks, self.damping, 0.0),
         )
@@ -120,8 +121,9 @@ class Track:
 
     `force` and `energy` are phi_e and its energy at the end of the last part, `v` the velocity to which the
     impulse of N is complete: `impulse`, and `signed` in the direction of the slip. `slip_work` and `damping_work`
-    complete the quadratures by what happens where a mode begins and ends. `order` is the leading power of x
-    in N at first contact; `modes` has a bit for sticking, slipping forwards and backwards.
+    complete the quadratures by what happens where a mode begins and ends. `slip_memory` is the memory work of
+    slips, `order` the leading power of x in N at first contact, and `touches` tells that a slip began or ended at
+    x = 0. `modes` has a bit for sticking, slipping forwards and backwards.
     """
 
     mode: Array
@@ -133,7 +135,9 @@ class Track:
     signed: Array
     slip_work: Array
     damping_work: Array
+    slip_memory: Array
     order: Array
+    touches: Mask
     modes: NDArray[np.int8]
     changes: NDArray[np.int32]
     is_slow: Mask
@@ -142,7 +146,11 @@ class Track:
     def of(cls, n: int) -> Track:
         """Begin n trajectories."""
         arrays: dict[str, Any] = {name: np.zeros(n) for name in cls.__annotations__}
-        flags = {"modes": np.zeros(n, np.int8), "changes": np.zeros(n, np.int32), "is_slow": np.zeros(n, bool)}
+        flags = {
+            "modes": np.zeros(n, np.int8),
+            "changes": np.zeros(n, np.int32),
+        }
+        flags |= {"touches": np.zeros(n, bool), "is_slow": np.zeros(n, bool)}
         return cls(**{**arrays, **flags, "sign": np.ones(n), "v": np.ones(n)})
 
     def add_impulse(self, index: NDArray[np.intp], columns: Columns, v: Array) -> None:
@@ -160,6 +168,10 @@ class Track:
         was_slip, is_slip = np.abs(old) == 1.0, np.abs(new) == 1.0
         self.slip_work[index] += np.where(
             is_slip, np.where(was_slip, 0.0, entered), np.where(was_slip, -left, before - after)
+        )
+        memory = y[MEMORY_ROW]
+        self.slip_memory[index] += np.where(was_slip & ~is_slip, memory, 0.0) - np.where(
+            is_slip & ~was_slip, memory, 0.0
         )
         was_held, is_held = np.abs(old) == 2.0, np.abs(new) == 2.0
         kinetic = 0.5 * y[SLIP_ROW] * y[SLIP_ROW]
@@ -275,7 +287,7 @@ class SlipPhase:
         slip_drag = working_drag - stick_drag
         out[SLIP_WORK_ROW] = power * (slip_force - slip_drag)
         out[DAMPING_ROW] = power * working_drag
-        held_force = spring_force + columns.memory_limit * force - columns.counted * slip_drag
+        held_force = spring_force + columns.memory_limit * force - slip_drag
         out[MEMORY_ROW] = (
             (1.0 - 2.0 * self.memory) * self.stiffness_power * v * self._energy(s, held_force, columns)
         )
@@ -306,8 +318,7 @@ class SlipPhase:
     def local(self, y: Array, k: Array, params: Params) -> Local:
         """Compute the state of friction at components y with rates k."""
         columns, s, force = self.columns(params), y[0], k[FORCE_ROW]
-        small = motion.RELEASE_STEP * np.clip(np.abs(s), motion.MIN_RELEASE_S, 1.0)
-        d_force = (self.normal.rates(y[:2] + small * k[:2], params)[4] - force) / small
+        d_force = self._rate_of_force(y, k, params)
         share = columns.press / columns.G0
         N = share * force
         drag = columns.damping * self._power(s, self.drag_power) * y[SLIP_ROW]
@@ -319,6 +330,17 @@ class SlipPhase:
         )
         trial = drag if self.form.kind == "dashpot" else spring_force + capped_drag
         return Local(N, share * d_force, d_force, k[TIME_ROW], spring_force, drag, trial)
+
+    def _rate_of_force(self, y: Array, k: Array, params: Params) -> Array:
+        """Compute the rate of the normal force by a difference quotient."""
+        reach = np.clip(np.abs(y[0]), motion.MIN_RELEASE_S, 1.0)
+        if self.form.cap == "total":
+            small = motion.RELEASE_STEP * reach
+            return np.asarray((self.normal.rates(y[:2] + small * k[:2], params)[4] - k[FORCE_ROW]) / small)
+        # the friction force jumps where a slip ends, which makes the time of it matter
+        small = RATE_OF_LIMIT_STEP * reach
+        ahead, behind = (self.normal.rates(y[:2] + step * k[:2], params)[4] for step in (small, -small))
+        return np.asarray((ahead - behind) / (2.0 * small))
 
     def trial_rate(
         self, y: Array, k: Array, columns: Columns, local: Local, spring_force: Array, phi: Array
@@ -357,7 +379,8 @@ class SlipPhase:
         held = np.flatnonzero(np.abs(columns.mode) == 2.0)
         if held.size:
             margin[held], margin_rate[held] = self._held_margin(y[:, held], _taken(params, held))[0], np.nan
-        free = columns.press == 0.0
+        # without a limit the mode does not matter, and where the contact ends all margins vanish
+        free = (columns.press == 0.0) | (y[0] < END_S)
         margin, margin_rate = np.where(free, 1.0, margin), np.where(free, 0.0, margin_rate)
         return np.array([margin, sign_margin]), np.array([margin_rate, sign_rate])
 
@@ -426,11 +449,9 @@ class SlipPhase:
 
     def _held_slip(self, y: Array, params: Params, direction: Array) -> tuple[Array, Array]:
         """Compute Gamma for which the trial force of the spring grows as its limit does, and N."""
-        k, small = self.rates(y, params), RATE_OF_LIMIT_STEP * np.clip(np.abs(y[0]), motion.MIN_RELEASE_S, 1.0)
-        columns, step = self.columns(params), small * k[:TIME_ROW]
-        ahead, behind = (self.rates(y + sign * step, params)[FORCE_ROW] for sign in (1.0, -1.0))
+        k, columns = self.rates(y, params), self.columns(params)
         share = columns.press / columns.G0
-        N, dN = share * k[FORCE_ROW], share * (ahead - behind) / (2.0 * small)
+        N, dN = share * k[FORCE_ROW], share * self._rate_of_force(y, k, params)
         stiffness = columns.root * columns.root * k[TIME_ROW] * self._power(y[0], self.stiffness_power)
         fading = self.memory * self.stiffness_power * k[0] / _away_from_zero(y[0]) * N
         return direction * (dN - fading) / stiffness, N
@@ -487,7 +508,7 @@ class SlipPhase:
 
     def _at_change(self, y: Array, params: Params, index: NDArray[np.intp]) -> tuple[Array, Params]:
         """Find the modes where the formulas of the normal motion, or r, have changed."""
-        columns = self.columns(params)._replace(counted=self._counted(index))
+        columns = self.columns(params)
         old, force_before = self.track.mode[index], self.track.force[index]
         k = self.rates(y[:TIME_ROW], params)
         force = k[FORCE_ROW]
@@ -513,10 +534,6 @@ class SlipPhase:
             new = self._held_mode(at_limit & was_held, ~was_held, direction, new, y, params)
         return self._enter(index, old, new, sign, force_before, spring_force, y, params)
 
-    def _counted(self, index: NDArray[np.intp]) -> Array:
-        """Find where slips count for the memory work: where its integral exists down to x = 0."""
-        return np.where(2.0 * self.track.order[index] > self.form.stiffness_power + ORDER_TOLERANCE, 1.0, 0.0)
-
     def _replaced(self, params: Params, columns: Columns) -> Params:
         return (*params[: self.first], *columns, *params[self.first + len(columns) :])
 
@@ -532,7 +549,7 @@ class SlipPhase:
         self.track.order[index] = np.log2(twice_force / force) / self.law.model.coordinate_power
         sign = np.where(force < 0.0, -1.0, 1.0)
         self.track.sign[index] = sign
-        columns = columns._replace(counted=self._counted(index)).changed(np.zeros(n), sign)
+        columns = columns.changed(np.zeros(n), sign)
         params = self._replaced(params, columns)
         if not self.has_modes:
             mode = np.full(n, 1.0 if form.kind == "regularized" else 0.0)
@@ -559,6 +576,7 @@ class SlipPhase:
             if self.is_total and self.memory == 1.0 and form.damping_power < kp:
                 self.track.is_slow[index] = is_slow = local.drag > local.N
                 new = np.where(is_slow, -1.0, new)
+        self.track.touches[index] = new != 0.0
         near, params = self._enter(index, new, new, sign, np.zeros(n), spring_force, near, params)
         y[SPRING_ROW] = near[SPRING_ROW]
         return y, params

@@ -35,6 +35,7 @@ from .simulate import (
 from .slip_motion import (
     DAMPING_ROW,
     MEMORY_ROW,
+    ORDER_TOLERANCE,
     SLIP_ROW,
     SLIP_WORK_ROW,
     TIME_ROW,
@@ -173,7 +174,7 @@ def _integrate(form: TangentialForm, problems: DistinctProblems, rtol: float, ma
     n, names = slip.size, _coefficient_arguments(form)
     track = Track.of(n)
     unset = np.zeros(n)
-    base = Columns(*(unset,) * 7, np.arange(n, dtype=float), np.sqrt(stiffness), damping, slip, is_positive, unset)
+    base = Columns(*(unset,) * 7, np.arange(n, dtype=float), np.sqrt(stiffness), damping, slip, is_positive)
     states: list[Array] = []
 
     def solve(
@@ -203,6 +204,8 @@ def _integrate(form: TangentialForm, problems: DistinctProblems, rtol: float, ma
     if phases.restitution is not None:
         state[:, phases.rows] = states[1]
         steps[phases.rows] += phases.restitution.steps
+    if law.model.release == "gap":
+        track.touches[:] |= np.abs(track.mode) == 1.0
     result = _result(form, base, track, state)
     status = phases.status.copy()
     # at a limit the balls stop, sooner or later
@@ -221,6 +224,12 @@ def _result(form: TangentialForm, base: Columns, track: Track, state: Array) -> 
     mode, kinetic = np.abs(track.mode), 0.5 * state[SLIP_ROW] ** 2
     left = track.energy + state[MEMORY_ROW]
     slip_work = state[SLIP_WORK_ROW] + track.slip_work - np.where(mode == 1.0, left, 0.0)
+    memory_work = state[MEMORY_ROW]
+    # where N vanishes so slowly with x that both works of a slip at x = 0 are infinite, their sum is the slip work
+    slip_memory = track.slip_memory + np.where(mode == 1.0, memory_work, 0.0)
+    moved = np.where(
+        track.touches & (2.0 * track.order < form.stiffness_power + ORDER_TOLERANCE), slip_memory, 0.0
+    )
     damping_work = state[DAMPING_ROW] + track.damping_work - np.where(mode == 2.0, kinetic + left, 0.0)
     ended = np.isfinite(state[SLIP_ROW])
     nan = np.full(ended.size, np.nan)
@@ -237,9 +246,9 @@ def _result(form: TangentialForm, base: Columns, track: Track, state: Array) -> 
     return replace(
         result,
         slip=G0 * state[SLIP_ROW],
-        slip_work=scale * slip_work,
+        slip_work=scale * (slip_work + moved),
         damping_work=scale * damping_work,
-        memory_work=scale * state[MEMORY_ROW],
+        memory_work=scale * (memory_work - moved),
         elastic_left=scale * np.where(ended, track.energy, np.nan),
         regime=np.where(ended, regime, 0).astype(np.int8),
         slip_changes=np.where(ended, track.changes, 0).astype(np.int32),
