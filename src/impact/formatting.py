@@ -70,6 +70,15 @@ def quantity(value: object, unit: str = "1", digits: int = 6) -> str:
     return text if unit in ("", "1") or text == "–" else f"{text} {unit}"
 
 
+def degrees(angle: float) -> str:
+    """Write an angle, given in rad, in degrees.
+
+    >>> degrees(math.pi / 6.0)
+    '30°'
+    """
+    return f"{label(math.degrees(angle))}°"
+
+
 def heading(name: str, of: str = "", unit: str = "1") -> str:
     """Write the heading of a column: a name, the model or ball it belongs to, and its unit in brackets.
 

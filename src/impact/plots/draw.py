@@ -107,9 +107,7 @@ def get_plot_data(
     if default.source in STUDIES and found != default:
         raise UsageError(f"this result has the kind {default.name}, not {kind}")
     if found.source == "history":
-        pairs = found.of_friction and "friction" in dataset.dims
-        frictions = choice.frictions or (dataset["friction"].values.tolist() if pairs else ())
-        return found.data(histories(dataset, choice.models, choice.sel or {}, plugin_set, frictions), choice)
+        return found.data(histories(dataset, choice.models, choice.sel or {}, plugin_set), choice)
     return found.data(dataset, choice)
 
 

@@ -36,7 +36,6 @@ KINDS = {
     "impulse-ratio": "oblique",
     "spin": "oblique",
     "psi": "oblique",
-    "friction-loop": "oblique",
     "calibration": "calibrations",
     "uncertainty": "uncertainty",
     "sensitivity": "sensitivity",

@@ -164,14 +164,22 @@ def split_by_law(data: xr.Dataset, *, numbered: bool) -> Iterator[LawPart]:
 def friction_text(key: str, inputs: Mapping[str, object]) -> str:
     """Write the title of a friction law, with those of its parameters that differ from their defaults.
 
-    >>> friction_text("lammps-mindlin", {"friction.lammps-mindlin.xt": 0.5}).replace(NO_BREAK, " ")
-    'LAMMPS mindlin, xt = 0.5'
+    >>> inputs = {"friction.lammps-mindlin.xt": 0.5, "friction.lammps-mindlin.limit": 1.0}
+    >>> friction_text("lammps-mindlin", inputs).replace(NO_BREAK, " ")
+    'LAMMPS mindlin, xt = 0.5, limit = positive'
     """
     law = frictions().get(key)
     if law is None:
         return safe_text(key, 80)
-    defaults = {f"friction.{key}.{parameter.name}": parameter.default for parameter in law.parameters}
-    chosen = {name: value for name, value in inputs.items() if value != defaults.get(name)}
+    chosen: dict[str, object] = {}
+    for parameter in law.parameters:
+        name = f"friction.{key}.{parameter.name}"
+        value = inputs.get(name, parameter.default)
+        if value != parameter.default:
+            # a word is stored as its position
+            chosen[name] = (
+                parameter.choices[int(value)] if parameter.choices and isinstance(value, float) else value
+            )
     return ", ".join(filter(None, (law.title, parameter_text(f"friction.{key}", chosen))))
 
 

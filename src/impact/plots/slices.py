@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -12,7 +11,7 @@ from ..config.grid import SAMPLE
 from ..config.input_names import InputName, is_input
 from ..contact.units import with_numbers
 from ..errors import UsageError, did_you_mean
-from ..formatting import NO_BREAK, label as number_label, quantity, safe_text
+from ..formatting import NO_BREAK, degrees, quantity, safe_text
 from ..results.schema import exponents_of, plain_unit
 from ..results.selection import law_positions, select
 from .kinds import Choice
@@ -249,7 +248,7 @@ def described_inputs(inputs: Mapping[str, object], units: Mapping[str, str], exp
             unit = with_numbers(units[name], {"n": n}) if isinstance(n, float) else units[name]
             text = exponent if name == "n" and exponent else quantity(value, unit)
             if unit == "rad" and isinstance(value, float):
-                text = f"{number_label(math.degrees(value))}°"
+                text = degrees(value)
             parts.append(safe_text(f"{name} = {text}", 60).replace(" ", NO_BREAK))
     return ", ".join(parts)
 
