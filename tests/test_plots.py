@@ -34,9 +34,11 @@ from .conftest import ROOT, Run, one_line
 from .fork_server import ForkServer
 
 OTHER_RESULTS = ("timestep", "calibration", "uncertainty", "sensitivity")
-MOTION_KINDS = [kind for kind in KINDS if find_kind(kind).source == "history"]
+MOTION_KINDS = [kind for kind in KINDS if find_kind(kind).source == "history" and not find_kind(kind).of_friction]
 # those of the result of an ordinary sweep
-CURVES = [kind for kind in KINDS if kind not in ("map", "validity", *OTHER_RESULTS)]
+CURVES = [
+    kind for kind in KINDS if kind not in ("map", "validity", *OTHER_RESULTS) and not find_kind(kind).of_friction
+]
 
 
 def selection_of(kind: str) -> dict[str, float]:

@@ -382,7 +382,7 @@ def _label_curve_ends(axes: Axes, curves: Sequence[Curve], labels: Mapping[str, 
     low, high = axes.get_ylim()
     ordered = sorted((point[1], name) for name, point in ends.items())
     for rank, (y, name) in enumerate(ordered):
-        near = [other for other, _ in ordered if abs(other - y) < 0.06 * (high - low)]
+        near = [other for other, _ in ordered if abs(other - y) < 0.1 * (high - low)]
         aside = (-8 if rank == 0 else 8) if len(near) > 1 else 0
         axes.annotate(
             labels.get(name, symbol(name)),

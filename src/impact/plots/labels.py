@@ -211,8 +211,8 @@ class DegreeLocator(MaxNLocator):
 
     def tick_values(self, vmin: float, vmax: float) -> Any:
         low, high = math.degrees(vmin), math.degrees(vmax)
-        # as many as fit beside each other
-        most = min(max(MIN_ANGLES, self.axis.get_tick_space()), MAX_ANGLES) if self.axis else MAX_ANGLES
+        # as many as fit beside each other: the numbers have two digits
+        most = min(max(MIN_ANGLES, 1.5 * self.axis.get_tick_space()), MAX_ANGLES) if self.axis else MAX_ANGLES
         step = next((step for step in ANGLE_STEPS if MIN_ANGLES <= (high - low) / step <= most), None)
         if step is None:
             return np.radians(super().tick_values(low, high))

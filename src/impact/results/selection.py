@@ -54,11 +54,12 @@ def select(dataset: xr.Dataset, sel: Mapping[str, float | str]) -> xr.Dataset:
             raise UsageError(f'no axis "{name}" in this result; {did_you_mean(name, axes)}')
         (dim,) = dataset[name].dims
         values = dataset[name].values
-        same = _matches_value(values, _in_si(dataset[name], value))
+        in_si = _in_si(dataset[name], value)
+        same = _matches_value(values, in_si)
         if dim in masks and same.any():
             same &= masks[dim]
         if not same.any():
-            shown = safe_text(_nearest_values(name, values, value))
+            shown = safe_text(_nearest_values(name, values, in_si))
             raise UsageError(f"no {name} = {value} in this result; {shown}")
         masks[dim] = same
     return dataset.isel({dim: _matching_positions(dataset[dim], same) for dim, same in masks.items()})
