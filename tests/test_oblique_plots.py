@@ -105,8 +105,7 @@ def test_a_pair_that_cannot_be_combined_is_named_with_the_reason(beads: xr.Datas
     data = curves_of(beads, "beta")
     reason = "the contact force lacks what the friction law needs"
     assert data.not_drawn == tuple(
-        f"{model} with {friction}: {reason}"
-        for model, friction in ((HOOKE, MINDLIN), (HOOKE, FORCE))
+        f"{model} with {friction}: {reason}" for model, friction in ((HOOKE, MINDLIN), (HOOKE, FORCE))
     )
     with pytest.raises(UsageError, match=f"^no pair has a value of e_t here: {HOOKE} with {FORCE}: {reason}$"):
         curves_of(beads, "e-t", models=[HOOKE], frictions=[FORCE])

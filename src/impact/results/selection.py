@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic_core import PydanticCustomError
 
 from ..array_types import Mask
-from ..config.quantities import Quantity
+from ..config.quantities import number_in
 from ..errors import UsageError, did_you_mean
 from ..formatting import label, safe_text
 from .schema import plain_unit
@@ -70,10 +69,8 @@ def _in_si(coordinate: xr.DataArray, value: float | str) -> float | str:
     unit = coordinate.attrs.get("units")
     if not isinstance(value, str) or unit is None:
         return value
-    try:
-        return Quantity(plain_unit(str(unit)), "").read(value)
-    except PydanticCustomError:
-        return value
+    number = number_in(plain_unit(str(unit)), value)
+    return value if number is None else number
 
 
 def _matching_positions(labels: xr.DataArray, same: Mask) -> int | IndexArray:
