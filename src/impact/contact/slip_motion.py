@@ -482,16 +482,30 @@ class SlipPhase:
         fading = self.memory * self.stiffness_power * k[0] / _away_from_zero(y[0]) * N
         return direction * (dN - fading) / stiffness, N
 
+    def _held_force(self, y: Array, params: Params, direction: Array) -> Array:
+        """Compute the friction force that gives the slip its rate, over G0."""
+        small = RATE_OF_SLIP_STEP * np.clip(np.abs(y[0]), motion.MIN_RELEASE_S, 1.0)
+        k = self.rates(y, params)
+        step = small * k[:N_COMPONENTS]
+        ahead, behind = (self._held_slip(y + sign * step, params, direction)[0] for sign in (1.0, -1.0))
+        return np.asarray((behind - ahead) / (2.0 * small * k[TIME_ROW]))
+
+    def friction_at(self, y: Array, params: Params) -> tuple[Array, Array, Array]:
+        """Compute Gamma, the friction force phi and its part phi_e in the spring, over G0, from rows of a step."""
+        near = np.array([_away_from_zero(y[0]), *y[1:N_COMPONENTS]])
+        near = self._released(near, params)
+        k = self.rates(near, params)
+        mode, force = self.columns(params).mode, -k[SLIP_ROW] / k[TIME_ROW]
+        if (np.abs(mode) == 2.0).any():
+            force = np.where(np.abs(mode) == 2.0, self._held_force(near, params, np.sign(mode)), force)
+        return near[SLIP_ROW], force, self.local(near, k, params).spring_force
+
     def _held_margin(self, y: Array, params: Params, direction: Array | None = None) -> tuple[Array, Mask]:
         """Compute a margin, positive while the force is between slip and stick, and where it is nearer to slip."""
         columns, y = self.columns(params), y[:N_COMPONENTS]
         direction = np.sign(columns.mode) if direction is None else direction
         slip, N = self._held_slip(y, params, direction)
-        small = RATE_OF_SLIP_STEP * np.clip(np.abs(y[0]), motion.MIN_RELEASE_S, 1.0)
-        k = self.rates(y, params)
-        step = small * k[:N_COMPONENTS]
-        ahead, behind = (self._held_slip(y + sign * step, params, direction)[0] for sign in (1.0, -1.0))
-        force = (behind - ahead) / (2.0 * small * k[TIME_ROW])
+        force = self._held_force(y, params, direction)
         drag = columns.damping * self._power(y[0], self.drag_power) * slip
         above_slip = (force - direction * N) * np.sign(drag)
         return np.minimum(above_slip, np.abs(drag) - above_slip), above_slip < 0.5 * np.abs(drag)
