@@ -310,7 +310,7 @@ class SlipPhase:
             out[DAMPING_ROW] = power * working_drag
         out[SLIP_WORK_ROW] = power * slip_force
         if self.has_spring and self.stiffness_power and self.memory != 0.5:
-            safe = _away_from_zero(s)
+            safe = np.where(np.abs(s) < END_S, END_S, s)
             fading = (0.5 - self.memory) * self.stiffness_power * columns.compliance * v
             fading /= self._power(safe, self.stiffness_power + 1.0)
             np.multiply(fading, spring_force * spring_force, out[STICK_MEMORY_ROW])
@@ -403,8 +403,9 @@ class SlipPhase:
         held = np.flatnonzero(np.abs(columns.mode) == 2.0)
         if held.size:
             margin[held], margin_rate[held] = self._held_margin(y[:, held], _taken(params, held))[0], np.nan
-        # without a limit the mode does not matter, and where the contact ends all margins vanish
-        free = (columns.press == 0.0) | (y[0] < END_S)
+        # without a limit the mode does not matter, nor without a force; and where the contact ends growth vanishes
+        free = (columns.press == 0.0) | ((columns.root == 0.0) & (columns.damping == 0.0))
+        free |= (k[0] < 0.0) & (y[0] < np.where(sticks, -END_S, END_S))
         margin, margin_rate = np.where(free, 1.0, margin), np.where(free, 0.0, margin_rate)
         return np.array([margin, sign_margin]), np.array([margin_rate, sign_rate])
 
@@ -429,6 +430,8 @@ class SlipPhase:
         direction = np.sign(np.where(turned, rate, local.trial))
         new = self._mode_at_limit(direction * rate - dN, direction, y, other, turned)
         new = np.where(~turned & (np.abs(old) == 1.0), 0.0, new)
+        # a held force that goes through zero is at the limit of both slip and stick from there
+        new = np.where(turned & (np.abs(old) == 2.0) & (other.press != 0.0), 0.0, new)
         new = self._held_mode(~turned & (old != 0.0), np.abs(old) == 2.0, np.sign(old), new, y, params)
         capped_drag = local.drag if self.is_total else 0.0
         spring_force = np.where(~turned & (old == 0.0), direction * local.N - capped_drag, spring_force)
