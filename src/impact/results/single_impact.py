@@ -22,7 +22,7 @@ from ..config.input_names import SWEEP_INPUTS, InputName, input_values
 from ..config.load import Config, build, inline_files
 from ..config.rules import has_other_stiffness
 from ..config.starter import STARTER_CONFIG
-from ..config.tables import MATERIAL_QUANTITIES, SWEEP_DEFAULTS, expand_models, model_quantities
+from ..config.tables import MATERIAL_QUANTITIES, SWEEP_DEFAULTS, expand_models, law_quantities
 from ..contact.fixed_step import EXACT
 from ..contact.force_expressions import unload_to_residual, unload_with_stiffness
 from ..contact.history import History, integrate_history
@@ -475,7 +475,7 @@ def _has_input(draft: Draft, name: InputName) -> bool:
         value = as_table(draft.table("materials").get(name.material)).get(name.key)
         return isinstance(value, list | dict)
     if name.model:
-        return any(model.key == name.model and name.key in model_quantities(model) for model in draft.models)
+        return any(model.key == name.model and name.key in law_quantities(model) for model in draft.models)
     return name.key in SWEEP_INPUTS
 
 
