@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import impact
+from frictions_page import frictions_page
 from gallery import gallery_page, write_gallery
 from impact.contact.status import Status
 from impact.contact.variables import Variable
@@ -168,7 +169,7 @@ def schema_page() -> str:
 
 
 # each generated page of docs, and the function that returns its text
-PAGES = {"schema.md": schema_page, "models.md": models_page, "gallery.md": gallery_page}
+PAGES = {"schema.md": schema_page, "models.md": models_page, "frictions.md": frictions_page, "gallery.md": gallery_page}
 
 
 def write_pictures(folder: Path) -> None:
