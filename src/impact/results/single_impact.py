@@ -132,7 +132,7 @@ class Impact(Displayed):
                 rows[name] = f"{quantity(self.derived[name], self._with_numbers(plain_unit(unit)), 10)}  {meaning}"
         rows["status"] = f"{self.status.name.lower()}: {self.status.meaning}"
         for name, variable in OUTPUTS.items():
-            if variable.dtype == "f8" and name not in ("e_kinetic", "e_energetic"):
+            if name in self.values and variable.dtype == "f8" and name not in ("e_kinetic", "e_energetic"):
                 rows[name] = quantity(self.values[name], self._with_numbers(variable.unit), 10)
         rows["e_kinematic"] = quantity(self.e_kinematic, "1", 12) + "  (1), from the velocities"
         rows["e_kinetic"] = quantity(self.e_kinetic, "1", 12) + "  (2), tau_r/tau_c"
