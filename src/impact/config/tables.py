@@ -343,7 +343,7 @@ def parameter_table(law: ForceModel | FrictionLaw) -> type[Table]:
         default = parameter.default if parameter else None
         fields[f"field_{index}"] = (Annotated[kind, Field(alias=name)], default)
     # a contact force and a friction law may have one key
-    name = law.key if isinstance(law, ForceModel) else f"friction.{law.key}"
+    name = law.key if isinstance(law, ForceModel) else f"friction_{law.key}"
     return create_model(name, __base__=Table, **fields)
 
 
