@@ -35,16 +35,16 @@ equations. `impact models --frictions` lists the laws, and `impact models KEY --
 | c_n, m | damping of the contact force, of the form K δⁿ + c_n δ̇, and the effective mass |
 
 Parameters are set in `[friction.KEY]`. One of `k_t` and `kt_over_kn` may be set; otherwise the stiffness follows
-from the materials, where a law has such a rule. μ is an input of the sweep, and is shared by all friction laws, as e is.
+from the materials, where a law has such a rule. μ is an input of the sweep, and all friction laws share it.
 
 {parameters}
 
 The columns *β at γ* are the tangential restitution at four slips before the impact, by this program. γ is 1 where
 rigid bodies would just slide throughout, g₀ = γ μ (1 + e) v₀ m/m_t, and rigid bodies have β = 0 up to γ = 1, and
-1/γ − 1 above. The ball is solid, on a wall, with e = {e:g} and μ = {mu:g}. The contact force is `{hertz}` with laws
-whose stiffness is that of Mindlin, and `{linear}` with the others; the stiffness is {kappa:.4f} of that of the
-contact, as with ν = {nu:g}. Dashpots, and what else has a default, are as in the code; the slip of the largest
-friction of regularized laws is {slip:g} v₀.
+1/γ − 1 above. The ball is solid, on a wall, with e = {e:g} and μ = {mu:g}. The contact force is `{hertz}` with
+laws whose stiffness is that of Mindlin, and `{linear}` with the others; the stiffness is {kappa:.4f} of that of
+the contact, as with ν = {nu:g}. Other parameters have their defaults; the slip of the largest friction of
+regularized laws is {slip:g} v₀.
 
 ## Evidence
 
@@ -54,20 +54,22 @@ Every entry states the evidence for its formula, as in [the catalogue](models.md
 
 ## Reference numbers
 
-β of impacts in units in which K = m = v₀ = 1, with m_t = 2/7, μ = 0.3, and ζ = −ln e/√(π² + ln² e) at e = 0.7; a spring
-of Hertz contacts has k = {mindlin:.10f} δ^(1/2), that is, ν = 0.3. The numbers follow from the program. Its tests
-have them from another solver, which integrates one impact at a time by another method, and agrees to 1e-9.
+β of impacts in units in which K = m = v₀ = 1, with m_t = 2/7, μ = 0.3, and ζ = −ln e/√(π² + ln² e) at e = 0.7;
+Mindlin's spring has k = {mindlin:.10f} δ^(1/2), as with ν = 0.3. The numbers are computed by the program when this
+page is generated. The tests compare them with another solver, which integrates one impact at a time by another
+method.
 
 {numbers}
 """
 
 KINDS = {
     "coulomb": "Friction of rigid bodies: it opposes the slip, and vanishes with it. The slip never reverses.",
-    "spring": "A spring, with or without a dashpot, whose force is limited by μ N. It stores energy, so that the slip can "
-    "reverse. The laws differ in what the spring remembers while the contact grows and shrinks, and in what is limited.",
+    "spring": "A spring, with or without a dashpot, whose force is limited by μ N. It stores energy, so that the "
+    "slip can reverse. The laws differ in what the spring remembers while the contact grows and shrinks, and in "
+    "what is limited.",
     "dashpot": "A dashpot whose force is limited by μ N. The slip falls, but does not reverse.",
-    "regularized": "Coulomb's friction with a coefficient that is zero without slip and depends on it, so that the "
-    "force is a smooth function. Nothing sticks: the contact creeps.",
+    "regularized": "Coulomb's friction with a coefficient that depends on the slip and vanishes with it. Nothing "
+    "sticks: the contact creeps.",
 }
 # the impacts of the columns: solid balls against a wall
 E_IMPACT, MU, NU, CREEP = 0.9, 0.3, 0.3, 0.01

@@ -39,14 +39,14 @@ A netCDF-4 file in HDF5, schema version {version}, with a seal ([storage.md](sto
 `factored` contains trajectories instead of values, and opens as the dataset described here. A *point* is one
 cell of the grid for one model; cells that differ only in parameters of other models count once.
 
-The dimensions are `model`, then `friction` in a result with friction laws, followed by the swept axes in config order under their config names, such as `v1`,
-`bilinear.K` or `materials.steel.E`. A zip group is named after its first member; the other members are
-coordinates along it. Cases, and groups in which every column has repeated values, have the dimension `case`,
-with points numbered from 0 and all columns as coordinates; samples of uncertain inputs have the dimension
-`sample`. Scalars of the config are scalar coordinates.
-Variables with the dimension `friction`, and the coordinates of oblique impacts, are in results with friction laws only; the
-other variables do not depend on friction ([oblique.md](oblique.md)). Coordinates along `model` are `title`, `year`, `equation`, `reference`, `doi` and `exponent` (n). With `alpha`,
-`e` is a coordinate over the axes that it depends on, and so is a mass that is computed from radius and density.
+The dimensions are `model`, then `friction` if the config has friction laws, followed by the swept axes in config
+order under their config names, such as `v1`, `bilinear.K` or `materials.steel.E`. A zip group is named after its
+first member; the other members are coordinates along it. Cases, and groups in which every column has repeated
+values, have the dimension `case`, with points numbered from 0 and all columns as coordinates; samples of uncertain
+inputs have the dimension `sample`. Scalars of the config are scalar coordinates. Coordinates along `model` are
+`title`, `year`, `equation`, `reference`, `doi` and `exponent` (n). With `alpha`, `e` is a coordinate over the axes
+that it depends on, and so is a mass that is computed from radius and density. Variables with the dimension
+`friction` are in results with friction laws only ([oblique.md](oblique.md)).
 
 | variable | unit | dimensions | judged by compare | meaning | equation |
 |---|---|---|---|---|---|

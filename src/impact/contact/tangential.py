@@ -66,8 +66,8 @@ class TangentialResult(Record):
 
     `slip` is G at the end for a positive G0; works are in units of mu^2 (m v0)^2/m_t; `sliding_impulse` is the
     integral of the limiting normal force, Lambda; `exact` is `slip` in closed form, NaN without one; `stiffness`
-    is kappa', NaN for a kind without a spring. For the kind "coulomb" there is only `sliding_impulse`, and the
-    slip follows from it.
+    is kappa'/n, k_t/k_n times m/m_t, NaN without a spring or where that depends on the indentation. For the kind
+    "coulomb" there is only `sliding_impulse`, and the slip follows from it.
     """
 
     slip: Array
@@ -159,6 +159,8 @@ def _simulate_distinct(
     if form.kind == "coulomb":
         # with infinite damping the balls stop at first contact
         result.sliding_impulse[status == LIMIT] = 1.0
+    # the stiffness of the contact at the same indentation is n x^(n - 1)
+    result.stiffness[:] = result.stiffness / n if form.stiffness_power == n - 1.0 else np.nan
     return result
 
 
