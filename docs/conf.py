@@ -79,7 +79,7 @@ def config_page() -> str:
         "# Config keys",
         "",
         '`impact schema` prints the JSON Schema. Numbers are in SI, or strings with a unit such as `"5 km/h"`.',
-        "`models` and `frictions` are lists of contact force models and of friction laws; parameters of a law are in",
+        "`models` and `frictions` list contact force models and friction laws; parameters of a law are in",
         "`[model.KEY]` and `[friction.KEY]` ([the models](../models.md), [the friction laws](../frictions.md)).",
         "Any number of these, of `[sweep]` and of `[materials.NAME]` may be a list or a range (an axis),",
         "a column of a CSV file, `{ fit = [least, most] }` ([calibrate](../calibrate.md)) or a distribution",
@@ -92,7 +92,9 @@ def config_page() -> str:
         for key, field in table.model_fields.items():
             quantity = quantities.get(key)
             meaning = quantity.description if quantity else field.description or ""
-            default = {**SWEEP_DEFAULTS, **FIXED_STEP_DEFAULTS, **OBLIQUE_DEFAULTS}.get(key) if name == "sweep" else None
+            default = (
+                {**SWEEP_DEFAULTS, **FIXED_STEP_DEFAULTS, **OBLIQUE_DEFAULTS}.get(key) if name == "sweep" else None
+            )
             values = (quantity.expected if quantity else "") + (
                 f"; default {default:g}" if default is not None else ""
             )
