@@ -13,7 +13,7 @@ from ..contact.units import with_numbers
 from ..errors import UsageError, did_you_mean
 from ..formatting import NO_BREAK, quantity, safe_text
 from ..results.schema import exponents_of, plain_unit
-from ..results.selection import model_positions, select
+from ..results.selection import law_positions, select
 from .kinds import Choice
 
 if TYPE_CHECKING:
@@ -143,7 +143,7 @@ def _select(dataset: xr.Dataset, choice: Choice) -> xr.Dataset:
     if "model" not in dataset.dims:
         raise UsageError(NO_SWEEP)
     if choice.models:
-        dataset = dataset.isel(model=model_positions(choice.models, dataset))
+        dataset = dataset.isel(model=law_positions(choice.models, dataset))
     return select(dataset, choice.sel or {})
 
 

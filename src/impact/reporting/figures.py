@@ -22,7 +22,7 @@ from ..plots.kinds import STUDIES, Choice, Kind, Look, kinds_of
 from ..plots.slices import numeric_axes, unit_of, varying_inputs
 from ..plots.style import encoded
 from ..results.schema import columns_along
-from ..results.selection import model_positions
+from ..results.selection import law_positions
 from ..results.slabs import distinct_points, is_computed, slabs
 
 if TYPE_CHECKING:
@@ -125,7 +125,7 @@ def _first_answered_index(
     dims = dataset["status"].dims if "status" in dataset else dataset.dims
     axes = [dim for dim in dims if dim not in ("model", *drawn)]
     first: tuple[int, ...] | None = None
-    for index in model_positions(keys, dataset) if "status" in dataset else ():
+    for index in law_positions(keys, dataset) if "status" in dataset else ():
         answered = _first_answered_of_model(dataset.isel(model=index), axes)
         first = min(filter(None, (first, answered)), default=None)
         if first is not None and not any(first):

@@ -28,18 +28,18 @@ Labels = NDArray[Any]
 IndexArray = NDArray[np.intp]
 
 
-def model_positions(models: Sequence[str], dataset: xr.Dataset) -> list[int]:
-    """Find the positions of models along `model`, in the order of the keys; repeated keys count once."""
-    keys = [str(key) for key in dataset["model"].values]
-    for key in models:
-        if key not in keys:
-            raise UsageError(f'no model "{key}" in this result; {did_you_mean(key, keys)}')
-    return [keys.index(key) for key in dict.fromkeys(models)]
+def law_positions(keys: Sequence[str], dataset: xr.Dataset, dim: str = "model") -> list[int]:
+    """Find the positions of models, or of friction laws, in the order of the keys; repeated keys count once."""
+    known = [str(key) for key in dataset[dim].values]
+    for key in keys:
+        if key not in known:
+            raise UsageError(f'no {dim} "{key}" in this result; {did_you_mean(key, known)}')
+    return [known.index(key) for key in dict.fromkeys(keys)]
 
 
 def select(dataset: xr.Dataset, sel: Mapping[str, float | str]) -> xr.Dataset:
     """Select at values of coordinates; an axis is dropped, unless several numbered points have the value."""
-    axes = [str(dim) for dim in dataset.sizes if dim != "model"]
+    axes = [str(dim) for dim in dataset.sizes if dim not in ("model", "friction")]
     masks: dict[Hashable, Mask] = {}
     for name, value in sel.items():
         if name not in dataset.coords or len(dataset[name].dims) != 1 or dataset[name].dims == ("model",):
