@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..array_types import Array
-from ..ode.problem import Params, Problem, Solution
+from ..ode.problem import Params, Problem, Solution, Step
 from ..ode.rk45 import integrate
 from . import motion
 from .dimensionless import with_coefficients, with_units
@@ -82,6 +82,14 @@ class TangentialResult(Record):
     status: NDArray[np.int8]
 
 
+@dataclass(frozen=True)
+class RecordedSlip:
+    """The joint motion of one impact in a phase, and its steps, with the modes of friction among their params."""
+
+    phase: SlipPhase
+    steps: tuple[Step, ...]
+
+
 class PairOfLaws(Protocol):
     """What a trajectory needs of a `impact.contact.friction.Pair`."""
 
@@ -122,6 +130,18 @@ def simulate_friction(
     return simulate_parts(TangentialResult, pair.key, n, values, status, simulate_part, collapse, errors)
 
 
+def record_friction(
+    pair: PairOfLaws, n: float, values: ValueArrays, *, rtol: float, max_steps: int
+) -> list[RecordedSlip]:
+    """Integrate the slip of one impact, a batch of length one, and record it; empty for Coulomb's friction or no slip."""
+    recorded: list[RecordedSlip] = []
+    if pair.form(n).kind == "coulomb":
+        return recorded
+    with np.errstate(all="ignore"):
+        _simulate_distinct(pair, n, values, 1, rtol=rtol, max_steps=max_steps, collapse=False, recorded=recorded)
+    return recorded
+
+
 def _simulate_distinct(
     pair: PairOfLaws,
     n: float,
@@ -131,8 +151,9 @@ def _simulate_distinct(
     rtol: float,
     max_steps: int,
     collapse: bool,
+    recorded: list[RecordedSlip] | None = None,
 ) -> TangentialResult:
-    """Integrate each distinct dimensionless problem once."""
+    """Integrate each distinct dimensionless problem once; `recorded` receives the steps of one impact."""
     model, form = pair.model, pair.form(n)
     law_values = with_coefficients(model, with_units(values, n), count)
     status = check_coefficients(model, law_values, values, count)
@@ -146,7 +167,7 @@ def _simulate_distinct(
     columns = (slip, stiffness, damping, is_positive)
     chosen = (status == STATUS_OK) & ~is_trivial
     parts = [
-        (problems.rows, _integrate(form, problems, rtol, max_steps).take(problems.row_of_impact))
+        (problems.rows, _integrate(form, problems, rtol, max_steps, recorded).take(problems.row_of_impact))
         for problems in distinct_problems(model, n, law_values, chosen, collapse, columns)
     ]
     result = TangentialResult.joined(count, status, parts)
@@ -156,7 +177,13 @@ def _simulate_distinct(
     return result
 
 
-def _integrate(form: TangentialForm, problems: DistinctProblems, rtol: float, max_steps: int) -> TangentialResult:
+def _integrate(
+    form: TangentialForm,
+    problems: DistinctProblems,
+    rtol: float,
+    max_steps: int,
+    recorded: list[RecordedSlip] | None,
+) -> TangentialResult:
     """Integrate distinct problems through both phases."""
     law = problems.law
     slip, stiffness, damping, is_positive = (np.array(column, float) for column in problems.columns)
@@ -180,12 +207,14 @@ def _integrate(form: TangentialForm, problems: DistinctProblems, rtol: float, ma
 
         def run(problem: Problem, start: Array, params: Params) -> Solution:
             y, params = phase.begin(start, params)
-            solution = integrate(problem, y, params, rtol=rtol, max_steps=max_steps)
+            solution = integrate(problem, y, params, rtol=rtol, max_steps=max_steps, record=recorded is not None)
             phase.finish(solution.state, params)
             return solution
 
         solution = in_parts(run, phase.problem(), breakpoints, rows, (*params, *columns))
         states.append(solution.state)
+        if recorded is not None:
+            recorded.append(RecordedSlip(phase, solution.recorded))
         return solution
 
     phases = solve_phases(law, problems.params, n, solve)
