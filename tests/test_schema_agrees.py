@@ -39,7 +39,7 @@ BEYOND = re.compile(
     r"sweep\.cases\.|a unit of|a bare number|got \"\s*[-+.0-9]+[^\"]*[^\"0-9.]|\\x|a material of|on an axis|twice|overflow|two ends|a step other"
     r"|got no value|got a value|an axis|a scalar|no axis|chunks of|no such input|one length|set together with|missing"
     r"|as in the first|not read|cannot be read|not a regular|some model matches|models to exclude|left out again|NUL|64 characters"
-    r"|samples such as|in ascending order|expected a median"
+    r"|samples such as|in ascending order|expected a median|which needs frictions"
 )
 NUMBERS = st.integers(-3, 12) | st.floats(-2.0, 11.0) | st.floats(allow_nan=False, allow_infinity=False)
 ATOMS = (

@@ -23,7 +23,7 @@ from .tables import (
     Output,
     Solver,
     Sweep,
-    model_quantities,
+    law_quantities,
 )
 
 MAX_PROBLEM_LINES = 100
@@ -216,7 +216,7 @@ def _unknown_key_hint(location: KeyPath, models: Mapping[str, ForceModel]) -> st
         case ("model",):
             keys = models
         case ("model", key):
-            keys = model_quantities(models[str(key)])
+            keys = law_quantities(models[str(key)])
         case (table, *_):
             keys = vars(Solver() if table == "solver" else Output())
     return did_you_mean(name, list(keys), KEY_SYNONYMS)

@@ -215,7 +215,6 @@ def default_variables(of_friction: bool) -> tuple[str, ...]:
 
 
 CENTRAL_OUTPUTS = tuple(name for name, variable in OUTPUTS.items() if not variable.of_friction)
-BY_DEFAULT = default_variables(of_friction=False)
 
 # a time history, over the time since first contact
 HISTORY = by_name(

@@ -52,7 +52,7 @@ IS_STATUS = {
 # what the variables of each type of trajectories begin with, which is also the name of their dimension
 PREFIXES: Mapping[type[Record], str] = {CollisionResult: "trajectory", TangentialResult: "tangential"}
 # by whether they are of pairs, the dimension of witnesses and the variable of their places
-WITNESSES = {False: ("witness", "witness_index"), True: ("pair_witness", "pair_witness_index")}
+WITNESSES = {False: ("witness", "witness_index"), True: ("pair_witness", "witness_pair_index")}
 
 # reads some values of a variable of the table, by its name; and the parts of some lengths that it consists of
 ReadVariable = Callable[[str, slice | NDArray[np.intp]], NDArray[Any]]

@@ -35,7 +35,7 @@ TABLE_VARIABLES = frozenset(
         "trajectory_of_cell",
         "law_stiffness",
         "witness_index",
-        "pair_witness_index",
+        "witness_pair_index",
         *(f"witness_{name}" for name in OUTPUTS),
     }
 )
