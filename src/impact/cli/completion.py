@@ -19,6 +19,13 @@ def complete_model(incomplete: str) -> list[str]:
     return _beginning_with(incomplete, _models())
 
 
+def complete_friction(incomplete: str) -> list[str]:
+    """The keys of friction laws."""
+    from ..contact.frictions import frictions
+
+    return _beginning_with(incomplete, frictions())
+
+
 def complete_family(incomplete: str) -> list[str]:
     """The families of models."""
     from ..contact.models import FAMILIES
@@ -53,8 +60,8 @@ def complete_input(context: typer.Context, incomplete: str) -> list[str]:
 
 
 def complete_unknown(context: typer.Context, incomplete: str) -> list[str]:
-    """What `impact solve` solves for: the parameters of the model, K and e."""
-    return _beginning_with(incomplete, [*_parameters(context), "K", "e"])
+    """What `impact solve` solves for: the parameters of the model and of the friction law, K, e and mu."""
+    return _beginning_with(incomplete, [*_parameters(context), "K", "e", "mu"])
 
 
 def complete_output(incomplete: str) -> list[str]:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from .completion import complete_input, complete_model, complete_selection, complete_setting
+from .completion import complete_friction, complete_input, complete_model, complete_selection, complete_setting
 from .parsing import (
     Setting,
     Tolerance,
@@ -34,6 +34,15 @@ AtOption = Annotated[
 ]
 ModelKeyOption = Annotated[
     str, typer.Option("--model", metavar="KEY", autocompletion=complete_model, help="The model.")
+]
+FrictionKeyOption = Annotated[
+    str | None,
+    typer.Option(
+        "--friction",
+        metavar="KEY",
+        autocompletion=complete_friction,
+        help="The friction law. \\[default: the first of the source, if it has any]",
+    ),
 ]
 OutputOption = Annotated[Path, typer.Option("-o", "--output", help="The result file.")]
 OverwriteOption = Annotated[bool, typer.Option("--overwrite", help="Replace the output if it exists.")]
@@ -69,6 +78,15 @@ ModelOption = Annotated[
     list[str] | None,
     typer.Option(
         "--model", metavar="KEY", autocompletion=complete_model, help="Only this model; may be repeated."
+    ),
+]
+FrictionOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--friction",
+        metavar="KEY",
+        autocompletion=complete_friction,
+        help="Only this friction law; may be repeated.",
     ),
 ]
 JobsOption = Annotated[

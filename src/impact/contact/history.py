@@ -22,9 +22,9 @@ from .impacts import Impacts
 from .model import ForceModel
 from .rigid import ObliqueImpacts
 from .simulate import integrate_phases
-from .slip_motion import LEAST_S, SLIP_ROW, TIME_ROW
+from .slip_motion import LEAST_S, SLIP_ROW, TIME_ROW, SlipPhase
 from .status import Status
-from .tangential import LIMIT_POSITIVE, RecordedSlip
+from .tangential import LIMIT_POSITIVE, record_friction, simulate_friction
 from .velocity_coordinates import is_strong
 
 # points at which a step is sampled, and Gauss points by which it is integrated
@@ -137,33 +137,44 @@ def integrate_history(
     )
 
 
-def slip_times(recorded: Sequence[RecordedSlip]) -> Array:
-    """Sample the times of a recorded slip in the contact's own unit, SAMPLES_PER_STEP per step."""
-    steps = tuple(step for part in recorded for step in part.steps)
-    samples = zip(steps, _fractions(steps), strict=True)
-    return np.maximum.accumulate([step.at(theta)[TIME_ROW, 0] for step, within in samples for theta in within])
+def integrate_slip(
+    pair: Pair, oblique: ObliqueImpacts, *, rtol: float, max_steps: int, times: int | None = None
+) -> tuple[History | None, SlipHistory | None]:
+    """Integrate one oblique impact (a batch of length one): its history, and slip and friction over it.
 
-
-def slip_history(
-    history: History,
-    pair: Pair,
-    oblique: ObliqueImpacts,
-    recorded: Sequence[RecordedSlip],
-    sliding_impulse: float,
-) -> SlipHistory:
-    """Find slip and friction of an impact over the times of its history.
-
-    Parameters
-    ----------
-    recorded : by `record_friction`; empty for Coulomb's friction, and without slip or friction
-    sliding_impulse : the impulse of the limiting normal force over m v0, where nothing is recorded
+    Without `times` there are SAMPLES_PER_STEP per step of the joint motion.
     """
-    impacts, g0 = oblique.impacts, oblique.slip.item()
+    impacts, model = oblique.impacts, pair.model
+    with np.errstate(all="ignore"):
+        values = {**dimensionless_values(model, impacts), **friction_values(pair, oblique)}
+    values = {name: np.broadcast_to(value, 1) for name, value in values.items()}
+    recorded = record_friction(pair, float(impacts.n[0]), values, rtol=rtol, max_steps=max_steps)
     steps = [(part.phase, step) for part in recorded for step in part.steps]
-    if not steps:
-        return _coulomb_history(
-            history, oblique, bool(friction_values(pair, oblique)[LIMIT_POSITIVE]), sliding_impulse
-        )
+    grid = times if times is not None or not steps else _slip_times([step for _, step in steps])
+    history = integrate_history(model, impacts, rtol=rtol, max_steps=max_steps, times=grid)
+    if history is None:
+        return None, None
+    if steps:
+        return history, _slip_history(history, pair, oblique, steps)
+    status = np.full(1, Status.OK, np.int8)
+    result = simulate_friction(pair, impacts.n, values, status, rtol=rtol, max_steps=max_steps)
+    # without slip or friction nothing is integrated
+    impulse = np.nan_to_num(result.sliding_impulse).item()
+    return history, _coulomb_history(history, oblique, bool(values[LIMIT_POSITIVE][0]), impulse)
+
+
+def _slip_times(steps: Sequence[Step]) -> Array:
+    """Sample the times of joint steps in the contact's own unit."""
+    samples = zip(steps, _fractions(tuple(steps)), strict=True)
+    times: Array = np.array([step.at(theta)[TIME_ROW, 0] for step, within in samples for theta in within])
+    return np.maximum.accumulate(times)
+
+
+def _slip_history(
+    history: History, pair: Pair, oblique: ObliqueImpacts, steps: Sequence[tuple[SlipPhase, Step]]
+) -> SlipHistory:
+    """Find slip and friction of an impact over the times of its history, from the steps of the joint motion."""
+    impacts, g0 = oblique.impacts, oblique.slip.item()
     unit_t = (impacts.length / impacts.v0).item()
     times = history.t / unit_t
     fractions = _fractions_at(tuple(step for _, step in steps), times, TIME_ROW)

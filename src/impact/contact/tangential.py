@@ -133,7 +133,7 @@ def simulate_friction(
 def record_friction(
     pair: PairOfLaws, n: float, values: ValueArrays, *, rtol: float, max_steps: int
 ) -> list[RecordedSlip]:
-    """Integrate the slip of one impact, a batch of length one, and record it; empty for Coulomb's friction or no slip."""
+    """Integrate the slip of one impact, a batch of length one, and record it; empty for Coulomb's friction."""
     recorded: list[RecordedSlip] = []
     if pair.form(n).kind == "coulomb":
         return recorded
