@@ -537,6 +537,10 @@ class Quantity:
         of_n = f" with n = {n:g}" if self.exponents and n is not None else ""
         expected_unit = "a bare number" if self.unit == "1" else f"a unit of {self.unit}{of_n}{self._example}"
         scale = _si_scale(unit)
+        if self.unit == "rad/s" and "Hz" in unit:
+            raise UnitError(
+                'a unit of rad/s, such as "1 rpm" or "1 rad/s": turns and radians per second are both Hz'
+            )
         if scale is None:
             raise UnitError(f'{expected_unit}; "{unit}" is not a known unit')
         factor, powers = scale
@@ -577,7 +581,7 @@ def number_type(quantity: Quantity) -> Any:
     if math.isfinite(quantity.least):
         bounds["gt" if quantity.above else "ge"] = quantity.least
     if math.isfinite(quantity.most):
-        bounds["le"] = quantity.most
+        bounds["lt" if quantity.below else "le"] = quantity.most
     bare: Any = Annotated[float, Field(**bounds)]
     if quantity.exponents <= {"n"}:
         number = rf"\s*[-+]?({_DIGITS}{'|inf' if quantity.infinite else ''})\s*"

@@ -342,7 +342,9 @@ def parameter_table(law: ForceModel | FrictionLaw) -> type[Table]:
         kind = Annotated[Any, _words(words, quantity.meaning)] if words else Annotated[Numbers | None, quantity]
         default = parameter.default if parameter else None
         fields[f"field_{index}"] = (Annotated[kind, Field(alias=name)], default)
-    return create_model(law.key, __base__=Table, **fields)
+    # a contact force and a friction law may have one key
+    name = law.key if isinstance(law, ForceModel) else f"friction_{law.key}"
+    return create_model(name, __base__=Table, **fields)
 
 
 def _words(words: tuple[str, ...], meaning: str) -> Any:

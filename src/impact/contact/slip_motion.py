@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from ..array_types import Array, Mask
 from ..ode.problem import Margins, Params, Problem
 from . import motion
-from .formula_calls import Formula
+from .formula_calls import Formula, call_by_name
 from .velocity_coordinates import signed_power
 
 FrictionKind = Literal["coulomb", "spring", "dashpot", "regularized"]
@@ -42,9 +42,15 @@ MODE_MARGIN, SIGN_MARGIN = 0, 1
 MARGIN_TOLERANCE = 1e-12
 # a force within this part of the limit is at the limit where the formulas change
 CAP_TOLERANCE = 1e-9
+# powers of x that differ by less are the same
+ORDER_TOLERANCE = 1e-6
+# steps of the central difference quotients for the rate of N and the rate of the slip that it determines
+RATE_OF_LIMIT_STEP, RATE_OF_SLIP_STEP = 1e-5, 1e-3
 # s at which leading powers of x are compared at first contact, and their rates; and the least s for what
 # is singular at s = 0
 START_S, RATE_S, LEAST_S = 1e-7, 1e-4, 1e-10
+# s below which a mode does not change any more
+END_S = 1e-7
 # step of the central difference quotient there, relative to s; it sees the rate of N beside a force that jumps
 RATE_STEP = 1e-2
 
@@ -77,7 +83,7 @@ class Columns(NamedTuple):
 
     `limit`, `spring` and `dashpot` are the factors of F, X^r z and x^q Gamma in the force, zero in other modes;
     `memory_limit` is the factor of F in phi_e for the memory work. `press` is N/F: 1, and in tension -1 or 0;
-    `sign` is the sign of F. `root` is the root of kappa', `counted` is 1 where slips count for the memory work.
+    `sign` is the sign of F. `root` is the root of kappa'.
     """
 
     mode: Array
@@ -92,7 +98,6 @@ class Columns(NamedTuple):
     damping: Array
     G0: Array
     is_positive: Array
-    counted: Array
 
     def changed(self, mode: Array, sign: Array) -> Columns:
         """Make the columns of other modes and signs of the normal force."""
@@ -104,7 +109,7 @@ class Columns(NamedTuple):
             press=press,
             sign=sign,
             limit=np.where(np.abs(mode) == 1.0, limit, 0.0),
-            memory_limit=limit * self.counted,
+            memory_limit=limit,
             spring=np.where(sticks, self.root, 0.0),
             dashpot=np.where(sticks, self.damping, 0.0),
         )
@@ -116,8 +121,9 @@ class Track:
 
     `force` and `energy` are phi_e and its energy at the end of the last part, `v` the velocity to which the
     impulse of N is complete: `impulse`, and `signed` in the direction of the slip. `slip_work` and `damping_work`
-    complete the quadratures by what happens where a mode begins and ends. `counted` is that of `Columns`; `modes`
-    has a bit for sticking, slipping forwards and backwards.
+    complete the quadratures by what happens where a mode begins and ends. `slip_memory` is the memory work of
+    slips, `order` the leading power of x in N at first contact, and `touches` tells that a slip began or ended at
+    x = 0. `modes` has a bit for sticking, slipping forwards and backwards.
     """
 
     mode: Array
@@ -129,7 +135,9 @@ class Track:
     signed: Array
     slip_work: Array
     damping_work: Array
-    counted: Array
+    slip_memory: Array
+    order: Array
+    touches: Mask
     modes: NDArray[np.int8]
     changes: NDArray[np.int32]
     is_slow: Mask
@@ -138,7 +146,11 @@ class Track:
     def of(cls, n: int) -> Track:
         """Begin n trajectories."""
         arrays: dict[str, Any] = {name: np.zeros(n) for name in cls.__annotations__}
-        flags = {"modes": np.zeros(n, np.int8), "changes": np.zeros(n, np.int32), "is_slow": np.zeros(n, bool)}
+        flags = {
+            "modes": np.zeros(n, np.int8),
+            "changes": np.zeros(n, np.int32),
+        }
+        flags |= {"touches": np.zeros(n, bool), "is_slow": np.zeros(n, bool)}
         return cls(**{**arrays, **flags, "sign": np.ones(n), "v": np.ones(n)})
 
     def add_impulse(self, index: NDArray[np.intp], columns: Columns, v: Array) -> None:
@@ -156,6 +168,10 @@ class Track:
         was_slip, is_slip = np.abs(old) == 1.0, np.abs(new) == 1.0
         self.slip_work[index] += np.where(
             is_slip, np.where(was_slip, 0.0, entered), np.where(was_slip, -left, before - after)
+        )
+        memory = y[MEMORY_ROW]
+        self.slip_memory[index] += np.where(was_slip & ~is_slip, memory, 0.0) - np.where(
+            is_slip & ~was_slip, memory, 0.0
         )
         was_held, is_held = np.abs(old) == 2.0, np.abs(new) == 2.0
         kinetic = 0.5 * y[SLIP_ROW] * y[SLIP_ROW]
@@ -199,6 +215,7 @@ class SlipPhase:
     first : number of the first of the `Columns` among the params
     memory : r in this phase
     track : of all trajectories
+    arguments : names of the params after the columns, besides y over Gamma: those of `TangentialForm.coefficient`
     """
 
     form: TangentialForm
@@ -207,6 +224,7 @@ class SlipPhase:
     first: int
     memory: float
     track: Track
+    arguments: tuple[str, ...] = ()
 
     @property
     def stiffness_power(self) -> float:
@@ -217,6 +235,11 @@ class SlipPhase:
     def drag_power(self) -> float:
         """The exponent of s in x^q."""
         return self.law.model.coordinate_power * self.form.damping_power
+
+    @property
+    def has_modes(self) -> bool:
+        """Whether the contact sticks and slips."""
+        return self.form.kind in ("spring", "dashpot")
 
     @property
     def is_total(self) -> bool:
@@ -251,7 +274,7 @@ class SlipPhase:
         spring_force = columns.spring * self._power(s, self.memory * self.stiffness_power) * z
         drag = self._power(s, self.drag_power) * slip
         stick_drag = columns.dashpot * drag
-        slip_force = columns.limit * force
+        slip_force = columns.limit * force * self._coefficient(slip, params)
         out[SLIP_ROW] = -weight * (slip_force + spring_force + stick_drag)
         exponent = p - 1.0 + (1.0 - self.memory) * self.stiffness_power
         out[SPRING_ROW] = columns.spring * p * self._power(s, exponent) * slip
@@ -264,7 +287,7 @@ class SlipPhase:
         slip_drag = working_drag - stick_drag
         out[SLIP_WORK_ROW] = power * (slip_force - slip_drag)
         out[DAMPING_ROW] = power * working_drag
-        held_force = spring_force + columns.memory_limit * force - columns.counted * slip_drag
+        held_force = spring_force + columns.memory_limit * force - slip_drag
         out[MEMORY_ROW] = (
             (1.0 - 2.0 * self.memory) * self.stiffness_power * v * self._energy(s, held_force, columns)
         )
@@ -273,6 +296,15 @@ class SlipPhase:
         if len(out) > FORCE_ROW:
             out[FORCE_ROW] = force
         return out
+
+    def _coefficient(self, slip: Array, params: Params) -> Array | float:
+        """Compute the coefficient of friction over mu, with the sign of the slip where it depends on that."""
+        if self.form.coefficient is None:
+            return 1.0
+        first = self.first + len(Columns._fields)
+        arguments = dict(zip(("y", *self.arguments), params[first:], strict=False))
+        arguments["y"] = arguments["y"] * np.abs(slip)
+        return np.sign(slip) * call_by_name(self.form.coefficient, arguments)
 
     def _power(self, s: Array, exponent: float) -> Array | float:
         power: Array | float = signed_power(s, exponent) if exponent else 1.0
@@ -286,8 +318,7 @@ class SlipPhase:
     def local(self, y: Array, k: Array, params: Params) -> Local:
         """Compute the state of friction at components y with rates k."""
         columns, s, force = self.columns(params), y[0], k[FORCE_ROW]
-        small = motion.RELEASE_STEP * np.clip(np.abs(s), motion.MIN_RELEASE_S, 1.0)
-        d_force = (self.normal.rates(y[:2] + small * k[:2], params)[4] - force) / small
+        d_force = self._rate_of_force(y, k, params)
         share = columns.press / columns.G0
         N = share * force
         drag = columns.damping * self._power(s, self.drag_power) * y[SLIP_ROW]
@@ -299,6 +330,17 @@ class SlipPhase:
         )
         trial = drag if self.form.kind == "dashpot" else spring_force + capped_drag
         return Local(N, share * d_force, d_force, k[TIME_ROW], spring_force, drag, trial)
+
+    def _rate_of_force(self, y: Array, k: Array, params: Params) -> Array:
+        """Compute the rate of the normal force by a difference quotient."""
+        reach = np.clip(np.abs(y[0]), motion.MIN_RELEASE_S, 1.0)
+        if self.form.cap == "total":
+            small = motion.RELEASE_STEP * reach
+            return np.asarray((self.normal.rates(y[:2] + small * k[:2], params)[4] - k[FORCE_ROW]) / small)
+        # the friction force jumps where a slip ends, which makes the time of it matter
+        small = RATE_OF_LIMIT_STEP * reach
+        ahead, behind = (self.normal.rates(y[:2] + step * k[:2], params)[4] for step in (small, -small))
+        return np.asarray((ahead - behind) / (2.0 * small))
 
     def trial_rate(
         self, y: Array, k: Array, columns: Columns, local: Local, spring_force: Array, phi: Array
@@ -321,7 +363,7 @@ class SlipPhase:
         columns, local = self.columns(params), self.local(y, k, params)
         tolerance = MARGIN_TOLERANCE / columns.G0
         sign_margin, sign_rate = columns.sign * k[FORCE_ROW] + MARGIN_TOLERANCE, columns.sign * local.dF
-        if self.form.kind in ("coulomb", "regularized"):
+        if not self.has_modes:
             return sign_margin[None], sign_rate[None]
         sticks = columns.mode == 0.0
         direction = np.where(sticks, np.sign(local.trial), np.sign(columns.mode))
@@ -334,14 +376,19 @@ class SlipPhase:
         else:
             margin = np.where(sticks, room + tolerance, growth)
             margin_rate = np.where(sticks, -growth, np.nan)
-        free = columns.press == 0.0
+        held = np.flatnonzero(np.abs(columns.mode) == 2.0)
+        if held.size:
+            margin[held], margin_rate[held] = self._held_margin(y[:, held], _taken(params, held))[0], np.nan
+        # without a limit the mode does not matter, and where the contact ends all margins vanish
+        free = (columns.press == 0.0) | (y[0] < END_S)
         margin, margin_rate = np.where(free, 1.0, margin), np.where(free, 0.0, margin_rate)
         return np.array([margin, sign_margin]), np.array([margin_rate, sign_rate])
 
     def change(self, which: NDArray[np.intp], y: Array, k: Array, params: Params) -> tuple[Array, Params]:
         """Change the modes and signs of trajectories where margins vanish, see `Switch`."""
-        columns, local = self.columns(params), self.local(y, k, params)
-        if self.form.kind in ("coulomb", "regularized"):
+        y, columns = self._released(y, params), self.columns(params)
+        local = self.local(y, k, params)
+        if not self.has_modes:
             which = np.full_like(which, SIGN_MARGIN)
         index = columns.row.astype(np.intp)
         self.track.add_impulse(index, columns, k[0])
@@ -356,21 +403,24 @@ class SlipPhase:
         phi = np.where(turned, 0.0, np.where(old == 0.0, local.trial, np.sign(old) * local.N))
         rate = self.trial_rate(y, k, other, local, spring_force, phi)
         direction = np.sign(np.where(turned, rate, local.trial))
-        new = self._mode_at_limit(direction * rate - dN, direction, y, k, other)
+        new = self._mode_at_limit(direction * rate - dN, direction, y, other)
         new = np.where(~turned & (np.abs(old) == 1.0), 0.0, new)
+        new = self._held_mode(~turned & (old != 0.0), np.abs(old) == 2.0, np.sign(old), new, y, params)
         capped_drag = local.drag if self.is_total else 0.0
         spring_force = np.where(~turned & (old == 0.0), direction * local.N - capped_drag, spring_force)
         return self._enter(index, old, new, sign, local.spring_force, spring_force, y, params)
 
-    def _mode_at_limit(self, growth: Array, direction: Array, y: Array, k: Array, columns: Columns) -> Array:
+    def _mode_at_limit(self, growth: Array, direction: Array, y: Array, columns: Columns) -> Array:
         """Find the modes at the limit, where the trial force grows by this more than the limit."""
-        if self.form.kind in ("coulomb", "regularized"):
+        if not self.has_modes:
             return columns.mode
+        # without a limit the mode does not matter
         free = columns.press == 0.0
         forwards = np.where(y[SLIP_ROW] < 0.0, -1.0, 1.0)
+        kept = np.where(columns.mode == 0.0, forwards, np.sign(columns.mode))
         if self.form.kind == "dashpot":
-            return np.where(free | (columns.mode == 0.0), forwards, 0.0)
-        return np.where(free, forwards, np.where(growth > 0.0, direction, 0.0))
+            return np.where(free, kept, np.where(columns.mode == 0.0, forwards, 0.0))
+        return np.where(free, kept, np.where(growth > 0.0, direction, 0.0))
 
     def _enter(
         self,
@@ -395,6 +445,57 @@ class SlipPhase:
         end = self.first + len(changed)
         return y, (*params[: self.first], *changed, *params[end:])
 
+    # ---- the modes -2 and 2, in which a spring at its limit determines the slip
+
+    def _held_slip(self, y: Array, params: Params, direction: Array) -> tuple[Array, Array]:
+        """Compute Gamma for which the trial force of the spring grows as its limit does, and N."""
+        k, columns = self.rates(y, params), self.columns(params)
+        share = columns.press / columns.G0
+        N, dN = share * k[FORCE_ROW], share * self._rate_of_force(y, k, params)
+        stiffness = columns.root * columns.root * k[TIME_ROW] * self._power(y[0], self.stiffness_power)
+        fading = self.memory * self.stiffness_power * k[0] / _away_from_zero(y[0]) * N
+        return direction * (dN - fading) / stiffness, N
+
+    def _held_margin(self, y: Array, params: Params, direction: Array | None = None) -> tuple[Array, Mask]:
+        """Compute a margin, positive while the force is between slip and stick, and where it is nearer to slip."""
+        columns, y = self.columns(params), y[:TIME_ROW]
+        direction = np.sign(columns.mode) if direction is None else direction
+        slip, N = self._held_slip(y, params, direction)
+        small = RATE_OF_SLIP_STEP * np.clip(np.abs(y[0]), motion.MIN_RELEASE_S, 1.0)
+        k = self.rates(y, params)
+        step = small * k[:TIME_ROW]
+        ahead, behind = (self._held_slip(y + sign * step, params, direction)[0] for sign in (1.0, -1.0))
+        force = (behind - ahead) / (2.0 * small * k[TIME_ROW])
+        drag = columns.damping * self._power(y[0], self.drag_power) * slip
+        above_slip = (force - direction * N) * np.sign(drag)
+        return np.minimum(above_slip, np.abs(drag) - above_slip), above_slip < 0.5 * np.abs(drag)
+
+    def _held_mode(
+        self, at_limit: Mask, leaves: Mask, direction: Array, new: Array, y: Array, params: Params
+    ) -> Array:
+        """Replace new modes at the limit, where growth is zero, by a held mode, or by that to which it leaves."""
+        if self.form.cap == "total" or self.form.kind != "spring":
+            return new
+        rows = np.flatnonzero(
+            at_limit & (self.columns(params).damping > 0.0) & (self.columns(params).press != 0.0)
+        )
+        if rows.size:
+            ahead = direction[rows]
+            margin, is_near_slip = self._held_margin(y[:, rows], _taken(params, rows), ahead)
+            left = np.where(is_near_slip, ahead, 0.0)
+            new = new.copy()
+            new[rows] = np.where(leaves[rows], left, np.where(margin > 0.0, 2.0 * ahead, new[rows]))
+        return new
+
+    def _released(self, y: Array, params: Params) -> Array:
+        """Set Gamma where a held mode determines it."""
+        held = np.flatnonzero(np.abs(self.columns(params).mode) == 2.0)
+        if held.size:
+            part, y = _taken(params, held), y.copy()
+            direction = np.sign(self.columns(part).mode)
+            y[SLIP_ROW, held] = self._held_slip(y[:TIME_ROW, held], part, direction)[0]
+        return y
+
     # ---- the start and the end of a part
 
     def begin(self, start: Array, params: Params) -> tuple[Array, Params]:
@@ -407,7 +508,7 @@ class SlipPhase:
 
     def _at_change(self, y: Array, params: Params, index: NDArray[np.intp]) -> tuple[Array, Params]:
         """Find the modes where the formulas of the normal motion, or r, have changed."""
-        columns = self.columns(params)._replace(counted=self.track.counted[index])
+        columns = self.columns(params)
         old, force_before = self.track.mode[index], self.track.force[index]
         k = self.rates(y[:TIME_ROW], params)
         force = k[FORCE_ROW]
@@ -416,7 +517,7 @@ class SlipPhase:
         columns = columns.changed(old, sign)
         params = self._replaced(params, columns)
         local = self.local(y, k, params)
-        if self.form.kind in ("coulomb", "regularized"):
+        if not self.has_modes:
             return self._enter(index, old, old, sign, force_before, force_before, y, params)
         capped_drag = local.drag if self.is_total else 0.0
         trial = local.drag if self.form.kind == "dashpot" else force_before + capped_drag
@@ -427,9 +528,10 @@ class SlipPhase:
         if self.form.kind == "dashpot":
             new = np.where(at_limit, direction, 0.0)
         else:
-            new = np.where(
-                at_limit, self._mode_at_limit(direction * rate - local.dN, direction, y, k, columns), 0.0
-            )
+            new = self._mode_at_limit(direction * rate - local.dN, direction, y, columns)
+            new = np.where(at_limit, new, 0.0)
+            was_held = np.abs(old) == 2.0
+            new = self._held_mode(at_limit & was_held, ~was_held, direction, new, y, params)
         return self._enter(index, old, new, sign, force_before, spring_force, y, params)
 
     def _replaced(self, params: Params, columns: Columns) -> Params:
@@ -444,15 +546,14 @@ class SlipPhase:
         )
         k = self.rates(near[:TIME_ROW], params)
         force, twice_force = k[FORCE_ROW], self.rates(twice[:TIME_ROW], params)[FORCE_ROW]
-        order = np.log2(twice_force / force) / self.law.model.coordinate_power
-        self.track.counted[index] = 2.0 * order > form.stiffness_power + CAP_TOLERANCE
+        self.track.order[index] = np.log2(twice_force / force) / self.law.model.coordinate_power
         sign = np.where(force < 0.0, -1.0, 1.0)
         self.track.sign[index] = sign
-        columns = columns._replace(counted=self.track.counted[index]).changed(np.zeros(n), sign)
+        columns = columns.changed(np.zeros(n), sign)
         params = self._replaced(params, columns)
-        if form.kind in ("coulomb", "regularized"):
-            self.track.see(index, np.zeros(n))
-            return y, params
+        if not self.has_modes:
+            mode = np.full(n, 1.0 if form.kind == "regularized" else 0.0)
+            return self._enter(index, mode, mode, sign, np.zeros(n), np.zeros(n), y, params)
         local = self.local(near, k, params)
         kp = form.stiffness_power
         spring_force = (
@@ -475,6 +576,7 @@ class SlipPhase:
             if self.is_total and self.memory == 1.0 and form.damping_power < kp:
                 self.track.is_slow[index] = is_slow = local.drag > local.N
                 new = np.where(is_slow, -1.0, new)
+        self.track.touches[index] = new != 0.0
         near, params = self._enter(index, new, new, sign, np.zeros(n), spring_force, near, params)
         y[SPRING_ROW] = near[SPRING_ROW]
         return y, params
@@ -497,18 +599,27 @@ class SlipPhase:
         return self.trial_rate(near, k, columns, local, spring_force, local.N) - dN
 
     def finish(self, y: Array, params: Params) -> None:
-        """Note the state of friction at the end of a part, from its rows."""
+        """Note the state of friction at the end of a part, from its rows; complete the rows."""
         columns = self.columns(params)
         index = columns.row.astype(np.intp)
         columns = columns.changed(self.track.mode[index], self.track.sign[index])
         params = self._replaced(params, columns)
+        y[SLIP_ROW] = self._released(y, params)[SLIP_ROW]
         near = y.copy()
         near[0] = np.where(np.abs(y[0]) < LEAST_S, LEAST_S, y[0])
         k = self.rates(near[:TIME_ROW], params)
         force = self.local(near, k, params).spring_force
         self.track.force[index] = force
-        self.track.energy[index] = self._energy(near[0], force, columns)
+        # an energy that grows without bound towards x = 0 counts as slip work
+        is_finite = 2.0 * self.track.order[index] > self.form.stiffness_power - ORDER_TOLERANCE
+        is_finite |= np.abs(columns.mode) != 1.0
+        self.track.energy[index] = np.where(is_finite, self._energy(near[0], force, columns), 0.0)
         self.track.add_impulse(index, columns, k[0])
+
+
+def _taken(params: Params, rows: NDArray[np.intp]) -> Params:
+    """Take the params of some trajectories."""
+    return tuple(column[rows] for column in params)
 
 
 def _away_from_zero(s: Array) -> Array:

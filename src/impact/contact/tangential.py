@@ -19,6 +19,7 @@ from ..ode.problem import Params, Problem, Solution, Step
 from ..ode.rk45 import integrate
 from . import motion
 from .dimensionless import with_coefficients, with_units
+from .formula_calls import argument_names
 from .model import ForceModel
 from .piecewise import in_parts
 from .records import Record
@@ -34,6 +35,7 @@ from .simulate import (
 from .slip_motion import (
     DAMPING_ROW,
     MEMORY_ROW,
+    ORDER_TOLERANCE,
     SLIP_ROW,
     SLIP_WORK_ROW,
     TIME_ROW,
@@ -164,7 +166,11 @@ def _simulate_distinct(
     is_trivial = (slip == 0.0) | ~np.isfinite(slip)
     for array in (stiffness, damping):
         status[(status == STATUS_OK) & ~is_trivial & ~np.isfinite(array)] = Status.OUT_OF_RANGE
-    columns = (slip, stiffness, damping, is_positive)
+    names = _coefficient_arguments(form)
+    coefficient = (
+        (values[SLIP_SCALE] * slip, *(values[PREFIX + name] for name in names)) if form.coefficient else ()
+    )
+    columns = (slip, stiffness, damping, is_positive, *coefficient)
     chosen = (status == STATUS_OK) & ~is_trivial
     parts = [
         (problems.rows, _integrate(form, problems, rtol, max_steps, recorded).take(problems.row_of_impact))
@@ -177,6 +183,11 @@ def _simulate_distinct(
     return result
 
 
+def _coefficient_arguments(form: TangentialForm) -> tuple[str, ...]:
+    """Name the arguments of the coefficient of friction besides y."""
+    return tuple(name for name in argument_names(form.coefficient) if name != "y")
+
+
 def _integrate(
     form: TangentialForm,
     problems: DistinctProblems,
@@ -186,24 +197,24 @@ def _integrate(
 ) -> TangentialResult:
     """Integrate distinct problems through both phases."""
     law = problems.law
-    slip, stiffness, damping, is_positive = (np.array(column, float) for column in problems.columns)
-    n = slip.size
+    slip, stiffness, damping, is_positive, *coefficient = (np.array(column, float) for column in problems.columns)
+    n, names = slip.size, _coefficient_arguments(form)
     track = Track.of(n)
     unset = np.zeros(n)
-    base = Columns(*(unset,) * 7, np.arange(n, dtype=float), np.sqrt(stiffness), damping, slip, is_positive, unset)
+    base = Columns(*(unset,) * 7, np.arange(n, dtype=float), np.sqrt(stiffness), damping, slip, is_positive)
     states: list[Array] = []
 
     def solve(
         law: motion.MotionLaw, problem: Problem, start: Array, params: Params, recovery: Recovery | None
     ) -> Solution:
         if recovery is None:
-            columns, rows = base, np.vstack([start, np.ones(n), np.zeros(n)])
+            columns, rows = (*base, *coefficient), np.vstack([start, np.ones(n), np.zeros(n)])
         else:
-            columns = Columns(*(column[recovery.rows] for column in base))
+            columns = tuple(column[recovery.rows] for column in (*base, *coefficient))
             rows = np.vstack([start, states[0][2:, recovery.rows]])
         residual = None if recovery is None else recovery.residual
         params, breakpoints = motion.breakpoints(law, params, rows, residual)
-        phase = SlipPhase(form, law, problem, len(params), form.memory[recovery is not None], track)
+        phase = SlipPhase(form, law, problem, len(params), form.memory[recovery is not None], track, names)
 
         def run(problem: Problem, start: Array, params: Params) -> Solution:
             y, params = phase.begin(start, params)
@@ -222,6 +233,8 @@ def _integrate(
     if phases.restitution is not None:
         state[:, phases.rows] = states[1]
         steps[phases.rows] += phases.restitution.steps
+    if law.model.release == "gap":
+        track.touches[:] |= np.abs(track.mode) == 1.0
     result = _result(form, base, track, state)
     status = phases.status.copy()
     # at a limit the balls stop, sooner or later
@@ -240,6 +253,12 @@ def _result(form: TangentialForm, base: Columns, track: Track, state: Array) -> 
     mode, kinetic = np.abs(track.mode), 0.5 * state[SLIP_ROW] ** 2
     left = track.energy + state[MEMORY_ROW]
     slip_work = state[SLIP_WORK_ROW] + track.slip_work - np.where(mode == 1.0, left, 0.0)
+    memory_work = state[MEMORY_ROW]
+    # where N vanishes so slowly with x that both works of a slip at x = 0 are infinite, their sum is the slip work
+    slip_memory = track.slip_memory + np.where(mode == 1.0, memory_work, 0.0)
+    moved = np.where(
+        track.touches & (2.0 * track.order < form.stiffness_power + ORDER_TOLERANCE), slip_memory, 0.0
+    )
     damping_work = state[DAMPING_ROW] + track.damping_work - np.where(mode == 2.0, kinetic + left, 0.0)
     ended = np.isfinite(state[SLIP_ROW])
     nan = np.full(ended.size, np.nan)
@@ -256,9 +275,9 @@ def _result(form: TangentialForm, base: Columns, track: Track, state: Array) -> 
     return replace(
         result,
         slip=G0 * state[SLIP_ROW],
-        slip_work=scale * slip_work,
+        slip_work=scale * (slip_work + moved),
         damping_work=scale * damping_work,
-        memory_work=scale * state[MEMORY_ROW],
+        memory_work=scale * (memory_work - moved),
         elastic_left=scale * np.where(ended, track.energy, np.nan),
         regime=np.where(ended, regime, 0).astype(np.int8),
         slip_changes=np.where(ended, track.changes, 0).astype(np.int32),
