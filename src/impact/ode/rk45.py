@@ -139,9 +139,8 @@ def _advance(problem: Problem, state: State, rtol: float, record: bool) -> Step 
     state.steps += accepted
     if step is not None and ended.size:
         step = replace(step, end=1.0 + offset)
-    step = step if accepted[0] else None
     _move_to_ends(state, trial)
-    return step
+    return step if step is not None and accepted[0] else None
 
 
 def rk_step(
