@@ -21,9 +21,7 @@ def complete_model(incomplete: str) -> list[str]:
 
 def complete_friction(incomplete: str) -> list[str]:
     """The keys of friction laws."""
-    from ..contact.frictions import frictions
-
-    return _beginning_with(incomplete, frictions())
+    return _beginning_with(incomplete, impact.frictions())
 
 
 def complete_family(incomplete: str) -> list[str]:
@@ -136,7 +134,7 @@ def _axes(context: typer.Context) -> list[str]:
     # an option without its value yet leaves the arguments unparsed
     for path in filter(None, (context.params.get("result"), *context.args)):
         try:
-            return [str(name) for name in impact.load(path).dims if name != "model"]
+            return [str(name) for name in impact.load(path).dims if name not in ("model", "friction")]
         except (OSError, ImpactError):
             continue
     return []

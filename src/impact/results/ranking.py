@@ -6,7 +6,7 @@ import math
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
@@ -297,7 +297,8 @@ def rankable_parts(
     """Select the part of each law to rank; refuse a result that lacks a target or has too many points."""
     _check_rankable(dataset, criterion)
     selected, places = select(dataset[list(criterion.names)], sel), [{"model": 0}]
-    for dim, keys in (("model", models), ("friction", frictions)):
+    wanted: dict[Literal["model", "friction"], Sequence[str] | None] = {"model": models, "friction": frictions}
+    for dim, keys in wanted.items():
         if dim in selected.dims:
             chosen = law_positions(keys, dataset, dim) if keys else range(dataset.sizes[dim])
             places = [place | {dim: position} for place in places for position in chosen]
