@@ -70,8 +70,8 @@ def config(**sweep: Any) -> Config:
          ["x.toml:3: sweep.R1: missing, expected a number > 0 m, or inf: radius of ball 1, which its spin needs; "
           "or a material with rho"]),
         (HEAD + 'v1 = 2\nu1 = 2\nmu = 0.3\nomega1 = "10 Hz"',
-         ['x.toml:12: sweep.omega1: got "10 Hz", expected a unit of rad/s, such as "1 rpm" or "1 rad/s": turns '
-          "and radians per second are both Hz"]),
+         ['x.toml:12: sweep.omega1: got "10 Hz", expected a unit of rad/s, such as "1 rad/s"; 1/s may be turns or '
+          "radians per second"]),
         (HEAD + 'v1 = 2\nu1 = 2\nmu = 0.3\n[friction.coulomb-1785]\nlimit = "pos"',
          ['x.toml:13: friction.coulomb-1785.limit: got "pos", expected "abs" or "positive"']),
         (HEAD + "v1 = 2\nu1 = 2\nmu = 0.3\n[friction.coulomb-1785]\nxt = 1",
