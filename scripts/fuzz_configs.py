@@ -58,8 +58,8 @@ EXTRA = (
     'models = "tsuji-1992"\nfrictions = ["*-mindlin", "drake-*"]\n[design]\nn = 8\n[sweep]\ncases = "spins.csv"\n'
     'e = 0.9\nv1 = 2\nR1 = "2 cm"\nR2 = inf\nm2 = inf\nmaterial = "steel"\ninertia_factor1 = "40 %"\n'
     "mu = { uniform = [0.1, 0.3] }\n[friction.drake-regularized]\nv_s = [1e-4, 1e-3]\n",
-    'models = "hertz"\nfrictions = "cundall-strack-1979"\n[sweep]\nm1 = 1\nR1 = 1\nm2 = inf\nK = 1e6\nn = 1\nv1 = 1\n'
-    "mu = { fit = [0.01, 1] }\n[friction.cundall-strack-1979]\nkt_over_kn = { fit = [0.1, 2] }\n"
+    'models = "hertz"\nfrictions = "cundall-strack-1979"\n[sweep]\nm1 = 1\nR1 = 1\nm2 = inf\nK = 1e6\nn = 1\n'
+    "v1 = 1\nmu = { fit = [0.01, 1] }\n[friction.cundall-strack-1979]\nkt_over_kn = { fit = [0.1, 2] }\n"
     "[data.columns]\nbeta = [-0.2, 0.1, 0.3]\nu1 = [2, 1, 0.5]\nomega1 = [0, 0.1, 0]\n",
     'models = "hertz"\n[sweep]\ncases = { e = [0.1, 0.9], v1 = ["1 m/s", 2], m1 = [1, 2] }\nm2 = inf\nK = 1e6\n',
     'models = "hertz"\n[sweep]\ne = 0.5\nv1 = { file = "cases.csv", column = "v1" }\nm1 = 1\nm2 = 1\nK = 1e6\n',
