@@ -147,6 +147,8 @@ def _column_of(header: str, outputs: Sequence[str], models: Mapping[str, ForceMo
         raise value_error(f"no such input or output; {did_you_mean(header, choices)}") from None
     if quantity is None:
         raise value_error("got names of materials, expected numbers; all points have the materials of [sweep]")
+    if quantity.words:
+        raise value_error(f"got words, expected numbers; all points have one {name.key}")
     return _Column("input", str(name), replace(quantity, infinite=False))
 
 
