@@ -30,7 +30,7 @@ from impact.contact.impacts import Impacts
 from impact.contact.model import ForceModel
 from impact.contact.numba.dispatch import is_installed
 from impact.contact.output_formulas import collide
-from impact.contact.variables import OUTPUTS
+from impact.contact.variables import CENTRAL_OUTPUTS
 from impact.engine.executors import choose_executor
 from impact.engine.trajectories import RANGE_TRAJECTORIES, even_size
 
@@ -104,7 +104,7 @@ def run_core(e: np.ndarray, rtol: float, core: str, threads: int = 1) -> tuple[f
 
     def run_block(block: tuple[ForceModel, Impacts]) -> tuple[float, int]:
         contact = collide(*block, rtol=rtol, max_steps=10_000, collapse=False, core=core)
-        values = {name: contact[name] for name in OUTPUTS}
+        values = {name: contact[name] for name in CENTRAL_OUTPUTS}
         return float(np.max(np.abs(values["closed_form_error"]))), int(values["steps"].sum())
 
     with choose_executor(1, threads).start() as pool:

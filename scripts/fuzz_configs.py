@@ -52,6 +52,9 @@ Mutation = Callable[[random.Random, str, "Corpus"], str]
 # what the shipped configs do not use; their CSV files are among the `TABLES`
 EXTRA = (
     'models = ["hertz", "tsuji-1992"]\n[sweep]\ncases = "cases.csv"\nK = 1e6\n',
+    'models = ["hertz", "bilinear"]\nfrictions = ["coulomb-1785", "cundall-strack-1979"]\n[sweep]\ne = [0.5, 1]\n'
+    'speed = 2\nangle = { linspace = ["0 deg", "80 deg", 3] }\nmu = [0, 0.3]\nomega1 = "90 rpm"\nR1 = "2 cm"\n'
+    'm1 = 1\nm2 = inf\nK = 1e6\n[friction.cundall-strack-1979]\nk_t = [1e5, "1 MN/m"]\nlimit = "positive"\n',
     'models = "hertz"\n[sweep]\ncases = { e = [0.1, 0.9], v1 = ["1 m/s", 2], m1 = [1, 2] }\nm2 = inf\nK = 1e6\n',
     'models = "hertz"\n[sweep]\ne = 0.5\nv1 = { file = "cases.csv", column = "v1" }\nm1 = 1\nm2 = 1\nK = 1e6\n',
     'models = "hertz"\n[design]\nmethod = "random"\nn = 8\n[sweep]\nv1 = { empirical = "speeds.csv" }\n'

@@ -13,7 +13,7 @@ from hypothesis import given, settings, strategies as st
 
 import impact
 from impact.config.grid import Axis
-from impact.contact.variables import OUTPUTS
+from impact.contact.variables import CENTRAL_OUTPUTS
 from impact.engine.plan import MAX_FULL_REPEATED, Plan
 from impact.errors import UsageError
 from impact.results.provenance import config_of_part
@@ -25,7 +25,7 @@ from impact.results.sweep import prepare, sweep_in_memory, sweep_into
 from .conftest import assert_same_array
 
 LAYOUTS = ("full", "factored")
-EVERYTHING = [*OUTPUTS]
+EVERYTHING = [*CENTRAL_OUTPUTS]
 MATERIALS = {
     "steel": {"E": 210e9, "nu": 0.3, "rho": 7850.0, "yield_strength": 0.8e9},
     "brass": {"E": 100e9, "nu": 0.34, "rho": 8500.0, "yield_strength": 0.3e9},

@@ -291,7 +291,8 @@ BAD = [
     ('"steel"', '"\\u001b[31m\\u202e"',
      ['x.toml:8: sweep.material: got "\\x1b[31m\\u202e", expected a material of [materials]; known: ' + KNOWN]),
     ("e = 0.5", 'e = 0.5\n"\\u001b]0;" = 1',
-     ['x.toml:5: sweep."\\x1b]0;": unknown key; ' "known: K, R1, R2, alpha, cases, dt, e, m1, m2, material, material1, material2, n, phase, steps_per_contact, v1, v2, zip"]),
+     ['x.toml:5: sweep."\\x1b]0;": unknown key; ' "known: K, R1, R2, alpha, angle, cases, dt, e, inertia_factor1, inertia_factor2, m1, m2, material, material1, "
+      "material2, mu, n, omega1, omega2, phase, speed, steps_per_contact, u1, u2, v1, v2, zip"]),
 ]  # fmt: skip
 
 

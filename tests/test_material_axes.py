@@ -14,7 +14,7 @@ import xarray as xr
 import impact
 from impact.config.grid import Axis
 from impact.contact.materials import Material
-from impact.contact.variables import OUTPUTS
+from impact.contact.variables import CENTRAL_OUTPUTS
 from impact.engine.plan import Plan
 from impact.engine.run import Run
 from impact.errors import ModelError, UsageError
@@ -31,7 +31,7 @@ PROPERTIES: dict[str, list[float]] = {
     "yield_strength": [0.1e9, 0.4e9, 1e9],
 }
 LAYOUTS = ("full", "factored")
-EVERYTHING = [*OUTPUTS]
+EVERYTHING = [*CENTRAL_OUTPUTS]
 # a stiffness by Hertz, one with a yield strength, one with its own rule for K, and another one by Hertz
 LAWS = ["gharib-hurmuzlu-2012", "thornton-1997", "liggghts-hooke", "bilinear"]
 

@@ -15,7 +15,7 @@ from impact.contact.model import ForceModel, Parameter
 from impact.contact.models import find
 from impact.contact.output_formulas import Outputs, collide
 from impact.contact.status import FIRST_FAILURE, Status
-from impact.contact.variables import OUTPUTS
+from impact.contact.variables import CENTRAL_OUTPUTS
 from impact.errors import ConfigError
 
 from .conftest import new_law
@@ -24,7 +24,7 @@ from .problems import LAWS, table1_impacts, with_parameters
 RTOL, MAX_STEPS = 1e-10, 10_000
 # where bits or statuses are compared, and not accuracy
 LOOSE_RTOL = 1e-5
-NAMES = list(OUTPUTS)
+NAMES = list(CENTRAL_OUTPUTS)
 
 
 def outputs_of(model: ForceModel, impacts: Impacts, collapse: bool = True, rtol: float = RTOL) -> Outputs:

@@ -14,7 +14,7 @@ from impact.config.load import parse_config
 from impact.config.measurements import MEASURED_OUTPUTS
 from impact.contact.output_formulas import FORMULAS
 from impact.contact.status import Status
-from impact.contact.variables import BY_DEFAULT, OUTPUTS
+from impact.contact.variables import CENTRAL_OUTPUTS, OUTPUTS, default_variables
 from impact.engine.execute import integrate_ranges
 from impact.engine.plan import Plan
 from impact.engine.run import DEFAULT_RUN
@@ -25,6 +25,7 @@ from impact.results.trajectory_table import TrajectoryRows, TrajectoryTable, in_
 
 from .conftest import WIDE
 
+BY_DEFAULT = default_variables(of_friction=False)
 TABLE1 = {"v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 6.118486349e9}
 
 
@@ -56,7 +57,7 @@ ON_REQUEST = {"e_kinetic": "1", "e_energetic": "1", "lambda": "N s m-(n+1)", "se
 
 
 def test_variables_stored_on_request_only() -> None:
-    assert [name for name, entry in OUTPUTS.items() if entry.on_request] == list(ON_REQUEST)
+    assert [name for name in CENTRAL_OUTPUTS if OUTPUTS[name].on_request] == list(ON_REQUEST)
     sweep = {"e": [0.0, 0.25, 0.8], "v1": 2.0, "m1": 1.0, "m2": 3.0, "K": 6e9}
     config = {"models": ["gharib-hurmuzlu-2012", "gharib-hurmuzlu-2012-energetic"], "sweep": sweep}
     assert not ON_REQUEST.keys() & set(impact.sweep(config).data_vars)

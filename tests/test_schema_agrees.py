@@ -32,14 +32,15 @@ TABLES = {"sweep": "Sweep", "materials.block": "MaterialTable", "solver": "Solve
 KEYS = [
     "sweep.e", "sweep.v1", "sweep.m1", "sweep.R1", "sweep.n", "sweep.material", "sweep.zip", "sweep.cases",
     "materials.block.nu", "materials.block.rho", "solver.rtol", "solver.max_steps", "solver.collapse", "output.dtype",
-    "output.variables", "output.chunks", "model.kelvin-voigt.C", "title", "models",
+    "output.variables", "output.chunks", "model.kelvin-voigt.C", "title", "models", "frictions", "sweep.angle",
+    "sweep.omega1", "sweep.mu", "sweep.inertia_factor1", "friction.coulomb-1785.limit", "friction.lammps-mindlin.k_t",
 ]  # fmt: skip
 # messages about conditions that a schema cannot express
 BEYOND = re.compile(
     r"sweep\.cases\.|a unit of|a bare number|got \"\s*[-+.0-9]+[^\"]*[^\"0-9.]|\\x|a material of|on an axis|twice|overflow|two ends|a step other"
     r"|got no value|got a value|an axis|a scalar|no axis|chunks of|no such input|one length|set together with|missing"
     r"|as in the first|not read|cannot be read|not a regular|some model matches|models to exclude|left out again|NUL|64 characters"
-    r"|samples such as|in ascending order|expected a median"
+    r"|samples such as|in ascending order|expected a median|which needs frictions|without a friction law|did you mean \"[^ ]* deg|friction law|some friction"
 )
 NUMBERS = st.integers(-3, 12) | st.floats(-2.0, 11.0) | st.floats(allow_nan=False, allow_infinity=False)
 ATOMS = (
@@ -71,7 +72,9 @@ def values(schema: dict[str, Any], definitions: dict[str, Any]) -> st.SearchStra
         case "number":
             above = schema.get("exclusiveMinimum")
             low, high = schema.get("minimum", above), schema.get("maximum")
-            return st.floats(low, high, allow_nan=False, allow_infinity=False, exclude_min=above is not None)
+            below = schema.get("exclusiveMaximum")
+            ends = {"exclude_min": above is not None, "exclude_max": below is not None}
+            return st.floats(low, below if high is None else high, allow_nan=False, allow_infinity=False, **ends)
         case "integer":
             return st.integers(schema.get("minimum"), schema.get("maximum"))
         case "boolean":
@@ -96,7 +99,11 @@ def values(schema: dict[str, Any], definitions: dict[str, Any]) -> st.SearchStra
 def part(key: str) -> dict[str, Any]:
     """The schema of a key, with the definitions that it refers to."""
     table, _, name = key.rpartition(".")
-    definition = SCHEMA["$defs"][TABLES.get(table, table.removeprefix("model."))] if table else SCHEMA
+    definition = (
+        SCHEMA["$defs"][TABLES.get(table, table.removeprefix("model.").replace("friction.", "friction_"))]
+        if table
+        else SCHEMA
+    )
     schema = definition["properties"][name]
     definitions = {used: SCHEMA["$defs"][used] for used in re.findall(r"#/\$defs/([^']*)'", str(schema))}
     return {**schema, "$defs": definitions}
@@ -147,7 +154,8 @@ def test_reader_and_schema_agree_on_a_key(key: str, tmp_path: Any, monkeypatch: 
 
 
 @pytest.mark.parametrize(
-    "table", ["", "sweep", "materials.block", "solver", "output", "model", "model.kelvin-voigt"]
+    "table",
+    ["", "sweep", "materials.block", "solver", "output", "model", "model.kelvin-voigt", "friction.coulomb-1785"],
 )
 def test_an_unknown_key_is_refused_by_both(table: str) -> None:
     key = f"{table}.x9" if table else "x9"

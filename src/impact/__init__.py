@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from .contact.model import ForceModel as ForceModel, Parameter as Parameter
     from .contact.models.hysteresis import hysteresis as hysteresis
     from .contact.powers import power as power
+    from .engine.friction_catalogue import frictions as frictions
     from .engine.model_catalogue import models as models
     from .errors import ImpactError as ImpactError
     from .exporters.export import export as export, export_codes as export_codes
@@ -61,6 +62,7 @@ _MODULES = {
     "export_codes": "exporters.export",
     "extend": "results.extend",
     "extend_to_file": "results.extend",
+    "frictions": "engine.friction_catalogue",
     "hysteresis": "contact.models.hysteresis",
     "info": "results.info",
     "init": "config.starter",

@@ -1,4 +1,4 @@
-"""The command `models`: the catalogue, one law, or the checks of a user-defined law."""
+"""The command `models`: the catalogues, one law, or the checks of a user-defined law."""
 
 from __future__ import annotations
 
@@ -11,12 +11,15 @@ import typer
 import impact
 
 from ..display import Table, dump, print_blocks, show
+from ..errors import UsageError
 from . import exits
 from .completion import complete_family, complete_model
 from .options import JsonOption, PluginOption
 
 if TYPE_CHECKING:
     from ..contact.model import ForceModel
+    from ..engine.friction_catalogue import Frictions
+    from ..engine.model_catalogue import Models
 
 
 def models(
@@ -24,7 +27,7 @@ def models(
         str | None,
         typer.Argument(
             autocompletion=complete_model,
-            help='A model to describe in full, or models to list: "lammps-*", family:hysteresis. '
+            help='A model or friction law to describe in full, or models to list: "lammps-*", family:hysteresis. '
             "\\[default: list all]",
         ),
     ] = None,
@@ -46,23 +49,35 @@ def models(
         Path | None,
         typer.Option("--check", metavar="FILE", help="Check the models of a Python file against the contract."),
     ] = None,
+    frictions: Annotated[bool, typer.Option("--frictions", help="List friction laws, not models.")] = False,
     plugins: PluginOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """List the contact force models: equations, references, domains, delivered restitution."""
+    """List the contact force models, or the friction laws: equations, references, domains, restitution."""
+    if frictions and (family or check):
+        raise UsageError(
+            f"--frictions: got it with {'--family' if family else '--check'}, expected one of the two"
+        )
     if check is not None:
         with_file, others = impact.models([check]), impact.models()
         of_file = [model for name, model in with_file.items() if name not in others and key in (None, name)]
         _check_contract(of_file or [with_file.find(str(key))], as_json=as_json)
         return
     if key is not None and search is None and not (key.startswith("family:") or {*"*?["} & {*key}):
-        description = impact.describe(impact.models(plugins or ()).find(key))
+        laws: Frictions | Models = impact.frictions() if frictions else impact.models(plugins or ())
+        if key not in laws and key in impact.frictions():
+            laws = impact.frictions()
+        description = impact.describe(laws.find(key))
         if as_json:
             print(dump([description]))
         else:
             show(description)
         return
-    chosen = impact.models(plugins or (), pattern=key or "*", family=family, search=search)
+    pattern = key or "*"
+    if frictions:
+        chosen: Frictions | Models = impact.frictions(pattern=pattern, search=search)
+    else:
+        chosen = impact.models(plugins or (), pattern=pattern, family=family, search=search)
     if as_json:
         print(dump(chosen.records()))
     else:

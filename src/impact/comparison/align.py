@@ -21,6 +21,8 @@ from .verdict import Difference, DifferenceKind
 MAX_NAMED_LABELS = 3  # labels of one side that a message lists
 # coordinates that vary with the model
 MODEL_COORDINATES = ("model", "exponent", *MODEL_METADATA)
+# dimensions of laws, which not every variable has
+LAW_DIMS = ("model", "friction")
 
 
 @dataclass(frozen=True)
@@ -132,6 +134,8 @@ def _comparable_coordinates(result: xr.Dataset, other: xr.Dataset) -> xr.Dataset
     if "model" not in result.dims:
         # one model was selected: its key is still a label
         coords = _with_axis(coords, "model", MODEL_COORDINATES)
+    if "friction" in coords and "friction" not in result.dims:
+        coords = _with_axis(coords, "friction", ["friction"])
     for axis in map(str, other.dims):
         if axis not in coords.dims and axis in coords and coords[axis].ndim == 0:
             coords = _with_axis(coords, axis, [n for n in other.coords if axis in other.variables[n].dims])
@@ -170,7 +174,7 @@ def _with_axis(coords: xr.Dataset, axis: str, names: Iterable[Hashable]) -> xr.D
 def _axes_of_both(name: str, result: xr.Dataset, other: xr.Dataset) -> tuple[str, ...]:
     """List the axes of a variable, after axes of length one along which only the other result varies."""
     added = [str(dim) for dim in dict.fromkeys(("model", *other.dims)) if dim not in result.dims]
-    of_variable = [dim for dim in added if dim != "model" or OUTPUTS[name].per_model]
+    of_variable = [dim for dim in added if dim not in LAW_DIMS or dim in OUTPUTS[name].dims]
     return (*reversed(of_variable), *map(str, result.variables[name].dims))
 
 
@@ -197,7 +201,7 @@ def _changed_scalars(new: xr.Dataset, baseline: xr.Dataset, kind: DifferenceKind
 
 def _label_columns(dataset: xr.Dataset, axis: str) -> list[str]:
     """List the coordinates that identify the points of an axis: their numbers, or all columns of the axis."""
-    if axis == "model" or (is_case(axis) and axis in dataset.coords):
+    if axis == "model" or ((axis == "friction" or is_case(axis)) and axis in dataset.coords):
         return [axis]
     return sorted(columns_along(dataset, axis))
 

@@ -19,7 +19,7 @@ from ..results.kinds import is_calibration, kind_of, require_sweep
 from ..results.replay_command import command_start
 from ..results.schema import MODEL_METADATA, SCHEMA, SCHEMA_VERSION, is_case
 from ..results.xarray_backend import load
-from .align import MODEL_COORDINATES, Alignment, align_sweeps
+from .align import LAW_DIMS, MODEL_COORDINATES, Alignment, align_sweeps
 from .calibrations import align_calibrations, fit_notes
 from .tolerances import ALL_VARIABLES, Tolerances, calibration_tolerances, effective_tolerances
 from .values import compare_values, group_size, representative_regions
@@ -152,7 +152,7 @@ def check_comparable(dataset: xr.Dataset, name: str) -> None:
 
 def _unknown_variables(dataset: xr.Dataset) -> list[str]:
     """List the variables that are not part of a result."""
-    standard_names = {*MODEL_COORDINATES, *OUTPUTS}
+    standard_names = {*MODEL_COORDINATES, *LAW_DIMS, *OUTPUTS}
     names = [str(name) for name in dataset.variables if name not in standard_names]
     return [name for name in names if not (is_input(name) or is_case(name))]
 

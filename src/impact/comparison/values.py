@@ -19,7 +19,7 @@ from ..contact.variables import Variable
 from ..errors import UsageError
 from ..results import slabs
 from ..results.replay_command import inputs_of_model
-from ..results.schema import columns_along, is_case, scale_of
+from ..results.schema import SLIP_INPUTS, columns_along, is_case, scale_of
 from .align import AlignedResult, Alignment
 from .verdict import VariableComparison
 
@@ -32,8 +32,14 @@ MAX_COMPARED_POINTS = 10**10
 MAX_RATIO_GROUPS = 2**14
 # |difference|/scale is that of a trajectory: |Delta v1_post|/v0 = (m/m1) |Delta e_out| <= |Delta e_out|
 DIMENSIONLESS_SCALES = ("v0", "the peak", "itself", "m v0^2/2")
-# coordinates that the scale of a point is computed from
-SCALE_INPUTS = {"v0": ("v1", "v2"), "m v0^2/2": ("v1", "v2", "m1", "m2")}
+# coordinates that the scale of a point is computed from, if the result has them
+SCALE_INPUTS = {
+    "v0": ("v1", "v2"),
+    "m v0^2/2": ("v1", "v2", "m1", "m2"),
+    "the slip": ("v1", "v2", *SLIP_INPUTS),
+    "the spin": ("v1", "v2", *SLIP_INPUTS),
+    "m (v0^2 + g0^2)/2": ("v1", "v2", "m1", "m2", *SLIP_INPUTS),
+}
 
 
 def representative_regions(variables: Sequence[Variable], aligned: Alignment) -> dict[str, list[Region]]:
@@ -91,14 +97,15 @@ def _representative_dims(
 
     scale: set[Hashable] = set()
     for name in SCALE_INPUTS.get(variable.scale, ()):
-        scale |= set(aligned.baseline.coords.variables[name].dims)
+        if name in aligned.baseline.coords:
+            scale |= set(aligned.baseline.coords.variables[name].dims)
     if variable.scale == "the peak" and "peak_indentation" in datasets[1]:
         scale |= set(slabs.varying_dims(datasets[1], "peak_indentation"))
     full = varying(variable.name) | scale
     candidates = [full]
     if variable.per_model and variable.has_tolerance:
         # the status decides whether a NaN is an answer
-        candidates.insert(0, full | varying("status"))
+        candidates.insert(0, full | varying(variable.status))
     if variable.scale in DIMENSIONLESS_SCALES and all("e_out" in dataset for dataset in datasets):
         candidates.append(varying("e_out"))
     chosen = []
@@ -245,9 +252,9 @@ def _scale(variable: Variable, aligned: Alignment, region: Region, shape: tuple[
 def _may_be_missing(variable: Variable, aligned: Alignment, region: Region) -> NDArray[Any] | bool:
     """Find where NaNs in both are equal: the statuses are equal, and the status or the law explains the NaN."""
     results = (aligned.new, aligned.baseline)
-    if not variable.per_model or not all("status" in result.dataset for result in results):
+    if not variable.per_model or not all(variable.status in result.dataset for result in results):
         return True
-    new, baseline = (result.read("status", region) for result in results)
+    new, baseline = (result.read(variable.status, region) for result in results)
     return np.asarray((new == baseline) & ((baseline != Status.OK) | variable.may_be_nan))
 
 

@@ -15,6 +15,7 @@ from typing import Any
 
 from pydantic_core import PydanticCustomError
 
+from ..contact.friction import FrictionLaw
 from ..contact.model import ForceModel
 from ..contact.models import catalogue
 from ..errors import ConfigError
@@ -33,7 +34,7 @@ from .input_names import InputName, input_values
 from .lines import MAX_PROBLEM_LINES, key_lines, path_text
 from .material_library import library
 from .quantities import VALUE_FORMS, ConfigProblem, KeyPath
-from .tables import MATERIAL_KEYS, SWEEP_DEFAULTS, SWEEP_QUANTITIES, Loss, Noise, expand_models
+from .tables import MATERIAL_KEYS, SWEEP_DEFAULTS, SWEEP_QUANTITIES, Loss, Noise, expand_frictions, expand_models
 
 # keys of [sweep] that arrange inputs
 NO_INPUTS = (("sweep", "zip"), ("sweep", "cases"))
@@ -122,6 +123,11 @@ class Draft:
         return expand_models(self.data.get("models"), self.known_models)[0]
 
     @cached_property
+    def frictions(self) -> Sequence[FrictionLaw]:
+        """The selected friction laws, without those that are unknown; none for central impacts."""
+        return expand_frictions(self.data["frictions"])[0] if "frictions" in self.data else ()
+
+    @cached_property
     def input_names(self) -> list[str]:
         """The config names of all inputs, whether or not their values are valid."""
         return [str(name) for name, _ in input_values(self.data) if name.path not in NO_INPUTS]
@@ -154,7 +160,7 @@ class Draft:
         if not path:
             line = f"{safe_text(setting.shown)}: expected PATH=VALUE, such as sweep.e=0.5"
             return replace(self, lines=(*self.lines, line))
-        is_input = path[0] in ("sweep", "model", "materials") and len(path) > 2
+        is_input = path[0] in ("sweep", "model", "materials", "friction") and len(path) > 2
         data, start = set_value(data, path, setting.value, new_range=is_input and path[-1] in VALUE_FORMS)
         replaced = [start]
         if path[:2] in (("sweep", "e"), ("sweep", "alpha")):
@@ -203,8 +209,9 @@ class Draft:
             is_replaced = any(path[:start] in self.origins for start in range(end))
             if path[:end] in key_line and not is_replaced:
                 return (0, key_line[path[:end]]), f"{self.name}:{key_line[path[:end]]}"
-        # a parameter of a model without a table is required by the key `models`
-        return self._locate(("models",), key_line) if path[:1] == ("model",) else ((0, 0), self.name)
+        # a parameter of a law without a table is required by the key `models` or `frictions`
+        required_by = {"model": "models", "friction": "frictions"}.get(str(path[0])) if path else None
+        return self._locate((required_by,), key_line) if required_by else ((0, 0), self.name)
 
 
 def _library_setting(name: str, without: Iterable[str] = ()) -> Setting:

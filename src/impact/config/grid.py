@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from pydantic import ValidationError
 
-from ..contact.variables import BY_DEFAULT
+from ..contact.variables import default_variables
 from ..errors import did_you_mean
 from .draft import Draft
 from .input_names import InputName
@@ -20,13 +20,11 @@ MAX_POINTS = 10**9
 MAX_COUNTED_POINTS = 2**62
 # name of the dimension of the samples of uncertain inputs
 SAMPLE = "sample"
-# HDF5 arrays have at most 32 dimensions, and the models take one
+# HDF5 arrays have at most 32 dimensions, and the models take one, friction laws another
 MAX_AXES = 31
 FULL_LAYOUT_HINT = ' in layout "full" (--max-points); layout = "factored" stores any number'
 # chunks of a result and points of a chunk: a reader opens every chunk, and holds a whole one in memory
 MAX_STORED_CHUNKS, MAX_CHUNK_POINTS = 100_000, 2**22
-# upper bound of the bytes that the default outputs of a point take
-BYTES_PER_POINT = 8 * len(BY_DEFAULT)
 
 AxisValues = tuple[float, ...] | tuple[str, ...]
 
@@ -95,12 +93,16 @@ def build_grid(
     axis_names = [name for name in values if name not in scalars]
     # a group takes the position of its first member
     leaders = [name for name in axis_names if member_of.get(name, (name,))[0] == name]
-    points = math.prod(axis_sizes[name] or 1 for name in leaders) * len(draft.models)
-    if len(leaders) > MAX_AXES:
-        problems.append((("sweep",), f"got {len(leaders)} axes, expected at most {MAX_AXES}"))
+    laws = len(draft.models) * max(1, len(draft.frictions))
+    points = math.prod(axis_sizes[name] or 1 for name in leaders) * laws
+    most_axes = MAX_AXES - bool(draft.frictions)
+    if len(leaders) > most_axes:
+        problems.append((("sweep",), f"got {len(leaders)} axes, expected at most {most_axes}"))
     limit = max_points if in_full else MAX_COUNTED_POINTS
     if points > limit:
-        size = f"{points:,} points (axes times models), up to {BYTES_PER_POINT * points / 1e9:,.0f} GB"
+        times = "models and friction laws" if draft.frictions else "models"
+        number_of_bytes = 8 * len(default_variables(bool(draft.frictions))) * points
+        size = f"{points:,} points (axes times {times}), up to {number_of_bytes / 1e9:,.0f} GB"
         hint = FULL_LAYOUT_HINT if in_full else ""
         problems.append((("sweep",), f"got {size}, expected at most {limit:,} points{hint}"))
     columns: dict[str, AxisValues] = {}

@@ -1,4 +1,4 @@
-"""Names of inputs: keys of [sweep], properties of materials, and parameters of models."""
+"""Names of inputs: keys of [sweep], properties of materials, and parameters of models and friction laws."""
 
 from __future__ import annotations
 
@@ -6,11 +6,12 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from ..contact.frictions import frictions
 from ..contact.model import ForceModel
 from ..errors import did_you_mean
 from .files import as_table
 from .quantities import KeyPath, Quantity
-from .tables import MATERIAL_KEYS, MATERIAL_QUANTITIES, SWEEP_QUANTITIES, model_quantities
+from .tables import MATERIAL_KEYS, MATERIAL_QUANTITIES, SWEEP_QUANTITIES, law_quantities
 
 # keys of the inputs in [sweep]
 SWEEP_INPUTS = (*SWEEP_QUANTITIES, *MATERIAL_KEYS)
@@ -24,8 +25,8 @@ class InputName:
     (InputName(table='sweep', owner='', key='v1'), 'steel', ('model', 'bilinear', 'K'))
     """
 
-    table: str  # "sweep", "materials" or "model"
-    owner: str  # the material, or the key of the model; empty in [sweep]
+    table: str  # "sweep", "materials", "model" or "friction"
+    owner: str  # the material, or the key of the law; empty in [sweep]
     key: str
 
     @classmethod
@@ -33,8 +34,9 @@ class InputName:
         """Read a config name; "model." before the key of a model may be omitted."""
         # the key of a model has no dot, the name of a material may have one
         owner, _, key = str(text).removeprefix("model.").rpartition(".")
-        if owner.startswith("materials.") and owner != "materials.":
-            return cls("materials", owner.removeprefix("materials."), key)
+        for table in ("materials", "friction"):
+            if owner.startswith(f"{table}.") and owner != f"{table}.":
+                return cls(table, owner.removeprefix(f"{table}."), key)
         return cls("model", owner, key) if owner else cls("sweep", "", str(text))
 
     @classmethod
@@ -44,7 +46,7 @@ class InputName:
         return cls(table, ".".join(owner), key)
 
     def __str__(self) -> str:
-        prefix = "materials." if self.table == "materials" else ""
+        prefix = f"{self.table}." if self.table in ("materials", "friction") else ""
         return f"{prefix}{self.owner}.{self.key}" if self.owner else self.key
 
     @property
@@ -67,14 +69,21 @@ class InputName:
         """The key of the model of which it is a parameter; empty for an input of all models."""
         return self.owner if self.table == "model" else ""
 
-    def applies_to(self, model: str) -> bool:
-        """Check whether a model may depend on it: it is not a parameter of another model."""
-        return self.model in ("", model)
+    @property
+    def friction(self) -> str:
+        """The key of the friction law of which it is a parameter; otherwise empty."""
+        return self.owner if self.table == "friction" else ""
+
+    def applies_to(self, model: str, friction: str = "") -> bool:
+        """Check whether a model, or its pair, may depend on it: it is not a parameter of another law."""
+        return self.model in ("", model) and self.friction in ("", friction)
 
     def quantity(self, models: Mapping[str, ForceModel]) -> Quantity | None:
         """Find its quantity, or None for the name of a material; KeyError for an unknown input."""
         if self.table == "model":
-            return model_quantities(models[self.owner])[self.key]
+            return law_quantities(models[self.owner])[self.key]
+        if self.table == "friction":
+            return law_quantities(frictions()[self.owner])[self.key]
         if self.table == "materials":
             return MATERIAL_QUANTITIES[self.key]
         return None if self.key in MATERIAL_KEYS else SWEEP_QUANTITIES[self.key]
@@ -84,16 +93,21 @@ class InputName:
         name, names = str(self), [*SWEEP_INPUTS]
         if self.table == "materials":
             names = [str(InputName("materials", self.owner, key)) for key in MATERIAL_QUANTITIES]
+        elif self.table == "friction":
+            laws = frictions()
+            parameters = law_quantities(laws[self.owner]) if self.owner in laws else {}
+            names = [str(InputName("friction", self.owner, key)) for key in parameters]
+            name, names = (name, names) if names else (self.owner, list(laws))
         elif self.owner in models:
-            names = [f"{self.owner}.{parameter}" for parameter in model_quantities(models[self.owner])]
+            names = [f"{self.owner}.{parameter}" for parameter in law_quantities(models[self.owner])]
         elif self.owner:
             name, names = self.owner, list(models)
         return f"no such input; {did_you_mean(name, names)}"
 
 
-def is_foreign(names: Iterable[str], model: str) -> bool:
-    """Check whether inputs that vary together are parameters of other models only."""
-    applies = [InputName.parse(name).applies_to(model) for name in names]
+def is_foreign(names: Iterable[str], model: str, friction: str = "") -> bool:
+    """Check whether inputs that vary together are parameters of other laws only, of a model or a pair."""
+    applies = [InputName.parse(name).applies_to(model, friction) for name in names]
     return bool(applies) and not any(applies)
 
 
@@ -103,10 +117,10 @@ def is_input(name: object) -> bool:
 
 
 def input_values(data: Mapping[str, Any]) -> Iterator[tuple[InputName, Any]]:
-    """Yield the name and the value of every key of [sweep], of a material and of [model.KEY]."""
+    """Yield the name and the value of every key of [sweep], of a material, of [model.KEY] and [friction.KEY]."""
     for key, value in as_table(data.get("sweep")).items():
         yield InputName("sweep", "", key), value
-    for table in ("materials", "model"):
+    for table in ("materials", "model", "friction"):
         for owner, values in as_table(data.get(table)).items():
             for key, value in as_table(values).items():
                 yield InputName(table, owner, key), value

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping
 
 from pydantic import ValidationError
 
+from ..contact.frictions import frictions
 from ..contact.model import ForceModel
 from ..errors import did_you_mean
 from ..formatting import safe_text
@@ -23,7 +24,7 @@ from .tables import (
     Output,
     Solver,
     Sweep,
-    model_quantities,
+    law_quantities,
 )
 
 MAX_PROBLEM_LINES = 100
@@ -34,6 +35,8 @@ EXPECTED_BY_KEY = {
     **{name: str(info.description) for name, info in Column.model_fields.items()},
     "n": f"the number of {Design.model_fields['n'].description}, such as 1024",
 }
+# tables of inputs
+INPUT_TABLES: Mapping[str, type[quantities.Table]] = {"sweep": Sweep, "data": Data, "design": Design}
 # other words that users may write for a key
 KEY_SYNONYMS = {
     "restitution": "e",
@@ -205,18 +208,18 @@ def _unknown_key_hint(location: KeyPath, models: Mapping[str, ForceModel]) -> st
             keys = Column.model_fields
         case ():
             keys = Document.model_fields
-        case ("sweep",):
-            keys = Sweep.model_fields
-        case ("data",):
-            keys = Data.model_fields
-        case ("design",):
-            keys = Design.model_fields
+        case ("sweep" | "data" | "design" as table,):
+            keys = INPUT_TABLES[table].model_fields
         case ("materials", _):
             keys = MaterialTable.model_fields
         case ("model",):
             keys = models
         case ("model", key):
-            keys = model_quantities(models[str(key)])
+            keys = law_quantities(models[str(key)])
+        case ("friction",):
+            keys = frictions()
+        case ("friction", key):
+            keys = law_quantities(frictions()[str(key)])
         case (table, *_):
             keys = vars(Solver() if table == "solver" else Output())
     return did_you_mean(name, list(keys), KEY_SYNONYMS)

@@ -11,10 +11,12 @@ from typing import Any, Literal
 from pydantic import ValidationError
 
 from ..contact.fixed_step import EXACT
+from ..contact.friction import FrictionLaw
+from ..contact.frictions import frictions
 from ..contact.materials import Material
 from ..contact.model import ForceModel
 from ..contact.numba.dispatch import is_installed
-from ..contact.variables import BY_DEFAULT
+from ..contact.variables import OUTPUTS, default_variables
 from . import measurements, quantities, tables
 from .columns import expand_cases, named_files, read_files
 from .design import design_problems, distribution_paths, draw_columns, unit_samples
@@ -54,6 +56,7 @@ class Config:
     design: tables.Design | None = None
     distributions: Mapping[str, Distribution] = field(default_factory=dict)  # of the uncertain inputs
     files: tuple[Path, ...] = field(default=(), repr=False, compare=False)
+    frictions: tuple[FrictionLaw, ...] = ()  # without one, impacts are central
 
     @property
     def overrides(self) -> tuple[str, ...]:
@@ -131,13 +134,13 @@ def build(draft: Draft, max_points: int = MAX_POINTS, purpose: Purpose = "sweep"
     grid = build_grid(draft, values, groups, list(distributions), max_points, in_full=in_full)
     draft = draft.with_problems(grid.problems)
     if not draft.problems:
-        draft = draft.with_problems(_settings_problems(document, grid.axes, len(draft.models)))
+        draft = draft.with_problems(_settings_problems(document, grid.axes, draft))
     if not draft.problems and draft.measurements is not None:
         draft = draft.with_problems(measurements.count_problems(draft.measurements, fits, draft.models))
     if draft.problems or draft.lines:
         raise draft.error()
     measured = draft.measurements.inputs if draft.measurements is not None else {}
-    defaults = _default_scalars(draft.models, document.solver)
+    defaults = _default_scalars(draft, document.solver)
     return Config(
         title=document.title,
         models=tuple(draft.models),
@@ -157,6 +160,7 @@ def build(draft: Draft, max_points: int = MAX_POINTS, purpose: Purpose = "sweep"
         design=document.design,
         distributions=distributions,
         files=draft.files or (),
+        frictions=tuple(draft.frictions),
     )
 
 
@@ -178,7 +182,8 @@ def inline_files(draft: Draft) -> Draft:
 def _validate(draft: Draft) -> tuple[tables.Document | None, list[ConfigProblem]]:
     """Build the document of the valid part, or None, and list the problems of single values."""
     with_tables = [key for key in draft.table("model") if key in draft.known_models]
-    document = tables.document_type(draft.known_models, with_tables)
+    frictions_with_tables = [key for key in draft.table("friction") if key in frictions()]
+    document = tables.document_type(draft.known_models, with_tables, frictions_with_tables)
     materials = tuple({**draft.table("materials"), **library()})
     context = quantities.ValidationContext(draft.exponent, materials, draft.known_models)
     try:
@@ -192,20 +197,29 @@ def _validate(draft: Draft) -> tuple[tables.Document | None, list[ConfigProblem]
         return None, problems
 
 
-def _default_scalars(models: Iterable[ForceModel], solver: tables.Solver) -> dict[str, float]:
+def _default_scalars(draft: Draft, solver: tables.Solver) -> dict[str, float]:
     """List the defaults of inputs and of parameters by config name."""
-    fixed_step = {} if solver.integrator == EXACT else tables.FIXED_STEP_DEFAULTS
-    return {**tables.SWEEP_DEFAULTS, **fixed_step} | {
-        f"{model.key}.{parameter.name}": parameter.default
-        for model in models
-        for parameter in model.parameters
-        if parameter.default is not None
-    }
+    defaults = {**tables.SWEEP_DEFAULTS, **({} if solver.integrator == EXACT else tables.FIXED_STEP_DEFAULTS)}
+    if draft.frictions:
+        # with an angle or a speed, u1 follows from it
+        is_given = {"angle", "speed"} & {
+            *draft.input_names,
+            *(draft.measurements.inputs if draft.measurements else ()),
+        }
+        defaults |= {**tables.OBLIQUE_DEFAULTS, **({"u2": 0.0} if is_given else {"u1": 0.0, "u2": 0.0})}
+    for laws, table in ((draft.models, "model"), (draft.frictions, "friction")):
+        defaults |= {
+            str(InputName(table, law.key, parameter.name)): parameter.default
+            for law in laws
+            for parameter in law.parameters
+            if parameter.default is not None
+        }
+    return defaults
 
 
 def _remove_invalid(data: Mapping[str, Any], problems: Iterable[ConfigProblem]) -> dict[str, Any]:
-    """Remove keys that have problems: [solver] and [output] whole, and of [model.KEY] the parameter."""
-    lengths = {"solver": 1, "output": 1, "model": 3}
+    """Remove keys that have problems: [solver] and [output] whole, and of the table of a law the parameter."""
+    lengths = {"solver": 1, "output": 1, "model": 3, "friction": 3}
     invalid = {path[: lengths.get(str(path[0]), 2)] for path, _ in problems if path}
 
     def valid_part(value: Any, path: KeyPath) -> Any:
@@ -228,12 +242,13 @@ def _valid_values(document: tables.Document, draft: Draft) -> dict[str, quantiti
         for name, value in _values_by_key(table).items() if material in used_materials else ():
             if not isinstance(value, float):
                 values[f"materials.{material}.{name}"] = value
-    parameter_tables = _values_by_key(document.model)
-    selected = {model.key for model in draft.models}
-    for key in draft.table("model"):
-        # parameters of models that are not selected are checked, but are not part of the grid
-        parameters = _values_by_key(parameter_tables.get(key)) if key in selected else {}
-        values |= {f"{key}.{name}": value for name, value in parameters.items()}
+    for table_name, laws in (("model", draft.models), ("friction", draft.frictions)):
+        parameter_tables = _values_by_key(getattr(document, table_name))
+        selected = {law.key for law in laws}
+        for key in draft.table(table_name):
+            # parameters of models that are not selected are checked, but are not part of the grid
+            parameters = _values_by_key(parameter_tables.get(key)) if key in selected else {}
+            values |= {str(InputName(table_name, key, name)): value for name, value in parameters.items()}
     # a file that is left cannot be read
     return {
         name: value
@@ -286,13 +301,18 @@ def _calibration_problems(
         yield ("sweep", "zip"), f"got axes that vary together, {single} for each name"
 
 
-def _settings_problems(document: tables.Document, axes: Sequence[Axis], n_models: int) -> Iterator[ConfigProblem]:
+def _settings_problems(document: tables.Document, axes: Sequence[Axis], draft: Draft) -> Iterator[ConfigProblem]:
     """Check [solver] and [output] against the grid and the installed packages."""
     output = document.output
     if document.solver.core == "numba" and not is_installed():
         expected = 'numba, which is not installed (pip install "impact-sweep[fast]"), or "auto"'
         yield ("solver", "core"), f'got "numba", expected {expected}'
-    n_variables = len({"status", *(output.variables or BY_DEFAULT)})
-    yield from chunk_problems(output.chunks, axes, n_models, n_variables)
+    n_frictions = len(draft.frictions)
+    stored = {"status", *(output.variables or default_variables(bool(n_frictions)))}
+    per_model = sum(n_frictions if OUTPUTS[name].of_friction else 1 for name in stored)
+    yield from chunk_problems(output.chunks, axes, len(draft.models), per_model)
+    for position, name in enumerate(output.variables or ()):
+        if OUTPUTS[name].of_friction and not n_frictions:
+            yield ("output", "variables", position), f'got "{name}", which needs frictions = [...]'
     if output.chunks and output.layout == "factored":
         yield ("output", "chunks"), 'set together with layout = "factored", expected layout = "full"'

@@ -312,7 +312,7 @@ class Range(_OneForm):
         values[inner] = [float(f"{value:.15g}") for value in values[inner].tolist()]
         for extreme in (float(values.min()), float(values.max())):
             if not quantity.allows(extreme):
-                raise self._error(f"got a value {extreme!r}, expected {quantity.expected}")
+                raise self._error(quantity.refusal(extreme, extreme).replace("got", "got a value", 1))
         repeated = np.flatnonzero(np.diff(values) == 0)
         if repeated.size:
             raise self._error(f"got {float(values[repeated[0]])!r} twice, expected each value once")
@@ -433,6 +433,7 @@ class Quantity:
     most: float = math.inf
     above: bool = False  # the interval excludes `least`
     infinite: bool = False  # inf is allowed
+    below: bool = False  # the interval excludes `most`
 
     @property
     def expected(self) -> str:
@@ -440,6 +441,8 @@ class Quantity:
         unit = "" if self.unit == "1" else f" {self.unit}"
         low, high = f"{'>' if self.above else '>='} {self.least:g}", f"<= {self.most:g}"
         match math.isfinite(self.least), math.isfinite(self.most):
+            case True, True if self.below:
+                return f"an angle from {self.least:g} to below {math.degrees(self.most):g} deg"
             case True, True:
                 both = f"{low} and {high}" if self.above else f"from {self.least:g} to {self.most:g}"
                 return f"a number {both}{unit}"
@@ -458,7 +461,14 @@ class Quantity:
         """Check whether a number is allowed."""
         if math.isinf(value) and not self.infinite:
             return False
-        return (self.least < value if self.above else self.least <= value) and value <= self.most
+        above = self.least < value if self.above else self.least <= value
+        return above and (value < self.most if self.below else value <= self.most)
+
+    def refusal(self, value: object, number: float) -> str:
+        """Say what is wrong with a number that is not allowed; a bare one that may be an angle in degrees."""
+        if self.unit == "rad" and not isinstance(value, str) and 0.0 < number < math.degrees(self.most):
+            return f'got {number:g} rad; did you mean "{number:g} deg"?'
+        return f"got {as_text(value)}, expected {self.expected}"
 
     @property
     def exponents(self) -> frozenset[str]:
@@ -494,7 +504,7 @@ class Quantity:
         else:
             number = _float_or_inf(lambda: float(value))
         if not self.allows(number):
-            raise mismatch_error(value, self.expected)
+            raise value_error(self.refusal(value, number))
         # -0.0 becomes 0.0: they are one value with one label
         return number + 0.0
 
@@ -527,6 +537,10 @@ class Quantity:
         of_n = f" with n = {n:g}" if self.exponents and n is not None else ""
         expected_unit = "a bare number" if self.unit == "1" else f"a unit of {self.unit}{of_n}{self._example}"
         scale = _si_scale(unit)
+        if self.unit == "rad/s" and "Hz" in unit:
+            raise UnitError(
+                'a unit of rad/s, such as "1 rpm" or "1 rad/s": turns and radians per second are both Hz'
+            )
         if scale is None:
             raise UnitError(f'{expected_unit}; "{unit}" is not a known unit')
         factor, powers = scale
@@ -567,7 +581,7 @@ def number_type(quantity: Quantity) -> Any:
     if math.isfinite(quantity.least):
         bounds["gt" if quantity.above else "ge"] = quantity.least
     if math.isfinite(quantity.most):
-        bounds["le"] = quantity.most
+        bounds["lt" if quantity.below else "le"] = quantity.most
     bare: Any = Annotated[float, Field(**bounds)]
     if quantity.exponents <= {"n"}:
         number = rf"\s*[-+]?({_DIGITS}{'|inf' if quantity.infinite else ''})\s*"

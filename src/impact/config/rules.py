@@ -9,12 +9,13 @@ from dataclasses import replace
 from ..contact.dimensionless import required_quantities
 from ..contact.fixed_step import EXACT, SCHEMES, has_scheme, law_problem
 from ..contact.formula_calls import argument_names
+from ..contact.friction import parameter_problem, required_inputs
 from ..contact.materials import hertz_stiffness
 from ..contact.model import ForceModel, with_base_quantities
 from .draft import Draft, listed_names
 from .files import as_table
-from .quantities import ConfigProblem, Quantity
-from .tables import FIXED_STEP_INPUTS, MATERIAL_QUANTITIES, SWEEP_QUANTITIES, model_quantities
+from .quantities import ConfigProblem, Quantity, as_text
+from .tables import FIXED_STEP_INPUTS, MATERIAL_QUANTITIES, OBLIQUE_INPUTS, SWEEP_QUANTITIES, law_quantities
 
 
 def _sets_stiffness(draft: Draft, model: ForceModel) -> bool:
@@ -72,7 +73,7 @@ def _missing(quantity: Quantity) -> str:
 
 
 def _velocity_problems(draft: Draft) -> Iterable[ConfigProblem]:
-    if "v1" not in draft.table("sweep"):
+    if {"v1", "speed"}.isdisjoint(draft.table("sweep")):
         yield ("sweep", "v1"), _missing(SWEEP_QUANTITIES["v1"])
 
 
@@ -183,7 +184,7 @@ def _parameter_problems(draft: Draft) -> Iterable[ConfigProblem]:
         table = as_table(draft.table("model").get(model.key))
         for parameter in model.parameters:
             if parameter.default is None and parameter.name not in table:
-                message = _missing(model_quantities(model)[parameter.name])
+                message = _missing(law_quantities(model)[parameter.name])
                 yield ("model", model.key, parameter.name), message + _exclusion_hint(draft, model)
 
 
@@ -209,6 +210,75 @@ def _fixed_step_problems(draft: Draft) -> Iterable[ConfigProblem]:
             yield ("sweep", name), f"{_missing(SWEEP_QUANTITIES[name])}; or dt"
 
 
+def _oblique_problems(draft: Draft) -> Iterable[ConfigProblem]:
+    """Check that inputs of oblique impacts have friction laws, and these their inputs."""
+    sweep = draft.table("sweep")
+    if "frictions" not in draft.data:
+        expected = 'expected frictions as well, such as frictions = ["coulomb-1785"]'
+        yield from (
+            (("sweep", name), f"set without a friction law, {expected}")
+            for name in OBLIQUE_INPUTS
+            if name in sweep
+        )
+        yield from (
+            (("friction", key), f"set without a friction law, {expected}") for key in draft.table("friction")
+        )
+        return
+    if "mu" not in sweep:
+        yield ("sweep", "mu"), _missing(SWEEP_QUANTITIES["mu"])
+    if "speed" in sweep and "angle" not in sweep:
+        yield ("sweep", "angle"), f"{_missing(SWEEP_QUANTITIES['angle'])}; or v1 and u1 in place of speed"
+    for name, others in (("angle", ("u1",)), ("speed", ("v1", "u1", "u2"))):
+        for other in others if name in sweep else ():
+            if other in sweep and not (other == "u1" and {"angle", "speed"} <= sweep.keys() and name == "speed"):
+                yield ("sweep", other), f"set together with {name}, expected one of the two"
+    integrator = draft.table("solver").get("integrator", EXACT)
+    if integrator != EXACT:
+        message = f'got {as_text(integrator)}, expected "{EXACT}" with frictions, which have no fixed step'
+        yield ("solver", "integrator"), message
+
+
+def _spin_problems(draft: Draft) -> Iterable[ConfigProblem]:
+    """Check that a ball with a spin has a radius, and is neither a wall nor a plane."""
+    sweep = draft.table("sweep")
+    for ball in ("1", "2"):
+        spin = sweep.get(f"omega{ball}")
+        if spin is None or spin in (0, 0.0):
+            continue
+        bodies = ((f"m{ball}", "wall"), (f"R{ball}", "plane"))
+        body = next((body for name, body in bodies if sweep.get(name) in (math.inf, "inf")), "")
+        if body:
+            yield ("sweep", f"omega{ball}"), f"got the spin of a {body}, which does not turn, expected none"
+            continue
+        has_material = bool({"material", f"material{ball}"} & sweep.keys()) and f"m{ball}" in sweep
+        without_density = list(_materials_without(draft, ball, "rho")) if has_material else []
+        if f"R{ball}" not in sweep and (not has_material or without_density):
+            message = f"{_missing(SWEEP_QUANTITIES[f'R{ball}'])}, which its spin needs; or a material with rho"
+            yield ("sweep", f"R{ball}"), message
+
+
+def _friction_problems(draft: Draft) -> Iterable[ConfigProblem]:
+    """Check the parameters of friction laws, and the inputs that they need."""
+    sweep = draft.table("sweep")
+    exponents = {model.exponent or draft.exponent or math.nan for model in draft.models}
+    has_stiffness = "K" in sweep or any(_sets_stiffness(draft, model) for model in draft.models)
+    has_material = "material" in sweep or {"material1", "material2"} <= sweep.keys()
+    for law in draft.frictions:
+        given = as_table(draft.table("friction").get(law.key)).keys()
+        problem = parameter_problem(law, given, n=min(exponents, default=None), has_stiffness=has_stiffness)
+        if problem:
+            name, _, message = problem.partition(": ")
+            yield ("friction", law.key, name), message
+        for parameter in law.parameters:
+            if parameter.default is None and not parameter.optional and parameter.name not in given:
+                yield ("friction", law.key, parameter.name), _missing(law_quantities(law)[parameter.name])
+        needed = required_inputs(law, given, exponents)
+        if "e" in needed and {"e", "alpha"}.isdisjoint(sweep):
+            yield ("sweep", "e"), f"missing, expected e or alpha (used by {law.key}), or other frictions"
+        if "E1" in needed and not has_material and not problem:
+            yield ("sweep", "material"), f"missing, expected a material of [materials] (used by {law.key})"
+
+
 def _stiffness_arguments(model: ForceModel) -> frozenset[str]:
     """List the quantities from which the stiffness of a model is derived if the config has no K."""
     return with_base_quantities(argument_names(model.stiffness or hertz_stiffness))
@@ -231,4 +301,7 @@ RULES = (
     _radius_problems,
     _parameter_problems,
     _fixed_step_problems,
+    _oblique_problems,
+    _spin_problems,
+    _friction_problems,
 )

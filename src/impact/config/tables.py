@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import field
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Annotated, Any, Literal, cast, get_args
+from typing import Annotated, Any, Literal, TypeVar, cast, get_args
 
 from pydantic import (
     BeforeValidator,
@@ -25,6 +26,8 @@ from pydantic_core import PydanticCustomError
 
 from ..atomic import write_file
 from ..contact.fixed_step import EXACT, MAX_STEPS_PER_CONTACT, SCHEMES
+from ..contact.friction import FrictionLaw
+from ..contact.frictions import frictions
 from ..contact.model import ForceModel
 from ..contact.models import built_in, catalogue
 from ..contact.variables import OUTPUTS
@@ -64,6 +67,8 @@ NOISES, LOSSES = get_args(Noise), get_args(Loss)
 DESIGN_METHODS = ("sobol", "lhs", "halton", "random")
 MAX_SAMPLES = 2**22
 MODELS_EXPECTED = 'a model, or a list of models; "all" are all'
+FRICTIONS_EXPECTED = 'a friction law, or a list of friction laws; "all" are all'
+L = TypeVar("L", ForceModel, FrictionLaw)
 
 
 MATERIAL_NAME = name_or_names(
@@ -84,6 +89,10 @@ CasesTable = Annotated[
 ]
 
 
+RIGHT_ANGLE = 0.5 * math.pi
+INERTIA = "moment of inertia over m R^2, 0.4 for a solid sphere and inf for one that does not turn, of ball"
+
+
 class Sweep(Table):
     """What to sweep: single values, and lists and ranges, which are the axes of the grid."""
 
@@ -95,6 +104,19 @@ class Sweep(Table):
     m2: Annotated[Numbers | None, Quantity("kg", "mass of ball 2", 0, above=True, infinite=True)] = None
     R1: Annotated[Numbers | None, Quantity("m", "radius of ball 1", 0, above=True, infinite=True)] = None
     R2: Annotated[Numbers | None, Quantity("m", "radius of ball 2", 0, above=True, infinite=True)] = None
+    angle: Annotated[
+        Numbers | None, Quantity("rad", "angle of the impact from the normal", 0, RIGHT_ANGLE, below=True)
+    ] = None
+    speed: Annotated[
+        Numbers | None, Quantity("m/s", "relative speed of an oblique impact, in place of v1", 0, above=True)
+    ] = None
+    u1: Annotated[Numbers | None, Quantity("m/s", "tangential velocity of ball 1 before the impact")] = None
+    u2: Annotated[Numbers | None, Quantity("m/s", "tangential velocity of ball 2 before the impact")] = None
+    omega1: Annotated[Numbers | None, Quantity("rad/s", "spin of ball 1 before the impact")] = None
+    omega2: Annotated[Numbers | None, Quantity("rad/s", "spin of ball 2 before the impact")] = None
+    inertia_factor1: Annotated[Numbers | None, Quantity("1", f"{INERTIA} 1", 0, above=True, infinite=True)] = None
+    inertia_factor2: Annotated[Numbers | None, Quantity("1", f"{INERTIA} 2", 0, above=True, infinite=True)] = None
+    mu: Annotated[Numbers | None, Quantity("1", "coefficient of friction", 0)] = None
     K: Annotated[Numbers | None, Quantity("N/m^n", "stiffness of the contact, F = K x^n", 0, above=True)] = None
     n: Annotated[Numbers, Quantity("1", "compliance exponent", least=1, most=10)] = 1.5
     steps_per_contact: Annotated[
@@ -145,6 +167,9 @@ SWEEP_DEFAULTS = {name: float(Sweep.model_fields[name].default) for name in ("v2
 # inputs of an integrator with a fixed step only, and their defaults
 FIXED_STEP_INPUTS = ("steps_per_contact", "dt", "phase")
 FIXED_STEP_DEFAULTS = {"phase": 0.5}
+# inputs of oblique impacts, which need a friction law, and the defaults of some
+OBLIQUE_INPUTS = ("angle", "speed", "u1", "u2", "omega1", "omega2", "inertia_factor1", "inertia_factor2", "mu")
+OBLIQUE_DEFAULTS = {"omega1": 0.0, "omega2": 0.0, "inertia_factor1": 0.4, "inertia_factor2": 0.4}
 # K of a model with a fixed exponent
 LAW_STIFFNESS = Quantity("N/m^n", "stiffness of this law, in place of the sweep's", 0, above=True)
 
@@ -298,27 +323,56 @@ def power_of_two_problem(n: int, purpose: str) -> str:
     return f"got {n}, expected a power of two {purpose}: {nearest}" if n & (n - 1) else ""
 
 
-def model_quantities(model: ForceModel) -> dict[str, Quantity]:
-    """List the quantities of [model.KEY]: the parameters, and K of a model with a fixed exponent."""
-    stiffness = {} if model.exponent is None else {"K": LAW_STIFFNESS}
-    return stiffness | {
+def law_quantities(law: ForceModel | FrictionLaw) -> dict[str, Quantity]:
+    """List the quantities of [model.KEY] or [friction.KEY]: the parameters, and K of a model with its own n."""
+    has_own_n = isinstance(law, ForceModel) and law.exponent is not None
+    return ({"K": LAW_STIFFNESS} if has_own_n else {}) | {
         parameter.name: Quantity(parameter.unit, parameter.meaning, parameter.least, parameter.most)
-        for parameter in model.parameters
+        for parameter in law.parameters
     }
 
 
-def parameter_table(model: ForceModel) -> type[Table]:
-    """Create the type of [model.KEY]; its keys are aliases, since not every parameter name can name a field."""
-    defaults = {parameter.name: parameter.default for parameter in model.parameters}
-    fields: dict[str, Any] = {
-        f"field_{index}": (Annotated[Numbers | None, quantity, Field(alias=name)], defaults.get(name))
-        for index, (name, quantity) in enumerate(model_quantities(model).items())
-    }
-    return create_model(model.key, __base__=Table, **fields)
+def parameter_table(law: ForceModel | FrictionLaw) -> type[Table]:
+    """Create the type of [model.KEY] or [friction.KEY]; keys are aliases, as not every name can name a field."""
+    parameters = {parameter.name: parameter for parameter in law.parameters}
+    fields: dict[str, Any] = {}
+    for index, (name, quantity) in enumerate(law_quantities(law).items()):
+        parameter = parameters.get(name)
+        words = parameter.choices if parameter else ()
+        kind = Annotated[Any, _words(words, quantity.meaning)] if words else Annotated[Numbers | None, quantity]
+        default = parameter.default if parameter else None
+        fields[f"field_{index}"] = (Annotated[kind, Field(alias=name)], default)
+    # a contact force and a friction law may have one key
+    name = law.key if isinstance(law, ForceModel) else f"friction_{law.key}"
+    return create_model(name, __base__=Table, **fields)
+
+
+def _words(words: tuple[str, ...], meaning: str) -> Any:
+    """Build the type of a word, or a list of words, whose value is the position of the word."""
+    either = " or ".join(f'"{word}"' for word in words)
+
+    def position(value: object) -> float:
+        if not isinstance(value, str) or value not in words:
+            raise mismatch_error(value, either)
+        return float(words.index(value))
+
+    def read(value: object) -> float | tuple[float, ...]:
+        return tuple(map(position, value)) if isinstance(value, list) and value else position(value)
+
+    word: Any = Literal[words]
+    schema = Annotated[word | Annotated[list[word], Field(min_length=1)], Field(description=meaning)]
+    return PlainValidator(read, json_schema_input_type=schema)
 
 
 def _select_models(value: object, info: ValidationInfo) -> tuple[ForceModel, ...]:
     selection, problems = expand_models(value, cast(ValidationContext, info.context).models)
+    if problems:
+        raise located_errors(problems)
+    return tuple(selection)
+
+
+def _select_frictions(value: object) -> tuple[FrictionLaw, ...]:
+    selection, problems = expand_frictions(value)
     if problems:
         raise located_errors(problems)
     return tuple(selection)
@@ -334,6 +388,7 @@ class Document(Table):
         DEFAULT_TITLE, description="title of the sweep"
     )
     models: Annotated[tuple[ForceModel, ...], PlainValidator(_select_models)] = ()
+    frictions: Annotated[tuple[FrictionLaw, ...], PlainValidator(_select_frictions)] = ()
     sweep: Sweep
     materials: Annotated[dict[str, MaterialTable], expected("a table")] = Field(
         default_factory=dict, description="materials by name"
@@ -345,18 +400,29 @@ class Document(Table):
         None, description="samples of the inputs that are distributions"
     )
     model: Any = None
+    friction: Any = None
 
 
-def document_type(models_by_key: Mapping[str, ForceModel], with_tables: Sequence[str]) -> type[Document]:
-    """Build the type of a whole config, in which some models have a table for their parameters."""
+def document_type(
+    models_by_key: Mapping[str, ForceModel], with_tables: Sequence[str], frictions_with_tables: Sequence[str]
+) -> type[Document]:
+    """Build the type of a whole config, in which some models and friction laws have a table of parameters."""
     for table in (Sweep, MaterialTable, Data, Design):
         # built once; the type of each config then contains it
         table.model_rebuild()
-    fields: dict[str, Any] = {
-        f"field_{index}": (Annotated[parameter_table(models_by_key[key]), Field(alias=key)], None)
-        for index, key in enumerate(with_tables)
-    }
-    parameters = create_model("model", __base__=Table, __doc__="Parameters of models, by key.", **fields)
+
+    def tables_of(name: str, laws: Mapping[str, Any], keys: Sequence[str], meaning: str) -> type[Table]:
+        fields: dict[str, Any] = {
+            f"field_{index}": (Annotated[parameter_table(laws[key]), Field(alias=key)], None)
+            for index, key in enumerate(keys)
+        }
+        return create_model(name, __base__=Table, __doc__=meaning, **fields)
+
+    parameters = tables_of("model", models_by_key, with_tables, "Parameters of models, by key.")
+    of_frictions = "Parameters of friction laws, by key."
+    friction_parameters = tables_of("friction", frictions(), frictions_with_tables, of_frictions)
+    friction_selection = PlainValidator(_select_frictions, json_schema_input_type=_law_names(frictions(), "all"))
+    friction_description = Field(description="friction laws, as models: each model is paired with each of them")
     selection = PlainValidator(_select_models, json_schema_input_type=_model_names(models_by_key))
     description = Field(description='models by name, "all", "family:NAME" or a pattern; after "!" those left out')
     return create_model(
@@ -364,6 +430,8 @@ def document_type(models_by_key: Mapping[str, ForceModel], with_tables: Sequence
         __base__=Document,
         models=(Annotated[Any, selection, description], ...),
         model=(parameters, Field(default_factory=parameters)),
+        frictions=(Annotated[Any, friction_selection, friction_description], ()),
+        friction=(friction_parameters, Field(default_factory=friction_parameters)),
     )
 
 
@@ -390,11 +458,11 @@ def schema(output: str | Path | None = None, *, overwrite: bool = False) -> dict
     """
     models = catalogue()
     # these inputs have alternative keys; measurements may contain them
-    alternatives = (("v1", "cases"), ("m1", "R1", "cases"), ("m2", "R2", "cases"))
+    alternatives = (("v1", "speed", "cases"), ("m1", "R1", "cases"), ("m2", "R2", "cases"))
     required = [{"anyOf": [{"required": [key]} for key in keys]} for keys in alternatives]
     content = {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
-        **document_type(models, list(models)).model_json_schema(),
+        **document_type(models, list(models), list(frictions())).model_json_schema(),
         "if": {"not": {"required": ["data"]}},
         "then": {"properties": {"sweep": {"allOf": required}}},
     }
@@ -407,7 +475,12 @@ def schema(output: str | Path | None = None, *, overwrite: bool = False) -> dict
 def _model_names(models: Mapping[str, ForceModel]) -> Any:
     """Create the type of the key `models` for its JSON Schema, with all names."""
     families = {f"family:{model.family}" for model in models.values() if not model.same_as}
-    words = (*models, "all", *sorted(families))
+    return _law_names(models, "all", *sorted(families))
+
+
+def _law_names(laws: Mapping[str, Any], *more: str) -> Any:
+    """Create the type of names of laws: their keys, further words, patterns, and after "!" those left out."""
+    words = (*laws, *more)
     # a pattern contains *, ? or [; no key begins with "!", and "family:" takes no pattern
     pattern = r"(?!!|family:).*[*?\[]"
     name: Any = Literal[words] | Annotated[str, Field(pattern=f"^{pattern}")]
@@ -421,57 +494,68 @@ def expand_models(
     selection: object, models: Mapping[str, ForceModel]
 ) -> tuple[list[ForceModel], list[ConfigProblem]]:
     """Find the models of a key, "all", "family:NAME", a pattern, or a list of those, some excluded by "!"."""
+    return _expand_laws(selection, models, "model", MODELS_EXPECTED)
+
+
+def expand_frictions(selection: object) -> tuple[list[FrictionLaw], list[ConfigProblem]]:
+    """Find the friction laws of a key, "all", a pattern, or a list of those, some excluded by "!"."""
+    return _expand_laws(selection, frictions(), "friction law", FRICTIONS_EXPECTED)
+
+
+def _expand_laws(
+    selection: object, laws: Mapping[str, L], what: str, expectation: str
+) -> tuple[list[L], list[ConfigProblem]]:
     if not isinstance(selection, str | list) or not selection:
-        return [], [((), mismatch_error(selection, MODELS_EXPECTED).message())]
-    selected: dict[str, ForceModel] = {}
+        return [], [((), mismatch_error(selection, expectation).message())]
+    selected: dict[str, L] = {}
     problems: list[ConfigProblem] = []
     for index, word in enumerate([selection] if isinstance(selection, str) else selection):
         try:
             if isinstance(word, str) and word.startswith("!"):
-                _leave_out(selected, word, models)
+                _leave_out(selected, word, laws, what)
             else:
-                selected |= _models_matching(word, models)
+                selected |= _laws_matching(word, laws, what)
         except PydanticCustomError as error:
             problems.append((() if isinstance(selection, str) else (index,), error.message()))
             if len(problems) >= MAX_PROBLEMS:
                 break
     if not selected and not problems:
-        problems.append(((), mismatch_error(selection, "models that are not all left out again").message()))
+        problems.append(((), mismatch_error(selection, f"{what}s that are not all left out again").message()))
     return list(selected.values()), problems
 
 
-def _leave_out(selected: dict[str, ForceModel], word: str, models: Mapping[str, ForceModel]) -> None:
-    """Remove the models of "!..." from those selected before it."""
+def _leave_out(selected: dict[str, L], word: str, laws: Mapping[str, L], what: str) -> None:
+    """Remove the laws of "!..." from those selected before it."""
     try:
-        excluded = _models_matching(word[1:], models)
+        excluded = _laws_matching(word[1:], laws, what)
     except PydanticCustomError as error:
         raise value_error(f"after !: {error.message()}") from None
     if selected.keys().isdisjoint(excluded):
-        raise mismatch_error(word, "models to exclude from those before it")
+        raise mismatch_error(word, f"{what}s to exclude from those before it")
     for key in excluded:
         selected.pop(key, None)
 
 
-def _models_matching(word: object, models: Mapping[str, ForceModel]) -> dict[str, ForceModel]:
-    """Find the models of a key, "all", "family:NAME" or a pattern, by key."""
+def _laws_matching(word: object, laws: Mapping[str, L], what: str) -> dict[str, L]:
+    """Find the laws of a key, "all", "family:NAME" or a pattern, by key."""
     if not isinstance(word, str):
-        raise mismatch_error(word, "the name of a model")
+        raise mismatch_error(word, f"the name of a {what}")
     # a law with two names is not run twice
-    laws = {key: model for key, model in models.items() if not model.same_as}
+    distinct = {key: law for key, law in laws.items() if not law.same_as}
     if word == "all":
-        return {key: model for key, model in laws.items() if key in built_in()}
-    if word.startswith("family:"):
+        return {key: law for key, law in distinct.items() if isinstance(law, FrictionLaw) or key in built_in()}
+    if word.startswith("family:") and what == "model":
         family = word.removeprefix("family:")
-        members = {key: model for key, model in laws.items() if model.family == family}
+        members = {key: law for key, law in distinct.items() if getattr(law, "family", "") == family}
         if not members:
-            families = sorted({model.family for model in laws.values()})
+            families = sorted({str(getattr(law, "family", "")) for law in distinct.values()})
             raise mismatch_error(word, f"a family of models; {did_you_mean(family, families)}")
         return members
     if any(letter in word for letter in "*?["):
-        matching = {key: model for key, model in models.items() if fnmatchcase(key, word[:MAX_UNIT_LENGTH])}
+        matching = {key: law for key, law in laws.items() if fnmatchcase(key, word[:MAX_UNIT_LENGTH])}
         if not matching:
-            raise mismatch_error(word, "a pattern that some model matches")
+            raise mismatch_error(word, f"a pattern that some {what} matches")
         return matching
-    if word not in models:
-        raise mismatch_error(word, f"a model; {did_you_mean(word, list(models))}")
-    return {word: models[word]}
+    if word not in laws:
+        raise mismatch_error(word, f"a {what}; {did_you_mean(word, list(laws))}")
+    return {word: laws[word]}

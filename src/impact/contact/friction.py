@@ -176,12 +176,9 @@ def friction_values(pair: Pair, oblique: ObliqueImpacts) -> dict[str, Array]:
     values = {LIMIT_POSITIVE: _value(law, oblique, "limit")}
     if law.kind == "coulomb":
         return values
+    values |= _spring_values(pair, oblique)
     with np.errstate(all="ignore"):
         values[SLIP] = np.abs(oblique.G0)
-        if law.stiffness and law.kind == "spring":
-            values[TANGENTIAL_STIFFNESS] = _stiffness(pair, oblique) / oblique.mass_ratio
-        if law.damping:
-            values[TANGENTIAL_DAMPING] = _damping(pair, oblique) / oblique.mass_ratio
         if law.kind == "regularized":
             dynamic = _parameter(law, oblique, "mu_d")
             speed = _value(law, oblique, next(p.name for p in law.parameters if p.unit == "m/s"))
@@ -201,11 +198,9 @@ def check_friction(pair: Pair, oblique: ObliqueImpacts) -> NDArray[np.int8]:
     damping is not finite.
     """
     law = pair.friction
-    values = friction_values(pair, oblique)
     status = np.full((1,) * max(1, len(oblique.impacts.shape)), FrictionStatus.OK, np.int8)
-    for name in (TANGENTIAL_STIFFNESS, TANGENTIAL_DAMPING):
-        if name in values:
-            status = _where(~(values[name] >= 0.0) | np.isinf(values[name]), FrictionStatus.OUT_OF_RANGE, status)
+    for value in _spring_values(pair, oblique).values():
+        status = _where(~(value >= 0.0) | np.isinf(value), FrictionStatus.OUT_OF_RANGE, status)
     for mask in _invalid(law, oblique):
         status = _where(mask, FrictionStatus.INVALID_PARAMETER, status)
     for mask, _ in _problems(pair, oblique):
@@ -282,6 +277,17 @@ def _value(law: FrictionLaw, oblique: ObliqueImpacts, name: str) -> Array:
     """Return the values of a parameter, NaN where there are none."""
     values = _parameter(law, oblique, name)
     return _ones(oblique.impacts) * np.nan if values is None else values
+
+
+def _spring_values(pair: Pair, oblique: ObliqueImpacts) -> dict[str, Array]:
+    """Compute the stiffness and the damping that a law has, over the mass ratio, in the contact's own units."""
+    law, values = pair.friction, {}
+    with np.errstate(all="ignore"):
+        if law.stiffness and law.kind == "spring":
+            values[TANGENTIAL_STIFFNESS] = _stiffness(pair, oblique) / oblique.mass_ratio
+        if law.damping:
+            values[TANGENTIAL_DAMPING] = _damping(pair, oblique) / oblique.mass_ratio
+    return values
 
 
 def _stiffness_power(law: FrictionLaw, n: float) -> float:

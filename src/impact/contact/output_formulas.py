@@ -16,11 +16,15 @@ from .impacts import Impacts, check_inputs
 from .impulse import velocities_after
 from .model import ForceModel, Law
 from .powers import all_within
+from .rigid import ObliqueImpacts
 from .simulate import CollisionResult, simulate
 from .status import FIRST_FAILURE, LIMIT, NO_IMPACT, STATUS_OK
-from .variables import OUTPUTS
+from .tangential import TangentialResult
+from .variables import CENTRAL_OUTPUTS
 
 Outputs = dict[str, NDArray[Any]]
+# the tangential inputs of impacts, their tangential motion, and the kind of the friction law
+Friction = tuple[ObliqueImpacts, TangentialResult, str]
 InSI = Callable[[Array, Array], Array]
 
 
@@ -30,15 +34,19 @@ def outputs(
     result: CollisionResult,
     names: Iterable[str],
     checked: NDArray[np.int8] | None = None,
+    friction: Friction | None = None,
 ) -> Outputs:
     """Compute outputs of collisions by name; only what they need is computed.
 
     The result is in the contact's own units. The arrays, in SI, have shapes that broadcast to that of the impacts;
-    an impact that failed has NaN. `checked` is the status by `check_inputs`, if it is already computed.
+    an impact that failed has NaN. `checked` is the status by `check_inputs`, if it is already computed; `friction`
+    is needed for the outputs of friction.
     """
     computed: dict[str, Any] = {"law": law, "impacts": impacts, "result": result}
     if checked is not None:
         computed["checked"] = checked
+    if friction is not None:
+        computed |= dict(zip(("oblique", "tangential", "kind"), friction, strict=True))
 
     with np.errstate(all="ignore"):
         return {name: _compute(name, computed) for name in names}
@@ -63,7 +71,7 @@ def collide(
     integrator: str = EXACT,
     fixed_step: Mapping[str, Array] | None = None,
     errors: dict[str, str] | None = None,
-    names: Iterable[str] = OUTPUTS,
+    names: Iterable[str] = CENTRAL_OUTPUTS,
 ) -> Outputs:
     """Simulate impacts by a law: their `outputs`; one that fails has NaN and a status, and affects no other.
 
@@ -101,7 +109,7 @@ def _mask_if_any(mask: Mask) -> Mask | None:
 
 
 def _replace_where(
-    value: NDArray[Any], mask: Mask | None, otherwise: float | np.int32 | NDArray[Any]
+    value: NDArray[Any], mask: Mask | None, otherwise: float | np.integer[Any] | NDArray[Any]
 ) -> NDArray[Any]:
     """Replace the value by another one where the mask is True."""
     return value if mask is None else np.where(mask, otherwise, value)
@@ -175,6 +183,118 @@ def _separation_time(
     return in_si(result.contact_time + np.where(np.isinf(remaining_time), np.nan, remaining_time), impacts.time)
 
 
+# ---- outputs of friction; G is the slip in units of mu v0 m/m_t, positive before the impact
+
+
+def _friction_status(
+    tangential: TangentialResult, status: NDArray[np.int8], not_integrated: Mask | None
+) -> NDArray[np.int8]:
+    """Status of the tangential motion: that of the normal motion where it has none of its own."""
+    own = _replace_where(tangential.status, _mask_if_any(tangential.status == STATUS_OK), status)
+    return _replace_where(own, not_integrated, status)
+
+
+def _slip_after(
+    oblique: ObliqueImpacts,
+    tangential: TangentialResult,
+    kind: str,
+    friction_status: NDArray[np.int8],
+    missed: Mask | None,
+) -> Array:
+    """G1/G0: 1 where nothing changes the slip, NaN where it is not known or G0 is 0."""
+    return _slip_share(oblique, tangential.slip, tangential.sliding_impulse, kind, friction_status, missed)
+
+
+def _slip_share(
+    oblique: ObliqueImpacts,
+    slip: Array,
+    sliding_impulse: Array,
+    kind: str,
+    friction_status: NDArray[np.int8],
+    missed: Mask | None,
+) -> Array:
+    size = np.abs(oblique.G0)
+    after = np.maximum(size - sliding_impulse, 0.0) if kind == "coulomb" else slip
+    share = _replace_where(after / size, _mask_if_any(oblique.mu == 0.0), 1.0)
+    unknown = (friction_status >= FIRST_FAILURE) | (oblique.slip == 0.0)
+    if kind != "coulomb":
+        unknown = unknown | (friction_status == LIMIT)
+    return _replace_where(_replace_where(share, _mask_if_any(unknown), np.nan), missed, 1.0)
+
+
+def _impulse(oblique: ObliqueImpacts, slip_share: Array, friction_status: NDArray[np.int8]) -> Array:
+    """P [N s], 0 without a slip."""
+    impulse = oblique.m_t * oblique.slip * (1.0 - slip_share)
+    return _replace_where(impulse, _without_slip(oblique, friction_status), 0.0)
+
+
+def _without_slip(oblique: ObliqueImpacts, friction_status: NDArray[np.int8]) -> Mask | None:
+    """Impacts that have an answer and no slip before it."""
+    return _mask_if_any((oblique.slip == 0.0) & (friction_status < FIRST_FAILURE))
+
+
+def _regime(
+    oblique: ObliqueImpacts,
+    tangential: TangentialResult,
+    kind: str,
+    friction_status: NDArray[np.int8],
+    missed: Mask | None,
+) -> NDArray[np.int8]:
+    """Whether the contact sticks (1), slides (2) or does both (3); 0 where that is not defined."""
+    regime = tangential.regime
+    if kind == "coulomb":
+        regime = np.where(np.abs(oblique.G0) >= tangential.sliding_impulse, np.int8(2), np.int8(3))
+    regime = _replace_where(regime, _mask_if_any(oblique.mu == 0.0), np.int8(2))
+    regime = _replace_where(regime, _without_slip(oblique, friction_status), np.int8(1))
+    undefined = friction_status >= FIRST_FAILURE
+    return np.where(undefined if missed is None else undefined | missed, np.int8(0), regime).astype(np.int8)
+
+
+def _slip_changes(
+    oblique: ObliqueImpacts, tangential: TangentialResult, kind: str, regime: NDArray[np.int8]
+) -> NDArray[np.int32]:
+    if kind == "coulomb":
+        return np.where(regime == 3, np.int32(1), np.int32(0))
+    return np.where(regime == 0, np.int32(0), tangential.slip_changes)
+
+
+def _friction_residual(
+    oblique: ObliqueImpacts, tangential: TangentialResult, kind: str, slip_share: Array, has_works: Mask
+) -> Array:
+    """What the works leave of the loss, relative to the tangential energy before the impact."""
+    if kind == "coulomb":
+        return np.where(has_works, 0.0, np.nan)
+    works = tangential.slip_work + tangential.damping_work + tangential.memory_work + tangential.elastic_left
+    loss = 1.0 - slip_share * slip_share
+    return np.where(has_works, loss - 2.0 * works / np.square(oblique.G0), np.nan)
+
+
+def _beta_error(
+    oblique: ObliqueImpacts,
+    tangential: TangentialResult,
+    kind: str,
+    friction_status: NDArray[np.int8],
+    missed: Mask | None,
+    beta: Array,
+) -> Array:
+    exact = _slip_share(oblique, tangential.exact, tangential.exact, kind, friction_status, missed)
+    return beta + exact
+
+
+def _work(name: str) -> Callable[..., Array]:
+    """Make the formula of a work in SI, from that in units of mu^2 (m v0)^2/m_t."""
+
+    def work(
+        oblique: ObliqueImpacts, tangential: TangentialResult, kind: str, friction_loss: Array, has_works: Mask
+    ) -> Array:
+        if kind == "coulomb":
+            return np.where(has_works, friction_loss if name == "slip_work" else 0.0, np.nan)
+        unit = np.square(oblique.mu * oblique.impacts.m * oblique.impacts.v0) / oblique.m_t
+        return np.where(has_works, getattr(tangential, name) * unit, np.nan)
+
+    return work
+
+
 # formulas by the names of their values; their arguments are names of this dict, or law, impacts and result
 FORMULAS: dict[str, Callable[..., Any]] = {
     "checked": lambda law, impacts: check_inputs(law, impacts),
@@ -212,4 +332,35 @@ FORMULAS: dict[str, Callable[..., Any]] = {
     # lambda = chi K/v0 [N s/m^(n+1)]
     "lambda": lambda damping_ratio, stiffness, impacts: damping_ratio * stiffness / impacts.v0,
     "separation_time": _separation_time,
+    # of friction
+    "friction_status": _friction_status,
+    "slip_share": _slip_after,
+    "impulse": _impulse,
+    "regime": _regime,
+    # impacts with a slip, friction and a complete tangential motion
+    "has_works": lambda slip_share, oblique, missed: (
+        np.isfinite(slip_share) & (oblique.mu > 0.0) & (True if missed is None else ~missed)
+    ),
+    "u1_post": lambda oblique, impulse: oblique.u1 - impulse / oblique.impacts.m1,
+    "u2_post": lambda oblique, impulse: oblique.u2 + impulse / oblique.impacts.m2,
+    "omega1_post": lambda oblique, impulse: oblique.spin_after("1", impulse),
+    "omega2_post": lambda oblique, impulse: oblique.spin_after("2", impulse),
+    "slip_post": lambda oblique, impulse: oblique.slip - impulse / oblique.m_t,
+    "beta": lambda slip_share, missed: _replace_where(-slip_share, missed, np.nan),
+    "e_t": lambda oblique, u1_post, u2_post: np.where(
+        oblique.u1 == oblique.u2, np.nan, (u1_post - u2_post) / (oblique.u1 - oblique.u2)
+    ),
+    "rebound_angle": lambda u1_post, u2_post, e_out, impacts: np.arctan2(u1_post - u2_post, e_out * impacts.v0),
+    "impulse_ratio": lambda impulse, e_out, impacts: impulse / ((1.0 + e_out) * impacts.m * impacts.v0),
+    "friction_loss": lambda oblique, slip_post: 0.5 * oblique.m_t * (oblique.slip**2 - slip_post**2),
+    "contact_regime": lambda regime: regime,
+    "friction_residual": _friction_residual,
+    "beta_error": _beta_error,
+    "slip_work": _work("slip_work"),
+    "tangential_damping_work": _work("damping_work"),
+    "memory_work": _work("memory_work"),
+    "elastic_left": _work("elastic_left"),
+    "psi1": lambda tangential, oblique: tangential.stiffness * oblique.G0,
+    "psi2": lambda tangential, oblique, slip_share: tangential.stiffness * oblique.G0 * slip_share,
+    "slip_changes": _slip_changes,
 }

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..array_types import Array
-from ..ode.problem import N_COMPONENTS, N_INTEGRATED, Event, Params, Problem, Solution, Step, Termination
+from ..ode.problem import Event, Params, Problem, Solution, Step, Termination
 
 # the formula of the force changes where this changes its sign; NaN for no breakpoint
 Breakpoint = Callable[[Array, Params], Array]
@@ -28,14 +28,15 @@ MAX_PARTS_PER_BREAKPOINT = 8
 def in_parts(
     run: IntegratePart, problem: Problem, breakpoints: Sequence[Breakpoint], start: Array, params: Params
 ) -> Solution:
-    """Integrate a phase from components at its start, shape (2, n), in parts between its breakpoints."""
+    """Integrate a phase from components at its start, or all rows, in parts between its breakpoints."""
     if not breakpoints:
         return run(problem, start, params)
-    n = start.shape[1]
-    total = Solution.blank(n)
+    components, n = problem.n_components, start.shape[1]
+    total = Solution.blank(n, problem.n_integrated)
     total.maximum[:] = -np.inf
     total.termination[:] = Termination.MAX_STEPS
-    state = np.vstack([start, np.zeros((2, n))])
+    state = np.zeros((problem.n_integrated, n))
+    state[: len(start)] = start
     sides = np.array([np.sign(breakpoint(start, params)) for breakpoint in breakpoints])
     between = replace(problem, event=_first_event(problem, breakpoints))
     recorded: list[Step] = []
@@ -47,11 +48,11 @@ def in_parts(
         total.maximum[rows] = np.fmax(total.maximum[rows], part.maximum)
         total.steps[rows] += part.steps
         state[:, rows] = part.state
-        k = problem.rates(part.state[:N_COMPONENTS], part_params)
-        met = _reached(problem, breakpoints, part.state[:N_COMPONENTS], k, part_params)
+        k = problem.rates(part.state[:components], part_params)
+        met = _reached(problem, breakpoints, part.state[:components], k, part_params)
         at_breakpoint = (part.termination == Termination.EVENT_REACHED) & met.any(axis=0)
         sides[:, rows] = np.where(met, -sides[:, rows], sides[:, rows])
-        state[:, rows] += STEP_BEYOND * np.minimum(part.state[0], 1.0) * k[:N_INTEGRATED]
+        state[:, rows] += STEP_BEYOND * np.minimum(part.state[0], 1.0) * k[: problem.n_integrated]
         done = rows[~at_breakpoint]
         total.termination[done] = part.termination[~at_breakpoint]
         total.state[:, done] = part.state[:, ~at_breakpoint]
@@ -64,7 +65,7 @@ def in_parts(
 def _distances(breakpoints: Sequence[Breakpoint], y: Array, k: Array, params: Params) -> list[tuple[Array, Array]]:
     """Compute each breakpoint, positive on the current side by its sign, and its rate; shapes (n,)."""
     small = BREAKPOINT_RATE_STEP * np.where(y[0] > 0.0, np.minimum(y[0], 1.0), 1.0)
-    ahead = y + small * k[:N_COMPONENTS]
+    ahead = y + small * k[: len(y)]
     distances = []
     for breakpoint, side in zip(breakpoints, params[-len(breakpoints) :], strict=True):
         distance = side * breakpoint(y, params)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,10 @@ def positions(mask: NDArray[np.bool_]) -> Positions:
 class Record:
     """The base of results that have one entry per trajectory: every field is an array of shape (n,)."""
 
+    if TYPE_CHECKING:
+        # every record has it, among its own fields
+        status: NDArray[np.int8]
+
     @classmethod
     def columns(cls) -> tuple[str, ...]:
         """List the names of the arrays."""
@@ -40,6 +44,11 @@ class Record:
         arrays["status"][:] = Status.OK
         return cls(**arrays)
 
+    @classmethod
+    def row_bytes(cls) -> int:
+        """Bytes of one trajectory."""
+        return sum(array.nbytes for array in vars(cls.blank(1)).values())
+
     def put(self, rows: Positions | NDArray[np.bool_], part: Self) -> None:
         """Write the arrays of a part to its positions."""
         for name in self.columns():
@@ -51,7 +60,7 @@ class Record:
         if parts and isinstance(parts[0][0], slice):
             return parts[0][1]
         result = cls.blank(n)
-        vars(result)["status"][:] = status
+        result.status[:] = status
         for rows, part in parts:
             result.put(rows, part)
         return result

@@ -101,4 +101,4 @@ class ObliqueImpacts:
 
 def _rim(radius: Array, omega: Array) -> Array:
     """R omega; 0 where nothing turns, also for a plane or an unknown radius."""
-    return np.where(omega == 0.0, 0.0, radius * omega)
+    return np.where(omega == 0.0, 0.0, radius) * omega

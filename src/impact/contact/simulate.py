@@ -8,9 +8,10 @@ indentation or zero force, as the law declares. For the coordinates see `impact.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,8 +74,9 @@ class CollisionResult(Record):
     exact: Array
 
 
-# integrates impacts with the same n: the model, n, the values and the number of impacts, and `collapse`
-SimulatePart = Callable[..., CollisionResult]
+# simulates impacts with the same n: n, the values and the number of impacts, and `collapse`
+T = TypeVar("T", bound=Record)
+SimulatePart = Callable[..., T]
 # columns of the trajectory table
 TABLE_COLUMNS = CollisionResult.columns()
 
@@ -115,26 +117,40 @@ def simulate(
         of `STEPS_PER_CONTACT` and `STEP`
     status : by `check_inputs`, shape (k,); impacts that are not OK are not integrated
     """
-    parts: list[tuple[Positions, CollisionResult]] = []
     integrate_both = partial(integrate_phases, rtol=rtol, max_steps=max_steps, core=core)
-    simulate_part: SimulatePart = partial(_simulate_distinct, integrate_both=integrate_both)
+    simulate_part: SimulatePart[CollisionResult] = partial(
+        _simulate_distinct, model, integrate_both=integrate_both
+    )
     if integrator != EXACT:
         collide_part = partial(
-            _collide_at_fixed_steps, scheme=integrator, integrate_both=integrate_both, max_steps=max_steps
+            _collide_at_fixed_steps, model, scheme=integrator, integrate_both=integrate_both, max_steps=max_steps
         )
         simulate_part = partial(_simulate_fixed_steps, collide_part=collide_part)
+    return simulate_parts(CollisionResult, model.key, n, values, status, simulate_part, collapse, errors)
+
+
+def simulate_parts(
+    record: type[T],
+    key: str,
+    n: Array,
+    values: ValueArrays,
+    status: NDArray[np.int8],
+    simulate_part: SimulatePart[T],
+    collapse: bool,
+    errors: dict[str, str] | None,
+) -> T:
+    """Simulate the impacts with status OK, those with the same n together; one that fails affects no other."""
+    parts: list[tuple[Positions, T]] = []
     errors = {} if errors is None else errors
     with np.errstate(all="ignore"):
         for exponent in distinct_values(n):
             chosen = (status == STATUS_OK) & (n == exponent)
             count, rows = int(np.count_nonzero(chosen)), positions(chosen)
             if count:
-                chosen_values = _values_at(values, rows)
-                part = _isolate_failures(
-                    model, float(exponent), chosen_values, count, simulate_part, collapse, errors
-                )
+                part_of_n = partial(simulate_part, float(exponent))
+                part = _isolate_failures(record, key, _values_at(values, rows), count, part_of_n, collapse, errors)
                 parts.append((rows, part))
-    return CollisionResult.joined(n.size, status, parts)
+    return record.joined(n.size, status, parts)
 
 
 def _values_at(values: ValueArrays, rows: Positions) -> ValueArrays:
@@ -142,14 +158,14 @@ def _values_at(values: ValueArrays, rows: Positions) -> ValueArrays:
 
 
 def _isolate_failures(
-    model: ForceModel,
-    n: float,
+    record: type[T],
+    key: str,
     values: ValueArrays,
     count: int,
-    simulate_part: SimulatePart,
+    simulate_part: Callable[..., T],
     collapse: bool,
     errors: dict[str, str],
-) -> CollisionResult:
+) -> T:
     """Simulate impacts with the same n; those for which the law raises an error have the status MODEL_ERROR.
 
     After an error both halves are tried again, so that only the impacts that cause it fail. A single impact is
@@ -158,17 +174,17 @@ def _isolate_failures(
     try:
         if count == 1:
             twice = _values_at(values, np.array([0, 0]))
-            return simulate_part(model, n, twice, 2, collapse=False).take(np.array([0]))
-        return simulate_part(model, n, values, count, collapse=collapse)
+            return simulate_part(twice, 2, collapse=False).take(np.array([0]))
+        return simulate_part(values, count, collapse=collapse)
     except ModelError as error:
-        result = CollisionResult.blank(count)
+        result = record.blank(count)
         if count == 1:
-            result.status[:] = Status.MODEL_ERROR
-            errors.setdefault(*describe_error(model.key, error))
+            vars(result)["status"][:] = Status.MODEL_ERROR
+            errors.setdefault(*describe_error(key, error))
             return result
         for half in np.array_split(np.arange(count), 2):
             part = _isolate_failures(
-                model, n, _values_at(values, half), half.size, simulate_part, collapse, errors
+                record, key, _values_at(values, half), half.size, simulate_part, collapse, errors
             )
             result.put(half, part)
         return result
@@ -185,23 +201,16 @@ def _simulate_distinct(
 ) -> CollisionResult:
     """Integrate each distinct dimensionless problem once, those with strong damping in their own coordinate."""
     law_values = with_coefficients(model, with_units(values, n), count)
-    status = _check_coefficients(model, law_values, values, count)
+    status = check_coefficients(model, law_values, values, count)
     exact, chi = exact_restitution(model, law_values, count), chi_of(law_values, count)
-    strong = is_strong(model, law_values, count)
-    parts: list[tuple[Positions, CollisionResult]] = []
-    for is_strongly_damped in (False, True):
-        chosen = (status == STATUS_OK) & (strong == is_strongly_damped)
-        size = int(np.count_nonzero(chosen))
-        if not size:
-            continue
-        rows = positions(chosen)
-        law = motion.MotionLaw.of(model, n, is_strongly_damped)
-        params = tuple(np.asarray(law_values[name])[rows] for name in law.names)
-        first, row_of_impact = deduplicate(params, (size,)) if collapse else (slice(None), slice(None))
-        never_separates = exact[rows][first] == 0.0
-        distinct_params = tuple(column[first] for column in params)
-        collision = integrate_both(law, distinct_params, never_separates.size, never_separates=never_separates)
-        parts.append((rows, collision.result.take(row_of_impact)))
+
+    def integrate_distinct(problems: DistinctProblems) -> CollisionResult:
+        never_separates = exact[problems.rows][problems.first] == 0.0
+        size = never_separates.size
+        return integrate_both(problems.law, problems.params, size, never_separates=never_separates).result
+
+    problems = distinct_problems(model, n, law_values, status == STATUS_OK, collapse)
+    parts = [(part.rows, integrate_distinct(part).take(part.row_of_impact)) for part in problems]
     result = replace(CollisionResult.joined(count, status, parts), chi=chi, exact=exact)
     stopped = status == LIMIT
     if stopped.any():
@@ -210,22 +219,64 @@ def _simulate_distinct(
     return result
 
 
-def _simulate_fixed_steps(
+@dataclass(frozen=True)
+class DistinctProblems:
+    """The distinct problems of impacts at `rows`: their law, and params and further columns of each.
+
+    `first` are the positions among the rows of the first impact of each problem, and `row_of_impact` is the number
+    of the problem of each row.
+    """
+
+    law: motion.MotionLaw
+    rows: Positions
+    first: Positions
+    row_of_impact: Positions
+    params: Params
+    columns: Params
+
+
+def distinct_problems(
     model: ForceModel,
+    n: float,
+    law_values: LawValues,
+    chosen: NDArray[np.bool_],
+    collapse: bool,
+    columns: Params = (),
+) -> Iterator[DistinctProblems]:
+    """Find the distinct problems of the chosen impacts: those in the velocity, then those with strong damping.
+
+    `columns` are further arrays of shape (count,) in which distinct problems may differ.
+    """
+    strong = is_strong(model, law_values, chosen.size)
+    for is_strongly_damped in (False, True):
+        part = chosen & (strong == is_strongly_damped)
+        size = int(np.count_nonzero(part))
+        if not size:
+            continue
+        rows = positions(part)
+        law = motion.MotionLaw.of(model, n, is_strongly_damped)
+        params = tuple(np.asarray(law_values[name])[rows] for name in law.names)
+        others = tuple(column[rows] for column in columns)
+        first, row_of_impact = deduplicate((*params, *others), (size,)) if collapse else (slice(None), slice(None))
+        distinct_params, distinct_others = (tuple(column[first] for column in part) for part in (params, others))
+        yield DistinctProblems(law, rows, first, row_of_impact, distinct_params, distinct_others)
+
+
+def _simulate_fixed_steps(
     n: float,
     values: ValueArrays,
     count: int,
     *,
-    collide_part: SimulatePart,
+    collide_part: SimulatePart[CollisionResult],
     collapse: bool,
 ) -> CollisionResult:
     """Integrate each distinct dimensionless problem at its fixed step once."""
     if collapse:
         first, row_of_impact = deduplicate([values[name] for name in sorted(values)], (count,))
         if first.size < count:
-            distinct = collide_part(model, n, _values_at(values, first), first.size, collapse=collapse)
+            distinct = collide_part(n, _values_at(values, first), first.size, collapse=collapse)
             return distinct.take(row_of_impact)
-    return collide_part(model, n, values, count, collapse=collapse)
+    return collide_part(n, values, count, collapse=collapse)
 
 
 def _collide_at_fixed_steps(
@@ -251,7 +302,7 @@ def _collide_at_fixed_steps(
         return continuous.contact_time, np.where(never_ends, np.int8(Status.NOT_SEPARATED), continuous.status)
 
     law_values = with_coefficients(model, with_units(of_law, n), count)
-    status = _check_coefficients(model, law_values, of_law, count)
+    status = check_coefficients(model, law_values, of_law, count)
     status[status == LIMIT] = Status.OK
     if STEPS_PER_CONTACT in values:
         times, status = contact_times(slice(None), count)
@@ -304,7 +355,7 @@ def _put_fixed_steps(
     result.contact_time[rows] = fixed.steps * step
 
 
-def _check_coefficients(
+def check_coefficients(
     model: ForceModel, law_values: LawValues, values: ValueArrays, count: int
 ) -> NDArray[np.int8]:
     """Compute the status of impacts by the coefficients of their law, before integration; shape (count,)."""
@@ -346,64 +397,103 @@ def integrate_phases(
     run = partial(integrate, rtol=rtol, max_steps=max_steps, record=record, workspace=workspace)
 
     def solve(
-        form: dispatch.Form | None,
-        law: motion.MotionLaw,
-        problem: Problem,
-        start: Array,
-        params: Params,
-        residual: Array | None = None,
+        law: motion.MotionLaw, problem: Problem, start: Array, params: Params, recovery: Recovery | None
     ) -> Solution:
+        form = forms[0 if recovery is None else 1]
         if form is not None:
             return dispatch.integrate_compiled(form, law, problem, start, params, rtol=rtol, max_steps=max_steps)
+        residual = None if recovery is None else recovery.residual
         params, breakpoints = motion.breakpoints(law, params, start, residual)
         return in_parts(run, problem, breakpoints, start, params)
 
-    approach = solve(forms[0], law, motion.approach_problem(law), motion.start_of_approach(law, params, n), params)
-    peak = motion.indentation(law, approach.state[0])
-    at_peak = motion.force_at_peak(law, approach.state[0], params)
-    residual, recovered, params = motion.unloading_state(law, params, peak, at_peak)
-    unknown = np.full(n, np.nan)
+    phases = solve_phases(law, params, n, solve, never_separates)
+    approach, restitution, rows = phases.approach, phases.restitution, phases.rows
     result = CollisionResult(
-        e_out=unknown.copy(),
-        peak=peak,
-        permanent=residual.copy(),
-        force=np.maximum(approach.maximum, at_peak),
+        e_out=phases.e_out,
+        peak=phases.peak,
+        permanent=phases.residual.copy(),
+        force=np.maximum(approach.maximum, phases.force_at_peak),
         contact_time=approach.state[2].copy(),
         approach_work=2.0 * approach.state[3],
         restitution_work=np.zeros(n),
         steps=approach.steps.copy(),
-        status=_status_of_solution(approach),
-        chi=unknown,
-        exact=unknown,
+        status=phases.status,
+        chi=np.full(n, np.nan),
+        exact=np.full(n, np.nan),
     )
+    if restitution is not None:
+        # balls that are held, or separate at zero speed after infinite time, lose all their energy
+        at_limit = phases.status[rows] == LIMIT
+        result.contact_time[rows] += restitution.state[2]
+        result.restitution_work[rows] = np.where(at_limit, 0.0, 2.0 * restitution.state[3])
+        result.steps[rows] += restitution.steps
+        if law.model.release == "force":
+            result.permanent[rows] += motion.indentation(law, restitution.state[0])
+    return RecordedCollision(result, approach, restitution, phases.params)
 
+
+@dataclass(frozen=True)
+class Recovery:
+    """What the restitution phase begins with, for the impacts at `rows` that enter it."""
+
+    rows: Positions
+    residual: Array
+
+
+@dataclass(frozen=True)
+class Phases:
+    """The solutions of both phases; `rows` are the impacts that enter restitution, and `params` theirs."""
+
+    approach: Solution
+    restitution: Solution | None
+    rows: Positions
+    params: Params
+    peak: Array
+    force_at_peak: Array
+    residual: Array
+    e_out: Array
+    status: NDArray[np.int8]
+
+
+# integrates a phase: its law, problem, start, params and, on restitution, the Recovery
+SolvePhase = Callable[[motion.MotionLaw, Problem, Array, Params, Recovery | None], Solution]
+
+
+def solve_phases(
+    law: motion.MotionLaw,
+    params: Params,
+    n: int,
+    solve: SolvePhase,
+    never_separates: NDArray[np.bool_] | bool = False,
+) -> Phases:
+    """Solve approach and restitution of n impacts, see `integrate_phases`."""
+    back = motion.restitution_law(law)
+    approach = solve(law, motion.approach_problem(law), motion.start_of_approach(law, params, n), params, None)
+    peak = motion.indentation(law, approach.state[0])
+    at_peak = motion.force_at_peak(law, approach.state[0], params)
+    residual, recovered, params = motion.unloading_state(law, params, peak, at_peak)
+    e_out, status = np.full(n, np.nan), _status_of_solution(approach)
     # without a recovered indentation the balls stay at their peak
-    stays = (result.status == STATUS_OK) & (recovered <= 0.0)
+    stays = (status == STATUS_OK) & (recovered <= 0.0)
     if stays.any():
-        result.status[stays], result.e_out[stays] = LIMIT, 0.0
+        status[stays], e_out[stays] = LIMIT, 0.0
 
-    rows = positions(result.status == STATUS_OK)
+    rows = positions(status == STATUS_OK)
     params, recovered = tuple(column[rows] for column in params), recovered[rows]
-    if not recovered.size:
-        return RecordedCollision(result, approach, None, params)
-    start = motion.start_of_restitution(back, params, recovered)
-    restitution = solve(forms[1], back, motion.restitution_problem(back), start, params, residual[rows])
-    _mark_never_separating(back, restitution, params, recovered)
-    e_out, work = -back.velocity(restitution.state, params), 2.0 * restitution.state[3]
-    status = _status_of_solution(restitution)
-    # the balls are held, or separate at zero speed after infinite time: all their energy is lost
-    at_limit = restitution.termination == Termination.EVENT_UNREACHABLE
-    if at_limit.any():
-        at_limit &= motion.may_be_overdamped(back.model) | np.broadcast_to(never_separates, n)[rows]
-        e_out[at_limit], work[at_limit], status[at_limit] = 0.0, 0.0, LIMIT
-    result.e_out[rows] = e_out
-    result.contact_time[rows] += restitution.state[2]
-    result.restitution_work[rows] = work
-    result.steps[rows] += restitution.steps
-    result.status[rows] = status
-    if law.model.release == "force":
-        result.permanent[rows] += motion.indentation(law, restitution.state[0])
-    return RecordedCollision(result, approach, restitution, params)
+    restitution = None
+    if recovered.size:
+        start = motion.start_of_restitution(back, params, recovered)
+        recovery = Recovery(rows, residual[rows])
+        restitution = solve(back, motion.restitution_problem(back), start, params, recovery)
+        _mark_never_separating(back, restitution, params, recovered)
+        velocity, ended = -back.velocity(restitution.state, params), _status_of_solution(restitution)
+        # the balls are held, or separate at zero speed after infinite time
+        at_limit = restitution.termination == Termination.EVENT_UNREACHABLE
+        if at_limit.any():
+            at_limit &= motion.may_be_overdamped(back.model) | np.broadcast_to(never_separates, n)[rows]
+            velocity[at_limit], ended[at_limit] = 0.0, LIMIT
+        e_out[rows], status[rows] = velocity, ended
+    return Phases(approach, restitution, rows, params, peak, at_peak, residual, e_out, status)
 
 
 def _mark_never_separating(law: motion.MotionLaw, solution: Solution, params: Params, recovered: Array) -> None:

@@ -1,22 +1,53 @@
-"""The tangential motion of a contact: the slip under friction, integrated together with the normal motion.
+"""Tangential trajectories: the slip of impacts under friction, each distinct problem integrated once.
 
 In the contact's own units, with G = (m_t/m) g/(mu v0) and phi = f/mu, the slip obeys G' = -phi, whatever mu, angle
-and inertia are: they enter by the slip at first contact, G0, alone.
+and inertia are: they enter by the slip at first contact, G0, alone. Normal motion and slip are integrated
+together, see `impact.contact.slip_motion`.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..array_types import Array
-from .formula_calls import Formula
+from ..ode.problem import Params, Problem, Solution
+from ..ode.rk45 import integrate
+from . import motion
+from .dimensionless import with_coefficients, with_units
+from .formula_calls import argument_names
+from .model import ForceModel
+from .piecewise import in_parts
 from .records import Record
+from .simulate import (
+    DistinctProblems,
+    Recovery,
+    ValueArrays,
+    check_coefficients,
+    distinct_problems,
+    simulate_parts,
+    solve_phases,
+)
+from .slip_motion import (
+    DAMPING_ROW,
+    MEMORY_ROW,
+    ORDER_TOLERANCE,
+    SLIP_ROW,
+    SLIP_WORK_ROW,
+    TIME_ROW,
+    Columns,
+    FrictionKind,
+    SlipPhase,
+    TangentialForm,
+    Track,
+)
+from .status import LIMIT, STATUS_OK, FrictionStatus, Status
 
-FrictionKind = Literal["coulomb", "spring", "dashpot", "regularized"]
+__all__ = ["FrictionKind", "TangentialForm", "TangentialResult", "simulate_friction"]
 
 # names of the values of a tangential problem, which no value of a law has: the size of the slip at first contact,
 # stiffness and damping of the tangential spring per power of x, 1 where only a pressing force limits friction, and
@@ -25,29 +56,8 @@ PREFIX = "friction."
 SLIP, TANGENTIAL_STIFFNESS, TANGENTIAL_DAMPING, LIMIT_POSITIVE, SLIP_SCALE = (
     f"{PREFIX}{name}" for name in ("G0", "k", "c", "positive", "slip_scale")
 )
-
-
-@dataclass(frozen=True)
-class TangentialForm:
-    """What all tangential trajectories of a pair at one exponent n have in common.
-
-    Parameters
-    ----------
-    kind : see `impact.contact.friction.FrictionLaw`
-    stiffness_power, damping_power : powers of x in the tangential stiffness k x^kp and damping c x^q
-    memory : r on loading and on unloading; while the contact grows or shrinks, 0 keeps the force, 1 the
-        displacement
-    cap : what mu N limits, the "total" force, or that of the "spring" alone
-    coefficient : of kind "regularized": the coefficient of friction over mu as a formula of y, which is
-        `SLIP_SCALE` abs(G), and of other values of the problem, by their names without `PREFIX`
-    """
-
-    kind: FrictionKind
-    stiffness_power: float = 0.0
-    damping_power: float = 0.0
-    memory: tuple[float, float] = (0.0, 0.0)
-    cap: Literal["total", "spring"] = "total"
-    coefficient: Formula | None = None
+# contact regimes, 0 where they are not defined
+STICKS, SLIDES, BOTH = 1, 2, 3
 
 
 @dataclass(frozen=True)
@@ -55,8 +65,9 @@ class TangentialResult(Record):
     """Tangential trajectories, in the contact's own units; arrays of shape (n,).
 
     `slip` is G at the end for a positive G0; works are in units of mu^2 (m v0)^2/m_t; `sliding_impulse` is the
-    integral of the limiting normal force, Lambda; `exact` is `slip` in closed form, NaN without one. For the kind
-    "coulomb" there is only `sliding_impulse`, and the slip follows from it.
+    integral of the limiting normal force, Lambda; `exact` is `slip` in closed form, NaN without one; `stiffness`
+    is kappa', NaN for a kind without a spring. For the kind "coulomb" there is only `sliding_impulse`, and the
+    slip follows from it.
     """
 
     slip: Array
@@ -68,5 +79,179 @@ class TangentialResult(Record):
     regime: NDArray[np.int8]
     slip_changes: NDArray[np.int32]
     exact: Array
+    stiffness: Array
     steps: NDArray[np.int32]
     status: NDArray[np.int8]
+
+
+class PairOfLaws(Protocol):
+    """What a trajectory needs of a `impact.contact.friction.Pair`."""
+
+    @property
+    def model(self) -> ForceModel: ...
+    @property
+    def key(self) -> str: ...
+    def form(self, n: float) -> TangentialForm: ...
+
+
+def simulate_friction(
+    pair: PairOfLaws,
+    n: Array,
+    values: ValueArrays,
+    status: NDArray[np.int8],
+    *,
+    rtol: float,
+    max_steps: int,
+    collapse: bool = True,
+    core: str = "numpy",
+    errors: dict[str, str] | None = None,
+) -> TangentialResult:
+    """Integrate the slip of impacts by a pair of laws; one that fails has a status, and affects no other.
+
+    Parameters
+    ----------
+    n : compliance exponents, shape (k,)
+    values : `dimensionless_values` of the impacts by the normal law, and `friction_values`, each of shape (k,)
+    status : `FrictionStatus` by `check_inputs` and `check_friction`, shape (k,); impacts that are not OK are not
+        integrated, nor are those without slip, or without friction, whose G0 is 0 or infinite
+    core : "numpy"; another core, which only integrates normal motions, is not used
+
+    Raises
+    ------
+    ModelError : of the errors of a law, only what is raised outside its formulas
+    """
+    simulate_part = partial(_simulate_distinct, pair, rtol=rtol, max_steps=max_steps)
+    return simulate_parts(TangentialResult, pair.key, n, values, status, simulate_part, collapse, errors)
+
+
+def _simulate_distinct(
+    pair: PairOfLaws,
+    n: float,
+    values: ValueArrays,
+    count: int,
+    *,
+    rtol: float,
+    max_steps: int,
+    collapse: bool,
+) -> TangentialResult:
+    """Integrate each distinct dimensionless problem once."""
+    model, form = pair.model, pair.form(n)
+    law_values = with_coefficients(model, with_units(values, n), count)
+    status = check_coefficients(model, law_values, values, count)
+    zero = np.zeros(count)
+    slip = np.ones(count) if form.kind == "coulomb" else np.abs(values[SLIP])
+    stiffness, damping = values.get(TANGENTIAL_STIFFNESS, zero), values.get(TANGENTIAL_DAMPING, zero)
+    is_positive = values.get(LIMIT_POSITIVE, zero)
+    is_trivial = (slip == 0.0) | ~np.isfinite(slip)
+    for array in (stiffness, damping):
+        status[(status == STATUS_OK) & ~is_trivial & ~np.isfinite(array)] = Status.OUT_OF_RANGE
+    names = _coefficient_arguments(form)
+    coefficient = (
+        (values[SLIP_SCALE] * slip, *(values[PREFIX + name] for name in names)) if form.coefficient else ()
+    )
+    columns = (slip, stiffness, damping, is_positive, *coefficient)
+    chosen = (status == STATUS_OK) & ~is_trivial
+    parts = [
+        (problems.rows, _integrate(form, problems, rtol, max_steps).take(problems.row_of_impact))
+        for problems in distinct_problems(model, n, law_values, chosen, collapse, columns)
+    ]
+    result = TangentialResult.joined(count, status, parts)
+    if form.kind == "coulomb":
+        # with infinite damping the balls stop at first contact
+        result.sliding_impulse[status == LIMIT] = 1.0
+    return result
+
+
+def _coefficient_arguments(form: TangentialForm) -> tuple[str, ...]:
+    """Name the arguments of the coefficient of friction besides y."""
+    return tuple(name for name in argument_names(form.coefficient) if name != "y")
+
+
+def _integrate(form: TangentialForm, problems: DistinctProblems, rtol: float, max_steps: int) -> TangentialResult:
+    """Integrate distinct problems through both phases."""
+    law = problems.law
+    slip, stiffness, damping, is_positive, *coefficient = (np.array(column, float) for column in problems.columns)
+    n, names = slip.size, _coefficient_arguments(form)
+    track = Track.of(n)
+    unset = np.zeros(n)
+    base = Columns(*(unset,) * 7, np.arange(n, dtype=float), np.sqrt(stiffness), damping, slip, is_positive)
+    states: list[Array] = []
+
+    def solve(
+        law: motion.MotionLaw, problem: Problem, start: Array, params: Params, recovery: Recovery | None
+    ) -> Solution:
+        if recovery is None:
+            columns, rows = (*base, *coefficient), np.vstack([start, np.ones(n), np.zeros(n)])
+        else:
+            columns = tuple(column[recovery.rows] for column in (*base, *coefficient))
+            rows = np.vstack([start, states[0][2:, recovery.rows]])
+        residual = None if recovery is None else recovery.residual
+        params, breakpoints = motion.breakpoints(law, params, rows, residual)
+        phase = SlipPhase(form, law, problem, len(params), form.memory[recovery is not None], track, names)
+
+        def run(problem: Problem, start: Array, params: Params) -> Solution:
+            y, params = phase.begin(start, params)
+            solution = integrate(problem, y, params, rtol=rtol, max_steps=max_steps)
+            phase.finish(solution.state, params)
+            return solution
+
+        solution = in_parts(run, phase.problem(), breakpoints, rows, (*params, *columns))
+        states.append(solution.state)
+        return solution
+
+    phases = solve_phases(law, problems.params, n, solve)
+    state, steps = states[0].copy(), phases.approach.steps.copy()
+    if phases.restitution is not None:
+        state[:, phases.rows] = states[1]
+        steps[phases.rows] += phases.restitution.steps
+    if law.model.release == "gap":
+        track.touches[:] |= np.abs(track.mode) == 1.0
+    result = _result(form, base, track, state)
+    status = phases.status.copy()
+    # at a limit the balls stop, sooner or later
+    stopped = status == LIMIT
+    press = base.changed(track.mode, track.sign).press
+    result.sliding_impulse[stopped] = (track.impulse + press * track.v)[stopped]
+    if form.kind == "coulomb":
+        status[stopped] = LIMIT
+    status[(status == STATUS_OK) & track.is_slow] = FrictionStatus.SLOW_LIMIT
+    return replace(result, steps=steps, status=status)
+
+
+def _result(form: TangentialForm, base: Columns, track: Track, state: Array) -> TangentialResult:
+    """Compute what trajectories come to from their last rows, NaN where they have not ended."""
+    scale, G0 = base.G0 * base.G0, base.G0
+    mode, kinetic = np.abs(track.mode), 0.5 * state[SLIP_ROW] ** 2
+    left = track.energy + state[MEMORY_ROW]
+    slip_work = state[SLIP_WORK_ROW] + track.slip_work - np.where(mode == 1.0, left, 0.0)
+    memory_work = state[MEMORY_ROW]
+    # where N vanishes so slowly with x that both works of a slip at x = 0 are infinite, their sum is the slip work
+    slip_memory = track.slip_memory + np.where(mode == 1.0, memory_work, 0.0)
+    moved = np.where(
+        track.touches & (2.0 * track.order < form.stiffness_power + ORDER_TOLERANCE), slip_memory, 0.0
+    )
+    damping_work = state[DAMPING_ROW] + track.damping_work - np.where(mode == 2.0, kinetic + left, 0.0)
+    ended = np.isfinite(state[SLIP_ROW])
+    nan = np.full(ended.size, np.nan)
+    result = replace(TangentialResult.blank(ended.size), sliding_impulse=np.where(ended, track.impulse, np.nan))
+    if form.kind == "coulomb":
+        return result
+    regime = np.where(track.modes == 1, STICKS, np.where(track.modes & 1, BOTH, SLIDES))
+    if form.kind == "regularized":
+        regime = np.zeros_like(regime)
+    exact = np.where(regime == SLIDES, G0 - track.signed, nan)
+    if form.kind == "spring" and form.stiffness_power == 0.0:
+        swing = G0 * np.cos(base.root * state[TIME_ROW])
+        exact = np.where((regime == STICKS) & (base.damping == 0.0), swing, exact)
+    return replace(
+        result,
+        slip=G0 * state[SLIP_ROW],
+        slip_work=scale * (slip_work + moved),
+        damping_work=scale * damping_work,
+        memory_work=scale * (memory_work - moved),
+        elastic_left=scale * np.where(ended, track.energy, np.nan),
+        regime=np.where(ended, regime, 0).astype(np.int8),
+        slip_changes=np.where(ended, track.changes, 0).astype(np.int32),
+        exact=np.where(ended, exact, np.nan),
+        stiffness=base.root**2 if form.kind == "spring" else nan,
+    )

@@ -23,6 +23,7 @@ class Dimension(NamedTuple):
 
 UNIT_DIMENSIONS = {
     "1": Dimension(0, 0, 0),
+    "rad": Dimension(0, 0, 0),
     "kg": Dimension(1, 0, 0),
     "m": Dimension(0, 1, 0),
     "s": Dimension(0, 0, 1),

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-from .status import Status
+from .status import FrictionStatus, Status
 
 # stands for the swept axes among the dimensions of a variable
 AXES = "axes"
@@ -20,6 +20,10 @@ Scale = Literal[
     "the peak",
     "itself",
     "m v0^2/2",
+    # of oblique impacts: v0 + |g0|, (v0 + |g0|)/R, m (v0^2 + g0^2)/2
+    "the slip",
+    "the spin",
+    "m (v0^2 + g0^2)/2",
     "bounded by 10 rtol",
     "exact",
     "reported",
@@ -72,6 +76,16 @@ class Variable:
         return "model" in self.dims
 
     @property
+    def of_friction(self) -> bool:
+        """Whether it depends on the friction law; a result without frictions lacks it."""
+        return "friction" in self.dims
+
+    @property
+    def status(self) -> str:
+        """The variable that explains where it is NaN."""
+        return "friction_status" if self.of_friction else "status"
+
+    @property
     def has_tolerance(self) -> bool:
         """Whether its values may differ within a tolerance and are judged."""
         return self.scale not in ("exact", "reported")
@@ -88,7 +102,7 @@ def by_name(*variables: Variable) -> dict[str, Variable]:
     return {variable.name: variable for variable in variables}
 
 
-_POINTS, _TIMES = ("model", AXES), ("t",)
+_POINTS, _PAIRS, _TIMES = ("model", AXES), ("model", "friction", AXES), ("t",)
 
 # outputs of a collision, in the order of a file
 OUTPUTS = by_name(
@@ -145,8 +159,62 @@ OUTPUTS = by_name(
              _POINTS, "N s/m^(n+1)", "itself", "λ = χ K/v0  (18)", may_be_nan=True, on_request=True),
     Variable("separation_time", "time until the surfaces separate", _POINTS, "s", "itself",
              "contact_time + remaining indentation/(e_out v0)", measured="positive", on_request=True),
+    Variable("u1_post", "tangential velocity of ball 1 after the impact", _PAIRS, "m/s", "the slip",
+             "u1+ = u1 - P/m1", symbol="u_1^+", measured="any"),
+    Variable("u2_post", "tangential velocity of ball 2 after the impact", _PAIRS, "m/s", "the slip",
+             "u2+ = u2 + P/m2", symbol="u_2^+", measured="any"),
+    Variable("omega1_post", "spin of ball 1 after the impact", _PAIRS, "rad/s", "the spin",
+             "omega1+ = omega1 - R1 P/I1", symbol=r"\omega_1^+", measured="any", may_be_nan=True),
+    Variable("omega2_post", "spin of ball 2 after the impact", _PAIRS, "rad/s", "the spin",
+             "omega2+ = omega2 - R2 P/I2", symbol=r"\omega_2^+", measured="any", may_be_nan=True),
+    Variable("slip_post", "slip speed of the contact points after the impact", _PAIRS, "m/s", "the slip",
+             "g1 = g0 - P/m_t", symbol="g_1", measured="any"),
+    Variable("beta", "tangential restitution of the contact points: -1 without friction, 0 sticks, 1 reverses",
+             _PAIRS, "1", "1", "-g1/g0", symbol=r"\beta", measured="any", may_be_nan=True),
+    Variable("e_t", "tangential restitution of the centres", _PAIRS, "1", "1",
+             "(u1+ - u2+)/(u1 - u2)", symbol="e_t", measured="any", may_be_nan=True),
+    Variable("rebound_angle", "angle of the rebound from the normal", _PAIRS, "rad", "1",
+             "atan2(u1+ - u2+, e_out v0)", symbol=r"\theta^+", measured="any"),
+    Variable("impulse_ratio", "tangential over normal impulse", _PAIRS, "1", "1",
+             "P/((1 + e_out) m v0)", symbol="P/P_n", measured="any"),
+    Variable("friction_loss", "energy lost to the tangential motion; negative where a law makes energy", _PAIRS,
+             "J", "m (v0^2 + g0^2)/2", "m_t (g0² - g1²)/2", measured="any"),
+    Variable("contact_regime", "whether the contact sticks, slides or does both", _PAIRS, "1", "exact",
+             "see flag_meanings", dtype="i1",
+             flags={"not_defined": 0, "sticks_throughout": 1, "slides_throughout": 2, "sticks_and_slides": 3}),
+    Variable("friction_residual", "residual of the tangential work balance", _PAIRS, "1", "bounded by 10 rtol",
+             "(friction_loss - works)/(m_t g0²/2)", may_be_nan=True),
+    Variable("beta_error", "distance of beta from the closed form, where one exists", _PAIRS, "1",
+             "bounded by 10 rtol", "beta - exact beta", may_be_nan=True),
+    Variable("friction_status", "outcome of the tangential motion", _PAIRS, "1", "exact", "see flag_meanings",
+             dtype="i1", flags={status.name.lower(): int(status) for status in FrictionStatus}),
+    Variable("slip_work", "work of friction while sliding", _PAIRS, "J", "m (v0^2 + g0^2)/2",
+             may_be_nan=True, on_request=True),
+    Variable("tangential_damping_work", "work of the tangential dashpot", _PAIRS, "J", "m (v0^2 + g0^2)/2",
+             may_be_nan=True, on_request=True),
+    Variable("memory_work", "energy that the spring loses as the contact changes; negative where it gains", _PAIRS,
+             "J", "m (v0^2 + g0^2)/2", "∫ (1/2 - r) f_e² k'/k² dt", may_be_nan=True, on_request=True),
+    Variable("elastic_left", "energy in the tangential spring at the release, which is lost", _PAIRS, "J",
+             "m (v0^2 + g0^2)/2", "f_e²/(2 k)", may_be_nan=True, on_request=True),
+    Variable("psi1", "slip before the impact in units of Maw, Barber and Fawcett", _PAIRS, "1", "1",
+             "(kappa/mu) g0/v0", symbol=r"\psi_1", may_be_nan=True, on_request=True),
+    Variable("psi2", "slip after the impact in units of Maw, Barber and Fawcett", _PAIRS, "1", "1",
+             "(kappa/mu) g1/v0", symbol=r"\psi_2", may_be_nan=True, on_request=True),
+    Variable("slip_changes", "changes between sticking and sliding", _PAIRS, "1", "exact",
+             dtype="i4", on_request=True),
 )  # fmt: skip
-BY_DEFAULT = tuple(name for name, variable in OUTPUTS.items() if not variable.on_request)
+
+
+def default_variables(of_friction: bool) -> tuple[str, ...]:
+    """List the variables that a result has by default, with or without those of friction."""
+    return tuple(
+        name
+        for name, variable in OUTPUTS.items()
+        if not variable.on_request and (of_friction or not variable.of_friction)
+    )
+
+
+CENTRAL_OUTPUTS = tuple(name for name, variable in OUTPUTS.items() if not variable.of_friction)
 
 # a time history, over the time since first contact
 HISTORY = by_name(

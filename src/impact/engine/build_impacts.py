@@ -10,9 +10,11 @@ import numpy as np
 
 from ..array_types import Array
 from ..contact.formula_calls import argument_names, call_by_name
+from ..contact.friction import FrictionLaw
 from ..contact.impacts import Impacts, stiffness as hertz_or_secant
 from ..contact.materials import effective_mass, hertz_stiffness, sphere_mass, sphere_radius
 from ..contact.model import Law
+from ..contact.rigid import ObliqueImpacts
 from ..contact.simulate import PHASE, STEP, STEPS_PER_CONTACT
 from ..errors import ModelError
 from .inputs import Index, Inputs, dimensions
@@ -40,7 +42,7 @@ def build_impacts(inputs: Inputs, model: Law, index: Index, stiffness: Stiffness
     def of_material(ball: str, key: str) -> Array:
         return property_at(inputs, ball, key, index)
 
-    v1, v2 = value("v1"), value("v2")
+    v1, v2 = (velocity_at(inputs, ball, index) for ball in "12")
     m1, m2 = (mass_at(inputs, ball, index) for ball in "12")
     E1, E2, nu1, nu2 = (of_material(ball, key) for key in ("E", "nu") for ball in "12")
     R1, R2 = (radius_at(inputs, ball, index, mass) for ball, mass in (("1", m1), ("2", m2)))
@@ -87,6 +89,35 @@ def build_impacts(inputs: Inputs, model: Law, index: Index, stiffness: Stiffness
     return replace(impacts, K=np.broadcast_to(K, math.prod(shape)).reshape(shape))
 
 
+def build_oblique(
+    inputs: Inputs, impacts: Impacts, index: Index, friction: FrictionLaw | None = None
+) -> ObliqueImpacts:
+    """Build the tangential inputs of impacts at cells, with the parameters of a friction law."""
+
+    def value(name: str) -> Array:
+        return values_at(inputs, name, index)
+
+    u1, u2, tangent = (value(name) for name in ("u1", "u2", "angle"))
+    if "angle" in inputs.names():
+        tangent = np.tan(tangent)
+        u2 = u2 if "u2" in inputs.names() else np.zeros_like(tangent)
+        u1 = u2 + impacts.v0 * tangent
+    return ObliqueImpacts(
+        impacts=impacts,
+        u1=u1,
+        u2=u2,
+        omega1=value("omega1"),
+        omega2=value("omega2"),
+        inertia_factor1=value("inertia_factor1"),
+        inertia_factor2=value("inertia_factor2"),
+        mu=value("mu"),
+        tangent=tangent if "angle" in inputs.names() else None,
+        parameters={}
+        if friction is None
+        else {p.name: value(f"friction.{friction.key}.{p.name}") for p in friction.parameters},
+    )
+
+
 def fixed_steps_at(inputs: Inputs, impacts: Impacts, index: Index) -> dict[str, Array]:
     """Compute the fixed step and the phase at cells, by the names of `simulate`; empty without a scheme."""
     names = inputs.names()
@@ -104,6 +135,15 @@ def values_at(inputs: Inputs, name: str, index: Index) -> Array:
     if name not in inputs.names():
         return np.full((1,) * dimensions(index), np.nan)
     return np.asarray(inputs.column(name, index), float)
+
+
+def velocity_at(inputs: Inputs, ball: str, index: Index) -> Array:
+    """Look up the normal velocity of a ball at cells [m/s]; with a speed, v1 = v2 + speed cos(angle)."""
+    velocity = values_at(inputs, f"v{ball}", index)
+    if ball == "2" or "speed" not in inputs.names():
+        return velocity
+    angle = values_at(inputs, "angle", index) if "angle" in inputs.names() else np.zeros_like(velocity)
+    return velocity_at(inputs, "2", index) + values_at(inputs, "speed", index) * np.cos(angle)
 
 
 def property_at(inputs: Inputs, ball: str, key: str, index: Index) -> Array:
@@ -155,7 +195,7 @@ def restitution_at(inputs: Inputs, index: Index) -> Array:
     """Compute the requested restitution at cells: e, or e = 1 - alpha (v1 - v2), equation (24)."""
     if "e" in inputs.names():
         return values_at(inputs, "e", index)
-    speed = values_at(inputs, "v1", index) - values_at(inputs, "v2", index)
+    speed = velocity_at(inputs, "1", index) - velocity_at(inputs, "2", index)
     return 1.0 - values_at(inputs, "alpha", index) * speed
 
 

@@ -20,7 +20,9 @@ import numpy as np
 from filelock import FileLock, Timeout
 
 from ..atomic import atomic_write, sync_folder
-from ..contact.simulate import TABLE_COLUMNS, CollisionResult
+from ..contact.records import Record
+from ..contact.simulate import TABLE_COLUMNS
+from ..contact.tangential import TangentialResult
 from ..errors import ImpactError, InUseError, StoreError, UsageError
 from ..formatting import safe_text
 from .plan import Plan
@@ -57,19 +59,19 @@ class WorkFolder:
         fields = trajectory_range.number, trajectory_range.model, trajectory_range.start, trajectory_range.stop
         return " ".join(map(str, (*fields, self.key)))
 
-    def store(self, trajectory_range: TrajectoryRange, collisions: CollisionResult) -> None:
+    def store(self, trajectory_range: TrajectoryRange, collisions: Record) -> None:
         """Store a finished range; raises a `StoreError` if the disk is full or failed."""
         path = self.path(trajectory_range)
         with atomic_write(path, overwrite=True, part=self.folder / "block.part") as sink:
             write_range(sink, self._header(trajectory_range), collisions)
 
-    def load(self, trajectory_range: TrajectoryRange) -> CollisionResult | None:
+    def load(self, trajectory_range: TrajectoryRange) -> Record | None:
         """Load a finished range; None if it is missing or damaged."""
         path = self.path(trajectory_range)
         # reading something other than a regular file might never end
         if not path.is_file():
             return None
-        return read_range(path, self._header(trajectory_range), trajectory_range.size)
+        return read_range(path, self._header(trajectory_range), trajectory_range.record, trajectory_range.size)
 
 
 @contextlib.contextmanager
@@ -168,6 +170,7 @@ def _sweep_record(plan: Plan, extends: str = "") -> dict[str, Any]:
     solver = plan.solver
     return {
         "schema": TABLE_COLUMNS,
+        **({"friction_schema": TangentialResult.columns()} if plan.frictions else {}),
         "block": RANGE_TRAJECTORIES,
         "collapse": solver.collapse,
         "core": solver.core,
@@ -213,29 +216,29 @@ def _difference_from(folder: Path, record: Mapping[str, Any]) -> str | None:
     return f"belongs to another sweep: {'; '.join(differences[:MAX_DIFFERENCES])}{more}" if differences else None
 
 
-def write_range(file: Any, header: str, collisions: CollisionResult) -> None:
+def write_range(file: Any, header: str, collisions: Record) -> None:
     """Write the results of a range, with the header that identifies it, to a binary file."""
-    np.savez(file, of=header, **{name: getattr(collisions, name) for name in TABLE_COLUMNS})
+    np.savez(file, of=header, **vars(collisions))
 
 
-def read_range(path: Path, header: str, size: int) -> CollisionResult | None:
+def read_range(path: Path, header: str, record: type[Record], size: int) -> Record | None:
     """Read a range of `size` trajectories; None if it has another header or is damaged."""
     try:
         with np.load(path, allow_pickle=False) as stored:
             if stored["of"].item() != header:
                 return None
-            arrays = {name: stored[name] for name in TABLE_COLUMNS}
+            arrays = {name: stored[name] for name in record.columns()}
     except MemoryError:
         raise
     # numpy and zipfile raise almost any exception on a damaged file
     except Exception:
         return None
-    blank = CollisionResult.blank(size)
+    blank = record.blank(size)
     is_whole = all(
         (array.shape, array.dtype) == (getattr(blank, name).shape, getattr(blank, name).dtype)
         for name, array in arrays.items()
     )
-    return CollisionResult(**arrays) if is_whole else None
+    return record(**arrays) if is_whole else None
 
 
 def record_differences(stored: object, current: object, path: str = "") -> Iterator[str]:

@@ -10,26 +10,31 @@ import socket
 import time
 import warnings
 from collections import Counter, deque
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from dataclasses import dataclass
 from functools import lru_cache, partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .._version import __version__
 from ..config.tables import Solver
+from ..contact.friction import Pair
+from ..contact.frictions import find_friction
 from ..contact.model import ForceModel
 from ..contact.models import catalogue
 from ..contact.numba.dispatch import is_installed
-from ..contact.simulate import TABLE_COLUMNS, CollisionResult, simulate
-from ..contact.status import STATUSES
+from ..contact.records import Record
+from ..contact.simulate import simulate
+from ..contact.status import FRICTION_STATUSES, STATUSES
+from ..contact.tangential import TangentialResult, simulate_friction
 from ..errors import StoreError, UsageError
 from .executors import ExecutorSpec
 from .plan import Plan
 from .run import Run
-from .trajectories import Columns, TrajectoryRange
+from .trajectories import Columns, PlanLaw, TrajectoryRange, keys_of
 
 # how often a range whose process was killed is submitted again
 MAX_RETRIES = 3
@@ -37,9 +42,9 @@ MAX_RETRIES = 3
 POLL_INTERVAL_S = 0.2
 
 # the results of a range, and a line for each distinct error that the law raised
-Integrated = tuple[CollisionResult, dict[str, str]]
+Integrated = tuple[Record, dict[str, str]]
 # a mask of the trajectories of a range that are reused from another result, and their results; None for no reuse
-ReusedPart = tuple[NDArray[np.bool_], CollisionResult] | None
+ReusedPart = tuple[NDArray[np.bool_], Record] | None
 FindReused = Callable[[TrajectoryRange], ReusedPart]
 # the ranges that are being integrated
 Running = dict[Future[Integrated], tuple[TrajectoryRange, ReusedPart]]
@@ -62,28 +67,26 @@ class WorkerContext:
     hashes: tuple[tuple[str, str | None], ...] = ()
 
 
-def integrate_columns(model: ForceModel, columns: Columns, solver: Solver) -> Integrated:
-    """Integrate trajectories of a model; see `impact.engine.plan.Plan.columns_of`."""
+def integrate_columns(law: PlanLaw, columns: Columns, solver: Solver) -> Integrated:
+    """Integrate trajectories of a law; see `impact.engine.plan.Plan.columns_of`."""
     errors: dict[str, str] = {}
     values = {name: column for name, column in columns.items() if name not in ("n", "status")}
-    collisions = simulate(
-        model,
-        columns["n"],
-        values,
-        columns["status"],
-        rtol=solver.rtol,
-        max_steps=solver.max_steps,
-        collapse=solver.collapse,
-        core=solver.core,
-        integrator=solver.integrator,
-        errors=errors,
+    problems, settings = (
+        (columns["n"], values, columns["status"]),
+        dict[str, Any](
+            rtol=solver.rtol, max_steps=solver.max_steps, collapse=solver.collapse, core=solver.core, errors=errors
+        ),
     )
-    return collisions, errors
+    if isinstance(law, Pair):
+        return simulate_friction(law, *problems, **settings), errors
+    return simulate(law, *problems, integrator=solver.integrator, **settings), errors
 
 
-def integrate_remotely(key: str, columns: Columns, context: WorkerContext) -> Integrated:
-    """Integrate trajectories of the model of a key, in any process, and with the same bits if repeated."""
-    return integrate_columns(models_of_context(context)[key], columns, context.solver)
+def integrate_remotely(keys: Sequence[str], columns: Columns, context: WorkerContext) -> Integrated:
+    """Integrate trajectories of the law of some keys, in any process, and with the same bits if repeated."""
+    model = models_of_context(context)[keys[0]]
+    law = Pair(model, find_friction(keys[1])) if len(keys) > 1 else model
+    return integrate_columns(law, columns, context.solver)
 
 
 @lru_cache(maxsize=4)
@@ -117,7 +120,7 @@ def integrate_ranges(
     todo: Iterable[TrajectoryRange],
     run: Run,
     find_reused: FindReused = reuse_nothing,
-) -> Iterator[tuple[TrajectoryRange, CollisionResult]]:
+) -> Iterator[tuple[TrajectoryRange, Record]]:
     """Integrate ranges of trajectories, and yield each when it is finished: in order in this process alone.
 
     `find_reused` returns the trajectories of a range that are not integrated, with their results. A killed process
@@ -186,7 +189,7 @@ def _submit_and_collect(
                 collisions, errors = integrated
                 if reused is not None:
                     is_reused, values = reused
-                    values = CollisionResult(**{name: array.copy() for name, array in vars(values).items()})
+                    values = values.take(np.arange(trajectory_range.size))
                     values.put(~is_reused, collisions)
                     collisions = values
                 yield trajectory_range, (collisions, errors)
@@ -197,20 +200,21 @@ def _submit_and_collect(
 
 def _check_integrated(trajectory_range: TrajectoryRange, integrated: object, size: int) -> None:
     """Refuse a return value of an executor that cannot be the results of `size` trajectories."""
-    prefix = f"executor: range {trajectory_range.number}"
+    prefix, kind = f"executor: range {trajectory_range.number}", trajectory_range.record
     collisions, errors = integrated if isinstance(integrated, tuple) and len(integrated) == 2 else (integrated, {})
-    if not isinstance(collisions, CollisionResult):
-        raise StoreError(f"{prefix}: got {type(collisions).__name__}, expected CollisionResult")
+    if not isinstance(collisions, kind):
+        raise StoreError(f"{prefix}: got {type(collisions).__name__}, expected {kind.__name__}")
     if not isinstance(errors, dict):
         raise StoreError(f"{prefix}: got {type(errors).__name__}, expected a dict of errors")
-    blank = CollisionResult.blank(size)
-    for name in TABLE_COLUMNS:
+    blank = kind.blank(size)
+    for name in kind.columns():
         got, expected = (_dtype_and_shape(getattr(result, name)) for result in (collisions, blank))
         if got != expected:
             raise StoreError(f"{prefix}: {name}: got {got}, expected {expected}")
-    unknown = np.setdiff1d(collisions.status, STATUSES)
+    statuses = FRICTION_STATUSES if kind is TangentialResult else STATUSES
+    unknown = np.setdiff1d(collisions.status, statuses)
     if unknown.size:
-        raise StoreError(f"{prefix}: status: got {unknown[0]}, expected one of {list(STATUSES)}")
+        raise StoreError(f"{prefix}: status: got {unknown[0]}, expected one of {list(statuses)}")
 
 
 def _dtype_and_shape(array: object) -> str:
@@ -224,12 +228,12 @@ def _build_submit(
     plan: Plan, spec: ExecutorSpec
 ) -> Callable[[Executor, TrajectoryRange, ReusedPart], Future[Integrated]]:
     """Build the function that submits what is not reused of a range to an executor."""
-    integrate: Callable[[str, Columns], Integrated]
+    integrate: Callable[[Sequence[str], Columns], Integrated]
     if spec.shares_memory:
-        models = {model.key: model for model in plan.models}
+        laws = {keys_of(law): law for law in plan.laws}
 
-        def integrate(key: str, columns: Columns) -> Integrated:
-            return integrate_columns(models[key], columns, plan.solver)
+        def integrate(keys: Sequence[str], columns: Columns) -> Integrated:
+            return integrate_columns(laws[tuple(keys)], columns, plan.solver)
 
     else:
         values = [plugin.model.key for plugin in plan.plugins.items if plugin.is_value]
@@ -245,7 +249,7 @@ def _build_submit(
         columns = plan.columns_of(trajectory_range)
         if reused is not None:
             columns = {name: values[~reused[0]] for name, values in columns.items()}
-        return executor.submit(integrate, plan.models[trajectory_range.model].key, columns)
+        return executor.submit(integrate, keys_of(plan.laws[trajectory_range.model]), columns)
 
     return submit
 

@@ -41,13 +41,13 @@ class Inputs:
         """Number of cells of the grid; cells that differ only in parameters of other models are one point."""
         return math.prod(self.shape)
 
-    def axes_of_model(self, key: str) -> tuple[int, ...]:
-        """List the axes along which the points of a model lie: all but those of other models' parameters."""
-        return tuple(number for number, axis in enumerate(self.axes) if not is_foreign(axis.columns, key))
+    def axes_of_law(self, model: str, friction: str = "") -> tuple[int, ...]:
+        """List the axes along which the points of a model or pair lie: not those of other laws' parameters."""
+        return tuple(n for n, axis in enumerate(self.axes) if not is_foreign(axis.columns, model, friction))
 
-    def points_of(self, key: str) -> int:
-        """Number of points of a model."""
-        return math.prod(self.shape[axis] for axis in self.axes_of_model(key))
+    def points_of(self, model: str, friction: str = "") -> int:
+        """Number of points of a model, or of its pair with a friction law."""
+        return math.prod(self.shape[axis] for axis in self.axes_of_law(model, friction))
 
     def names(self) -> tuple[str, ...]:
         """List all config names that have a value, those of axes first."""

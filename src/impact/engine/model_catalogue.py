@@ -7,17 +7,19 @@ from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from itertools import groupby
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
+from ..contact.catalogue import look_up
 from ..contact.dimensionless import delivered
 from ..contact.evidence import count_states
+from ..contact.friction import FrictionLaw
 from ..contact.model import ForceModel, Parameter
 from ..contact.models import catalogue
 from ..contact.numba.dispatch import serves
 from ..display import Block, Displayed, Styled, Table, Wrapped, html_of
-from ..errors import ModelError, UsageError, did_you_mean
+from ..errors import UsageError, did_you_mean
 from ..formatting import decimals, number, with_year
 from .plugins import read_plugins
 
@@ -29,6 +31,8 @@ E_WIDTH, EQUATION_WIDTH, DOMAIN_WIDTH, CORE_WIDTH = 8, 32, 26, 7
 COMPILED_AT = (1.0, 1.5, 2.0, 2.5, 3.0)
 # characters of a text about one model, which may be a plug-in
 MAX_TEXT = 2000
+
+Described = TypeVar("Described", ForceModel, FrictionLaw)
 
 
 @dataclass(frozen=True)
@@ -46,7 +50,7 @@ class ModelDescription(Displayed):
             "evidence": vars(model.evidence),
             "domain": {name: list(ends) for name, ends in model.domain.items()},
             "domain_source": model.domain_source,
-            "parameters": [vars(parameter) for parameter in model.parameters],
+            "parameters": [parameter_record(parameter) for parameter in model.parameters],
             "exponent": model.exponent,
             "release": model.release,
             "delivered_restitution": self.delivered,
@@ -90,18 +94,31 @@ class ModelDescription(Displayed):
             "ends at": gap if model.release == "gap" else f"zero force, at {gap} at the latest",
             "integrated by": self.cores,
         }
-        for index, parameter in enumerate(model.parameters):
-            # the table is named once
-            rows[" " * index if index else f"[model.{model.key}]"] = _describe_parameter(parameter)
+        rows |= parameter_rows(f"[model.{model.key}]", model.parameters)
         rows["delivers"] = ", ".join(f"{decimals(out)} for e = {e}" for e, out in self.delivered.items())
         yield Table([row for row in rows.items() if row[1]], max_cell=MAX_TEXT)
 
 
+def parameter_record(parameter: Parameter) -> dict[str, Any]:
+    """The declaration of a parameter as plain data; what few parameters have is left out elsewhere."""
+    return {name: value for name, value in vars(parameter).items() if value or name not in ("optional", "choices")}
+
+
+def parameter_rows(table: str, parameters: Sequence[Parameter]) -> dict[str, str]:
+    """Describe the parameters of a table of a config, a line each; the table is named once."""
+    names = [table, *(" " * index for index in range(1, len(parameters)))]
+    return {name: _describe_parameter(parameter) for name, parameter in zip(names, parameters, strict=False)}
+
+
 def _describe_parameter(parameter: Parameter) -> str:
-    default = "required" if parameter.default is None else f"default {number(parameter.default)}"
+    default, choices = parameter.default, [f'"{word}"' for word in parameter.choices]
+    if default is None:
+        status = "optional" if parameter.optional else "required"
+    else:
+        status = f"default {choices[int(default)] if choices else number(default)}"
     unit = "" if parameter.unit == "1" else f" [{parameter.unit}]"
-    limits = f"from {number(parameter.least)} to {number(parameter.most)}"
-    return f"{parameter.name}{unit}: {parameter.meaning}; {limits}, {default}"
+    limits = " or ".join(choices) or f"from {number(parameter.least)} to {number(parameter.most)}"
+    return f"{parameter.name}{unit}: {parameter.meaning}; {limits}, {status}"
 
 
 class Models(dict[str, ForceModel], Displayed):
@@ -117,9 +134,7 @@ class Models(dict[str, ForceModel], Displayed):
         ------
         ModelError : no model has this key; the message names the nearest one
         """
-        if key not in self:
-            raise ModelError(f'no model "{key}"; {did_you_mean(key, list(self))}')
-        return self[key]
+        return look_up(self, key, "model")
 
     def as_dict(self) -> dict[str, Any]:
         """The declarations by key."""
@@ -238,19 +253,31 @@ def models(
     if family is not None and family not in families:
         raise UsageError(f'--family: no family "{family}"; {did_you_mean(family, families)}')
     candidates = {key: model for key, model in all_models.items() if family in (None, model.family)}
-    matching = {key: model for key, model in candidates.items() if fnmatchcase(key, pattern)}
+    return Models(matching_laws(candidates, "model", pattern, search))
+
+
+def matching_laws(
+    laws: Mapping[str, Described], noun: str, pattern: str, search: str | None
+) -> dict[str, Described]:
+    """Select the laws whose keys match a pattern, and whose description has all words of a search.
+
+    Raises
+    ------
+    UsageError : no law matches; the message calls one by the noun
+    """
+    matching = {key: law for key, law in laws.items() if fnmatchcase(key, pattern)}
     if not matching:
-        raise UsageError(f'no model matches "{pattern}"; {did_you_mean(pattern.strip("*?"), list(candidates))}')
+        raise UsageError(f'no {noun} matches "{pattern}"; {did_you_mean(pattern.strip("*?"), list(laws))}')
     if search is not None:
         words = search.casefold().split()
-        matching = {key: model for key, model in matching.items() if _contains(model, words)}
+        matching = {key: law for key, law in matching.items() if _contains(law, words)}
         if not matching:
-            raise UsageError(f'--search: no model has "{search[:60]}" in its title, equation or reference')
-    return Models(matching)
+            raise UsageError(f'--search: no {noun} has "{search[:60]}" in its title, equation or reference')
+    return matching
 
 
-def _contains(model: ForceModel, words: Sequence[str]) -> bool:
-    """Whether all words occur in the description of a model."""
-    texts = (model.key, model.family, model.title, str(model.year), model.equation, model.reference, model.doi)
-    text = " ".join(texts).casefold()
+def _contains(law: ForceModel | FrictionLaw, words: Sequence[str]) -> bool:
+    """Whether all words occur in the description of a law."""
+    group = law.family if isinstance(law, ForceModel) else law.kind
+    text = " ".join((law.key, group, law.title, str(law.year), law.equation, law.reference, law.doi)).casefold()
     return all(word in text for word in words)

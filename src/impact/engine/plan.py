@@ -16,6 +16,7 @@ from ..config.input_names import InputName
 from ..config.load import Config
 from ..config.tables import Solver
 from ..contact.fixed_step import EXACT
+from ..contact.friction import FrictionLaw, Pair
 from ..contact.materials import Material
 from ..contact.model import ForceModel
 from ..contact.numba.dispatch import is_installed, serves
@@ -26,6 +27,7 @@ from .plugins import Plugins
 from .trajectories import (
     MAX_CELLS,
     Columns,
+    PlanLaw,
     TrajectoryMap,
     TrajectoryRange,
     build_map,
@@ -52,15 +54,24 @@ class Plan:
     def models(self) -> tuple[ForceModel, ...]:
         return self.config.models
 
+    @property
+    def frictions(self) -> tuple[FrictionLaw, ...]:
+        return self.config.frictions
+
+    @cached_property
+    def laws(self) -> tuple[PlanLaw, ...]:
+        """What trajectories are of: the models, then the pairs of each model with each friction law."""
+        return (*self.models, *(Pair(model, friction) for model in self.models for friction in self.frictions))
+
     @cached_property
     def inputs(self) -> Inputs:
         return Inputs(self.config.scalars, self.config.axes, self.config.materials)
 
     @cached_property
     def maps(self) -> tuple[TrajectoryMap, ...]:
-        """The distinct trajectories of each model."""
+        """The distinct trajectories of each law."""
         collapse = self.config.solver.collapse
-        return tuple(build_map(self.inputs, number, model, collapse) for number, model in enumerate(self.models))
+        return tuple(build_map(self.inputs, number, law, collapse) for number, law in enumerate(self.laws))
 
     @cached_property
     def ranges(self) -> tuple[TrajectoryRange, ...]:
@@ -69,7 +80,7 @@ class Plan:
 
     @property
     def trajectories(self) -> int:
-        """Number of distinct trajectories of all models."""
+        """Number of distinct trajectories of all laws."""
         return sum(trajectory_map.count for trajectory_map in self.maps)
 
     @cached_property
@@ -91,7 +102,9 @@ class Plan:
         if "dt" in self.inputs.names():
             # at a given step the continuous law is only integrated where balls do not separate
             return False
-        model = self.models[trajectory_map.model]
+        model = self.laws[trajectory_map.model]
+        if isinstance(model, Pair):
+            return False
         return all(any(serves(model, n)) for n in exponents(self.inputs, model))
 
     def columns_of(self, trajectory_range: TrajectoryRange) -> Columns:
@@ -103,14 +116,14 @@ class Plan:
         index_along = dict(zip(trajectory_map.axes, cell_index, strict=True))
         # the other axes are at their first value
         index = tuple(index_along.get(axis, np.zeros(1, np.intp)) for axis in range(len(self.shape)))
-        columns = columns_at(self.inputs, self.models[trajectory_range.model], trajectory_map.axes, index)
+        columns = columns_at(self.inputs, self.laws[trajectory_range.model], trajectory_map.axes, index)
         return {name: np.broadcast_to(values, cells.shape).copy() for name, values in columns.items()}
 
     def check_count(self, most: int, name: str) -> None:
         """Refuse too many trajectories before any array is allocated; `name` is that of the config."""
         if self.points <= most:
             return
-        axes = (law_axes(self.inputs, model, self.config.solver.collapse) for model in self.models)
+        axes = (law_axes(self.inputs, law, self.config.solver.collapse) for law in self.laws)
         # with fewer cells, equal ones are found, and the number of trajectories is not known yet
         cells = [math.prod(self.shape[axis] for axis in of_law) for of_law in axes]
         total = sum(count for count in cells if count > MAX_CELLS)
@@ -126,13 +139,13 @@ class Plan:
 
     @property
     def points(self) -> int:
-        """Points of all models; the axes of parameters of other models do not count."""
+        """Points of all models; the axes of parameters of other models and of friction laws do not count."""
         return sum(self.inputs.points_of(model.key) for model in self.models)
 
     @property
     def stored_points(self) -> int:
-        """Values of a variable in the dataset, cells times models; they repeat along the axes of other models."""
-        return self.inputs.cells * len(self.models)
+        """Values of a variable in the dataset, cells times laws; some repeat along the axes of other laws."""
+        return self.inputs.cells * len(self.models) * max(1, len(self.frictions))
 
     @property
     def layout(self) -> Literal["full", "factored"]:
@@ -156,6 +169,7 @@ class Plan:
         return {
             "version": __version__,
             "models": [model.key for model in config.models],
+            **({"frictions": [friction.key for friction in config.frictions]} if config.frictions else {}),
             "scalars": dict(sorted(config.scalars.items())),
             "axes": [
                 ({axis.name: list(axis.labels)} if axis.numbered else {})

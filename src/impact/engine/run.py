@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from ..config.grid import MAX_POINTS
-from ..contact.simulate import CollisionResult
-from ..contact.status import FIRST_FAILURE
+from ..contact.records import Record
+from ..contact.status import FIRST_FAILURE, FrictionStatus
 from ..errors import StoreError, UnfinishedError, UsageError
 from .executors import SERIAL, ExecutorSpec
 from .trajectories import TrajectoryRange
@@ -94,9 +94,11 @@ class ProgressCounter:
         """Whether all trajectories are integrated."""
         return self.progress.trajectories == self.progress.of_trajectories
 
-    def count(self, trajectory_range: TrajectoryRange, collisions: CollisionResult) -> None:
+    def count(self, trajectory_range: TrajectoryRange, collisions: Record) -> None:
         """Add a finished range."""
-        failed = int(np.count_nonzero(collisions.status >= FIRST_FAILURE))
+        # a pair without a meaning did not fail
+        is_failure = (collisions.status >= FIRST_FAILURE) & (collisions.status != FrictionStatus.NOT_COMBINABLE)
+        failed = int(np.count_nonzero(is_failure))
         self.progress = replace(
             self.progress,
             trajectories=self.progress.trajectories + trajectory_range.size,

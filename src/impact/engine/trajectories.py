@@ -16,9 +16,14 @@ from numpy.typing import NDArray
 
 from ..contact.deduplicate import deduplicate
 from ..contact.dimensionless import dimensionless_values, exponent_names
+from ..contact.friction import Pair, check_friction, friction_values
 from ..contact.impacts import CHECKS, check_inputs
 from ..contact.model import ForceModel
-from .build_impacts import build_impacts, fixed_steps_at
+from ..contact.records import Record
+from ..contact.simulate import CollisionResult
+from ..contact.status import STATUS_OK
+from ..contact.tangential import TangentialResult
+from .build_impacts import build_impacts, build_oblique, fixed_steps_at
 from .inputs import Index, Inputs, dimensions
 
 # cells up to which equal values are found in the whole plan; with more, only within a range of trajectories
@@ -29,19 +34,22 @@ RANGE_TRAJECTORIES = 32768
 # the dimensionless problems of trajectories: the exponent `n`, the `status` after the checks of inputs, and by
 # name the arguments of the law and the fixed step of a scheme
 Columns = dict[str, NDArray[Any]]
+# what a trajectory is of: a model, or its pair with a friction law
+PlanLaw = ForceModel | Pair
 
 
 @dataclass(frozen=True)
 class TrajectoryMap:
-    """The trajectories of a model, and the trajectory of each point of the grid.
+    """The trajectories of a model or a pair, and the trajectory of each point of the grid.
 
     Parameters
     ----------
-    model : index of the model in the plan
+    model : index of the law in the plan, see `Plan.laws`
     axes : the axes of the grid on which the values of the law depend
     shape : their sizes; a cell is an index into these axes
     first : the first cell of each trajectory, shape (count,); None if each cell has its own trajectory
     of_cell : the trajectory of each cell, shape (cells,); None if each cell has its own trajectory
+    record : what its trajectories are, collisions or tangential motions
     """
 
     model: int
@@ -49,6 +57,7 @@ class TrajectoryMap:
     shape: tuple[int, ...]
     first: NDArray[np.intp] | None = None
     of_cell: NDArray[np.int32] | None = None
+    record: type[Record] = CollisionResult
 
     @property
     def cells(self) -> int:
@@ -73,12 +82,13 @@ class TrajectoryMap:
 
 @dataclass(frozen=True)
 class TrajectoryRange:
-    """Trajectories `start` to `stop` of a model; `number` counts the ranges of a plan."""
+    """Trajectories `start` to `stop` of a model or a pair, a law of the plan; `number` counts its ranges."""
 
     number: int
     model: int
     start: int
     stop: int
+    record: type[Record] = CollisionResult
 
     @property
     def size(self) -> int:
@@ -90,26 +100,35 @@ class TrajectoryRange:
         return np.arange(self.start, self.stop)
 
 
-def law_axes(inputs: Inputs, model: ForceModel, collapse: bool) -> tuple[int, ...]:
-    """Find the axes on which a law and its fixed step depend; all axes of the model without `collapse`."""
+def model_of(law: PlanLaw) -> ForceModel:
+    """The contact force model of a law of a plan."""
+    return law.model if isinstance(law, Pair) else law
+
+
+def keys_of(law: PlanLaw) -> tuple[str, ...]:
+    """The key of a model, or the keys of the model and the friction law of a pair."""
+    return (law.model.key, law.friction.key) if isinstance(law, Pair) else (law.key,)
+
+
+def law_axes(inputs: Inputs, law: PlanLaw, collapse: bool) -> tuple[int, ...]:
+    """Find the axes on which a law and its fixed step depend; all of its axes without `collapse`."""
     if not collapse:
-        return inputs.axes_of_model(model.key)
-    index = _probe_index(inputs, model)
-    impacts = build_impacts(inputs, model, index)
-    with np.errstate(all="ignore"):
-        values = dimensionless_values(model, impacts) | fixed_steps_at(inputs, impacts, index)
-        return tuple(sorted(axes_of_arrays([impacts.n, *values.values()])))
+        return inputs.axes_of_law(*keys_of(law))
+    values, status = _values_at(inputs, law, _probe_index(inputs, law))
+    return tuple(sorted(axes_of_arrays([status, *values.values()])))
 
 
-def build_map(inputs: Inputs, number: int, model: ForceModel, collapse: bool) -> TrajectoryMap:
-    """Find the distinct trajectories of a model, which has this number in the plan."""
-    axes = law_axes(inputs, model, collapse)
-    trajectory_map = TrajectoryMap(number, axes, tuple(inputs.shape[axis] for axis in axes))
+def build_map(inputs: Inputs, number: int, law: PlanLaw, collapse: bool) -> TrajectoryMap:
+    """Find the distinct trajectories of a law, which has this number in the plan."""
+    axes = law_axes(inputs, law, collapse)
+    shape = tuple(inputs.shape[axis] for axis in axes)
+    record = TangentialResult if isinstance(law, Pair) else CollisionResult
+    trajectory_map = TrajectoryMap(number, axes, shape, record=record)
     if not collapse or trajectory_map.cells > MAX_CELLS:
         return trajectory_map
     # the other axes are at their first value
     shape = tuple(size if axis in axes else 1 for axis, size in enumerate(inputs.shape))
-    columns = columns_at(inputs, model, axes, np.ix_(*map(np.arange, shape)))
+    columns = columns_at(inputs, law, axes, np.ix_(*map(np.arange, shape)))
     first, of_cell = deduplicate(list(columns.values()), shape or (1,))
     return replace(trajectory_map, first=first, of_cell=of_cell.astype(np.int32))
 
@@ -120,7 +139,8 @@ def trajectory_ranges(maps: Sequence[TrajectoryMap], size: int = RANGE_TRAJECTOR
     for trajectory_map in maps:
         step = even_size(trajectory_map.count, size)
         for start in range(0, trajectory_map.count, step):
-            yield TrajectoryRange(number, trajectory_map.model, start, min(start + step, trajectory_map.count))
+            stop = min(start + step, trajectory_map.count)
+            yield TrajectoryRange(number, trajectory_map.model, start, stop, trajectory_map.record)
             number += 1
 
 
@@ -133,17 +153,28 @@ def even_size(count: int, most: int) -> int:
     return -(-count // -(-count // most))
 
 
-def columns_at(inputs: Inputs, model: ForceModel, axes: Sequence[int], index: Index) -> Columns:
-    """Build the problems of a model at cells, arrays that broadcast; only inputs along `axes` are checked."""
-    impacts = build_impacts(inputs, model, index)
+def columns_at(inputs: Inputs, law: PlanLaw, axes: Sequence[int], index: Index) -> Columns:
+    """Build the problems of a law at cells, arrays that broadcast; only inputs along `axes` are checked."""
+    model = model_of(law)
+    checks = frozenset(check for check, varying in axes_of_checks(inputs, model).items() if varying <= {*axes})
+    values, own_status = _values_at(inputs, law, index)
     with np.errstate(all="ignore"):
-        checks = frozenset(check for check, varying in axes_of_checks(inputs, model).items() if varying <= {*axes})
-        return {
-            "n": impacts.n,
-            "status": check_inputs(model, impacts, checks),
-            **dimensionless_values(model, impacts),
-            **fixed_steps_at(inputs, impacts, index),
-        }
+        status = check_inputs(model, build_impacts(inputs, model, index), checks)
+    # in this order: that of trajectories follows from it
+    return {"n": values.pop("n"), "status": np.where(status == STATUS_OK, own_status, status), **values}
+
+
+def _values_at(inputs: Inputs, law: PlanLaw, index: Index) -> tuple[Columns, NDArray[np.int8]]:
+    """Compute the exponent, the values of a law and its fixed step at cells, and the status by friction alone."""
+    model = model_of(law)
+    impacts, status = build_impacts(inputs, model, index), np.full((1,) * dimensions(index), STATUS_OK, np.int8)
+    with np.errstate(all="ignore"):
+        values = {"n": impacts.n, **dimensionless_values(model, impacts), **fixed_steps_at(inputs, impacts, index)}
+        if isinstance(law, Pair):
+            oblique = build_oblique(inputs, impacts, index, law.friction)
+            values |= friction_values(law, oblique)
+            status = check_friction(law, oblique)
+    return values, status
 
 
 def probe_index(inputs: Inputs, swept_names: Iterable[str] = ()) -> Index:
@@ -173,7 +204,8 @@ def axes_of_checks(inputs: Inputs, model: ForceModel) -> Mapping[str, frozenset[
     return {check: axes_of_arrays(checked_arrays[check]) for check in CHECKS}
 
 
-def _probe_index(inputs: Inputs, model: ForceModel) -> Index:
+def _probe_index(inputs: Inputs, law: PlanLaw) -> Index:
+    model = model_of(law)
     # an exponent of a unit may be zero at some values, where the unit drops out: all values of exponents are used
     names = exponent_names(model)
     exponents = {"n", *names, *(f"{model.key}.{name}" for name in names)}

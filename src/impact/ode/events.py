@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..array_types import Array, Mask
-from .problem import N_COMPONENTS, N_INTEGRATED, Problem, Termination
+from .problem import Problem, Termination
 from .state import State, TrialStep
 
 # an offset up to NEAR_EVENT of a step is bridged by a step of order two, forwards or backwards; the event is
@@ -89,12 +89,13 @@ def locate_event(
     event are of order five. Returns the positions of the trajectories that ended, and the offsets of their events
     from the end of the step, as fractions of it.
     """
-    g, dg = problem.event(trial.y[:N_COMPONENTS], trial.k, state.params)
+    components = problem.n_components
+    g, dg = problem.event(trial.y[:components], trial.k, state.params)
     positions = (is_event_ahead(g, dg, trial.h_next) & accepted).nonzero()[0]
     if not positions.size:
         return positions, g[positions]
     g, dg, h = g[positions], dg[positions], state.h[positions]
-    g_before, dg_before = problem.event(state.y[:N_COMPONENTS], state.k, state.params)
+    g_before, dg_before = problem.event(state.y[:components], state.k, state.params)
     offset, certain = event_offset(g, dg, g_before[positions], dg_before[positions], h)
     near, h_next = before_event(offset, certain, h, trial.h_next[positions])
     y, remaining = _step_to_event(problem, state, trial, positions, np.where(near, offset, 0.0))
@@ -111,10 +112,11 @@ def _step_to_event(
     problem: Problem, state: State, trial: TrialStep, positions: NDArray[np.intp], offset: Array
 ) -> tuple[Array, Array]:
     """Compute the rows at the event, by steps of order two and one, and the offset of the linear step."""
+    components, integrated = problem.n_components, problem.n_integrated
     params = tuple(column[positions] for column in state.params)
     y, k = trial.y[:, positions], trial.k[:, positions]
-    k_end = problem.rates(y[:N_COMPONENTS] + offset * k[:N_COMPONENTS], params)
-    y = y + trapezoid(offset, k, k_end)[:N_INTEGRATED]
-    k = problem.rates(y[:N_COMPONENTS], params)
-    remaining = linear_offset(*problem.event(y[:N_COMPONENTS], k, params))
-    return y + remaining * k[:N_INTEGRATED], remaining
+    k_end = problem.rates(y[:components] + offset * k[:components], params)
+    y = y + trapezoid(offset, k, k_end)[:integrated]
+    k = problem.rates(y[:components], params)
+    remaining = linear_offset(*problem.event(y[:components], k, params))
+    return y + remaining * k[:integrated], remaining

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..array_types import Array, Mask
 from .events import choose
-from .problem import N_COMPONENTS, N_INTEGRATED, WATCHED_ROW, Params, Problem
+from .problem import Params, Problem
 from .state import PeakCandidate, State, TrialStep
 
 # step of the difference quotient for the slope of the watched quantity, relative to the adjacent step
@@ -34,17 +34,20 @@ def secant_update(left: Array, d_left: Array, right: Array, d_right: Array) -> A
     return choose((root >= 0.0) & (root <= 1.0), root, right)
 
 
-def update_peaks(state: State, trial: TrialStep, accepted: Mask, ended: NDArray[np.intp]) -> None:
+def update_peaks(
+    problem: Problem, state: State, trial: TrialStep, accepted: Mask, ended: NDArray[np.intp]
+) -> None:
     """Update the candidates where the watched quantity begins to fall, or a trajectory ends, above `best`."""
-    value, value_end = state.k[WATCHED_ROW], trial.k[WATCHED_ROW]
+    components, watched_row = problem.n_components, problem.n_integrated
+    value, value_end = state.k[watched_row], trial.k[watched_row]
     falls = (begins_to_fall(value, value_end, state.best) & accepted).nonzero()[0]
     if falls.size:
         state.best[falls] = value[falls]
-        state.peak.put(state.index[falls], state.y[:N_COMPONENTS, falls], state.h_last[falls], state.h[falls])
+        state.peak.put(state.index[falls], state.y[:components, falls], state.h_last[falls], state.h[falls])
     ended = ended[value_end[ended] > state.best[ended]]
     if ended.size:
         state.best[ended] = value_end[ended]
-        state.peak.put(state.index[ended], trial.y[:N_COMPONENTS, ended], state.h[ended], 0.0)
+        state.peak.put(state.index[ended], trial.y[:components, ended], state.h[ended], 0.0)
 
 
 def refine_maximum(
@@ -55,11 +58,12 @@ def refine_maximum(
     The secant rule finds where the slope along the trajectory vanishes, by steps of order five from the candidate
     into the next step or, where the slope at the candidate is negative, back into the previous one.
     """
+    components, watched_row = problem.n_components, problem.n_integrated
     small = SLOPE_STEP * np.maximum(peak.behind, peak.ahead)
 
     def slope(y: Array, k: Array) -> Array:
-        ahead = problem.rates(y[:N_COMPONENTS] + small * k[:N_COMPONENTS], params)
-        return np.asarray((ahead[WATCHED_ROW] - k[WATCHED_ROW]) / small)
+        ahead = problem.rates(y[:components] + small * k[:components], params)
+        return np.asarray((ahead[watched_row] - k[watched_row]) / small)
 
     k = problem.rates(peak.y, params)
     d_peak = slope(peak.y, k)
@@ -69,12 +73,12 @@ def refine_maximum(
         return
     small, params = small[positions], tuple(column[positions] for column in params)
     h, k, d_peak = h[positions], k.take(positions, 1), d_peak[positions]
-    y = np.zeros((N_INTEGRATED, positions.size))
-    y[:N_COMPONENTS] = peak.y[:, positions]
+    y = np.zeros((problem.n_integrated, positions.size))
+    y[:components] = peak.y[:, positions]
 
     def slope_at(fraction: Array) -> Array:
         y_end, k_end = take_step(positions, y, k, fraction * h)
-        best[positions] = np.fmax(best[positions], k_end[WATCHED_ROW])
+        best[positions] = np.fmax(best[positions], k_end[watched_row])
         return slope(y_end, k_end)
 
     left, right = np.zeros(positions.size), np.ones(positions.size)

@@ -16,8 +16,8 @@ from .tableau import DENSE_WEIGHTS
 Params = tuple[Array, ...]
 Event = Callable[[Array, Array, Params], tuple[Array, Array]]
 
-# rows of a state: two components and two quadratures; rates have one row more, the watched quantity
-N_COMPONENTS, N_INTEGRATED, WATCHED_ROW = 2, 4, 4
+# margins and their rates, shape (margins, n) each
+Margins = tuple[Array, Array]
 
 
 class Termination(IntEnum):
@@ -37,34 +37,65 @@ class Rates(Protocol):
     def __call__(self, y: Array, params: Params, out: Array | None = None, /) -> Array: ...
 
 
+class Switch(Protocol):
+    """Changes of the formulas within an integration: the mode of a trajectory is part of its params.
+
+    A step ends near enough to the change that an error of its time is negligible, also where the rates jump.
+    """
+
+    def margins(self, y: Array, k: Array, params: Params, /) -> Margins:
+        """Compute functions that are positive as long as a mode lasts, and their rates, NaN where unknown."""
+        ...
+
+    def change(self, which: NDArray[np.intp], y: Array, k: Array, params: Params, /) -> tuple[Array, Params]:
+        """Change the modes of trajectories, by the number of the margin that vanished: new rows and params."""
+        ...
+
+
 @dataclass(frozen=True)
 class Problem:
     """An initial value problem with an event, for many trajectories.
 
     Parameters
     ----------
-    rates : (y, params, out=None) -> rates of the two components and the two quadratures, and the watched
-        quantity, of shape (5, n), at components y of shape (2, n); they may be written into `out`, which may lack
-        the last rows
+    rates : (y, params, out=None) -> rates of the components and the quadratures, and the watched quantity, of
+        shape (components + quadratures + 1, n), at components y of shape (components, n); they may be written into
+        `out`, which may lack the last rows
     event : (y, k, params) -> (g, dg): a function that is positive until the trajectory ends, and its rate along
         the trajectory, at components y where the rates are k
     unreachable : (y, k, params) -> mask of the trajectories that can no longer reach the event
     floor : the local error of each component is judged against rtol max(|y|, floor)
     watch : locate the maximum of the watched quantity
     step_at_unit_error : length of a step whose error is of the order of 1, from which the first step is chosen
+    n_quadratures : number of quadratures; the number of components is that of `floor`
+    strictness : factors on the errors of the components after the first two
+    switch : changes of the formulas within the integration
     """
 
     rates: Rates
     event: Event
     unreachable: Callable[[Array, Array, Params], Mask]
-    floor: tuple[float, float]
+    floor: tuple[float, ...]
     watch: bool = False
     step_at_unit_error: float = 1.0
+    n_quadratures: int = 2
+    strictness: tuple[float, ...] = ()
+    switch: Switch | None = None
+
+    @property
+    def n_components(self) -> int:
+        """Number of components."""
+        return len(self.floor)
+
+    @property
+    def n_integrated(self) -> int:
+        """Number of rows of a state: components and quadratures; it is also the row of the watched quantity."""
+        return len(self.floor) + self.n_quadratures
 
 
 @dataclass(frozen=True)
 class Step:
-    """An accepted step, for the interpolant: start (4, n), length (n,), stages (7, 4, n), end as a fraction."""
+    """An accepted step, to interpolate: start (rows, n), length (n,), stages (7, rows, n), end as a fraction."""
 
     start: Array
     length: Array
@@ -76,11 +107,11 @@ class Step:
         """Copy a step; missing rows of a stage are zero, since they have no weight."""
         rows = np.zeros((len(stages), *start.shape))
         for target, stage in zip(rows, stages, strict=True):
-            target[: len(stage)] = stage[:N_INTEGRATED]
+            target[: len(stage)] = stage[: len(start)]
         return cls(start.copy(), length, rows, end)
 
     def at(self, theta: float | Array) -> Array:
-        """Interpolate the integrated rows (4, n) at a fraction of the step, with order four."""
+        """Interpolate the integrated rows (rows, n) at a fraction of the step, with order four."""
         total = np.zeros_like(self.start)
         for weights, stage in zip(DENSE_WEIGHTS, self.stages, strict=True):
             factor = theta * (weights[0] + theta * (weights[1] + theta * (weights[2] + theta * weights[3])))
@@ -90,7 +121,7 @@ class Step:
 
 @dataclass(frozen=True)
 class Solution:
-    """The end of each trajectory: state (4, n), maximum of the watched quantity, accepted steps, termination."""
+    """The end of each trajectory: state (rows, n), largest watched quantity, accepted steps, termination."""
 
     state: Array
     maximum: Array
@@ -99,12 +130,12 @@ class Solution:
     recorded: tuple[Step, ...] = ()
 
     @classmethod
-    def empty(cls, n: int) -> Solution:
+    def empty(cls, n: int, rows: int = 4) -> Solution:
         """Arrays for n trajectories, to be filled."""
-        return cls(np.empty((N_INTEGRATED, n)), np.empty(n), np.empty(n, np.int32), np.empty(n, np.int8))
+        return cls(np.empty((rows, n)), np.empty(n), np.empty(n, np.int32), np.empty(n, np.int8))
 
     @classmethod
-    def blank(cls, n: int) -> Solution:
+    def blank(cls, n: int, rows: int = 4) -> Solution:
         """n trajectories without values: NaN, no steps, RUNNING."""
-        unknown = np.full((N_INTEGRATED, n), np.nan)
+        unknown = np.full((rows, n), np.nan)
         return cls(unknown, np.full(n, np.nan), np.zeros(n, np.int32), np.zeros(n, np.int8))

@@ -1,10 +1,10 @@
 """Adaptive Dormand-Prince 5(4) for many trajectories, each with its own step size, advanced as arrays.
 
-A trajectory is an initial value problem of two components that ends where an event function falls through zero.
-Two quadratures, whose rates depend on the components alone, are integrated with the same weights, and the maximum
-of one watched quantity is located. All arithmetic is elementwise and in a fixed order, so that a trajectory has
-the same bits alone, in any batch and in any order. The pair and its interpolant are those of `impact.ode.tableau`
-(Dormand and Prince 1980, Shampine 1986); an event ends a trajectory inside a step, see `impact.ode.events`.
+A trajectory is an initial value problem that ends where an event function falls through zero. Quadratures, whose
+rates depend on the components alone, are integrated with the same weights, and the maximum of one watched quantity
+is located. All arithmetic is elementwise and in a fixed order, so that a trajectory has the same bits alone, in
+any batch and in any order. The pair and its interpolant are those of `impact.ode.tableau` (Dormand and Prince
+1980, Shampine 1986); an event ends a trajectory inside a step, see `impact.ode.events`.
 """
 
 from __future__ import annotations
@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 from ..array_types import Array
 from .events import choose, locate_event
 from .maximum import refine_maximum, update_peaks
-from .problem import N_COMPONENTS, N_INTEGRATED, Params, Problem, Solution, Step, Termination
+from .problem import Params, Problem, Solution, Step, Termination
 from .state import RUNNING, State, TrialStep, Workspace
+from .switches import locate_switches
 from .tableau import A, E
 
 # the controller: a step is multiplied by SAFETY/error^CONTROLLER_EXPONENT, within
@@ -70,7 +71,7 @@ def integrate(
 
     Parameters
     ----------
-    start : components at the start, shape (2, n); or all rows, shape (4, n), where it continues
+    start : components at the start, shape (components, n); or all rows, where it continues
     params : arguments of the rates per trajectory, each of shape (n,)
     rtol : local error per step, relative to max(|y|, floor)
     max_steps : attempted steps after which a trajectory fails
@@ -78,9 +79,10 @@ def integrate(
     workspace : memory of an earlier call for as many trajectories or more
     """
     n = start.shape[1]
-    solution = Solution.blank(n)
+    rows = problem.n_components, problem.n_integrated
+    solution = Solution.blank(n, problem.n_integrated)
     recorded: list[Step] = []
-    workspace = Workspace.of(n) if workspace is None else workspace.narrow(n)
+    workspace = Workspace.of(n, *rows) if workspace is None else workspace.narrow(n)
     with np.errstate(all="ignore"):
         state = State.begin(problem, start, params, workspace.narrow(n), first_step(problem, rtol))
         for count in range(1, max_steps + 1):
@@ -117,9 +119,14 @@ def _advance(problem: Problem, state: State, rtol: float, record: bool) -> Step 
     accepted = trial.is_accurate & running
     ended, offset = locate_event(problem, state, trial, accepted)
     accepted &= trial.is_accurate
+    if problem.switch is not None:
+        locate_switches(problem, problem.switch, state, trial, accepted)
+        accepted &= trial.is_accurate
+        remain = accepted[ended]
+        ended, offset = ended[remain], offset[remain]
 
     if problem.watch:
-        update_peaks(state, trial, accepted, ended)
+        update_peaks(problem, state, trial, accepted, ended)
     unreachable = problem.unreachable(y_end, trial.k, state.params)
     if np.count_nonzero(unreachable):
         unreachable &= accepted & (state.termination == RUNNING)
@@ -138,18 +145,19 @@ def rk_step(
     problem: Problem, y: Array, k: Array, h: Array, params: Params, workspace: Workspace
 ) -> tuple[Array, list[Array]]:
     """Take a step of length h from rows y with rates k: rows at its end and the seven stages, in the workspace."""
-    stages, slopes = [k], [k[:N_COMPONENTS]]
-    part, y_end, start = workspace.part, workspace.y_end, y[:N_COMPONENTS]
+    components, integrated = problem.n_components, problem.n_integrated
+    stages, slopes = [k], [k[:components]]
+    part, y_end, start = workspace.part, workspace.y_end, y[:components]
     for weights, rows in zip(STAGE_WEIGHTS[:-1], workspace.stages[:-1], strict=True):
         _weighted_sum(weights, slopes, part)
         np.multiply(part, h, part)
         np.add(part, start, part)
         stages.append(problem.rates(part, params, rows))
-        slopes.append(stages[-1][:N_COMPONENTS])
-    _weighted_sum(STAGE_WEIGHTS[-1], [stage[:N_INTEGRATED] for stage in stages], y_end)
+        slopes.append(stages[-1][:components])
+    _weighted_sum(STAGE_WEIGHTS[-1], [stage[:integrated] for stage in stages], y_end)
     np.multiply(y_end, h, y_end)
     np.add(y_end, y, y_end)
-    stages.append(problem.rates(y_end[:N_COMPONENTS], params, workspace.stages[-1]))
+    stages.append(problem.rates(y_end[:components], params, workspace.stages[-1]))
     return y_end, stages
 
 
@@ -167,9 +175,13 @@ def local_error(
 ) -> Array:
     """Compute the norm of the local error of a step, shape (n,)."""
     error = workspace.part
-    _weighted_sum(ERROR_WEIGHTS, [stage[:N_COMPONENTS] for stage in stages], error)
+    _weighted_sum(ERROR_WEIGHTS, [stage[: problem.n_components] for stage in stages], error)
     np.multiply(error, h, error)
-    return error_norm(error[0], error[1], y[0], y[1], y_end[0], y_end[1], problem.floor)
+    norm = error_norm(error[0], error[1], y[0], y[1], y_end[0], y_end[1], problem.floor)
+    for row, factor in enumerate(problem.strictness, 2):
+        scale = larger(larger(np.abs(y[row]), np.abs(y_end[row])), problem.floor[row])
+        norm = larger(norm, factor * np.abs(error[row]) / scale)
+    return norm
 
 
 # The formulas from here to `next_step` hold for arrays and, compiled, for numbers; the compiled back end has its
@@ -187,9 +199,9 @@ def larger_quotient(this: Array, divisor: Array, other: Array, other_divisor: Ar
 
 
 def error_norm(
-    error_0: Array, error_1: Array, y_0: Array, y_1: Array, end_0: Array, end_1: Array, floor: tuple[float, float]
+    error_0: Array, error_1: Array, y_0: Array, y_1: Array, end_0: Array, end_1: Array, floor: tuple[float, ...]
 ) -> Array:
-    """The larger error of the two components, each relative to the largest of |y|, |y_end| and its floor."""
+    """The larger error of the first two components, each relative to the largest of |y|, |y_end| and its floor."""
     scale_0 = larger(larger(np.abs(y_0), np.abs(end_0)), floor[0])
     scale_1 = larger(larger(np.abs(y_1), np.abs(end_1)), floor[1])
     return larger_quotient(np.abs(error_0), scale_0, np.abs(error_1), scale_1)

@@ -8,24 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..array_types import Array, Mask
-from .problem import N_COMPONENTS, N_INTEGRATED, WATCHED_ROW, Params, Problem, Solution, Termination
+from .problem import Margins, Params, Problem, Solution, Termination
 
 RUNNING, EVENT_REACHED = int(Termination.RUNNING), int(Termination.EVENT_REACHED)
-# rows of the rates that each stage needs; the second stage has no weight in the solution
-STAGE_ROWS = (
-    WATCHED_ROW + 1,
-    N_COMPONENTS,
-    N_INTEGRATED,
-    N_INTEGRATED,
-    N_INTEGRATED,
-    N_INTEGRATED,
-    WATCHED_ROW + 1,
-)
+# stages after the first that need the rates of all integrated rows; the second has no weight in the solution
+N_WEIGHTED_STAGES = 4
 
 
 @dataclass(frozen=True)
 class PeakCandidate:
-    """Components where the watched quantity was largest at a step's end, shape (2, n), and the adjacent steps."""
+    """Components where the watched quantity was largest at the end of a step, and the adjacent steps."""
 
     y: Array
     behind: Array
@@ -54,9 +46,10 @@ class Workspace:
     part: Array
 
     @classmethod
-    def of(cls, n: int) -> Workspace:
+    def of(cls, n: int, components: int = 2, integrated: int = 4) -> Workspace:
         """Allocate for n trajectories, in one block of memory."""
-        rows = (N_INTEGRATED, WATCHED_ROW + 1, *STAGE_ROWS[1:], N_INTEGRATED, N_COMPONENTS)
+        stage_rows = (components, *(integrated,) * N_WEIGHTED_STAGES, integrated + 1)
+        rows = (integrated, integrated + 1, *stage_rows, integrated, components)
         block = np.empty((sum(rows), n))
         y, k, *stages, y_end, part = np.split(block, np.cumsum(rows)[:-1])
         return cls(y, k, stages, y_end, part)
@@ -79,6 +72,8 @@ class State:
 
     `h` is the length of the next step, `h_last` that of the previous one. `best` is the largest watched value at
     the end of a step from which it fell or at which the trajectory ended; `peak`, for all trajectories, is where.
+    Of a problem with a switch, `margins` are those at the start of the step, and `h_free` is the length of the
+    next step before a margin shortened it.
     """
 
     index: NDArray[np.intp]
@@ -93,6 +88,8 @@ class State:
     best: Array
     peak: PeakCandidate
     workspace: Workspace
+    margins: Margins | None = None
+    h_free: Array | None = None
 
     @classmethod
     def begin(cls, problem: Problem, start: Array, params: Params, workspace: Workspace, h: float) -> State:
@@ -100,9 +97,15 @@ class State:
         n = start.shape[1]
         y, k = workspace.y, workspace.k
         y[: len(start)], y[len(start) :] = start, 0.0
-        start = start[:N_COMPONENTS]
+        start = start[: problem.n_components]
         np.copyto(k, problem.rates(start, params, k))
+        switch = problem.switch
+        if switch is not None:
+            # the modes are written to the columns
+            params = tuple(column.copy() for column in params)
         return cls(
+            margins=None if switch is None else switch.margins(y, k, params),
+            h_free=None if switch is None else np.zeros(n),
             index=np.arange(n),
             params=params,
             y=y,
@@ -147,6 +150,8 @@ class State:
             best=self.best[running],
             peak=self.peak,
             workspace=workspace,
+            margins=None if self.margins is None else (self.margins[0][:, running], self.margins[1][:, running]),
+            h_free=None if self.h_free is None else self.h_free[running],
         )
 
 

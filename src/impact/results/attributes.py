@@ -6,10 +6,11 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
-from typing import Annotated, Any
+from typing import Annotated, Any, get_origin
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, NonNegativeInt, TypeAdapter, ValidationError
 
+from ..contact.tangential import FrictionKind
 from ..errors import ResultError
 
 # JSON has null for NaN
@@ -42,6 +43,7 @@ class SummaryRecord(BaseModel):
     worst: dict[str, dict[str, NullableFloat]]
     failed_at: list[tuple[str, str, list[NonNegativeInt]]]
     extremes: dict[str, tuple[NullableFloat, NullableFloat, NonNegativeInt] | None]
+    friction_status: dict[str, NonNegativeInt] = {}
 
 
 @dataclass(frozen=True)
@@ -59,6 +61,15 @@ class LawRecord:
     stiffness_axes: list[str] | None
 
 
+@dataclass(frozen=True)
+class PairRecord:
+    """What a factored file records about the trajectories of a model with a friction law."""
+
+    axes: list[str]
+    trajectories: int
+    is_shared: bool
+
+
 ATTRIBUTE_TYPES: Mapping[str, Any] = {
     "axes": list[str],
     "config_set": list[str],
@@ -66,10 +77,12 @@ ATTRIBUTE_TYPES: Mapping[str, Any] = {
     "extended": list[Any],
     "fit_bounds": dict[str, list[float]],
     "fit_paths": list[str],
+    "frictions": dict[str, FrictionKind],
     "inputs": dict[str, float | str],
     "laws": dict[str, LawRecord],
     "materials": dict[str, dict[str, Any]],
     "packages": dict[str, Any],
+    "pairs": list[PairRecord],
     "plugins": dict[str, PluginRecord],
     "summary": SummaryRecord,
     "tolerances": dict[str, Any],
@@ -89,7 +102,7 @@ def read_attribute(attributes: Mapping[Any, Any], name: str, source: str = "", *
     """
     kind = ATTRIBUTE_TYPES[name]
     if name not in attributes and not required:
-        return [] if kind in (list[str], list[Any]) else {}
+        return [] if get_origin(kind) is list else {}
     text = attributes.get(name)
     try:
         if isinstance(text, str):

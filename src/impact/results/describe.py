@@ -9,8 +9,10 @@ from typing import Any
 
 import xarray as xr
 
+from ..contact.friction import FrictionLaw
 from ..contact.model import ForceModel
 from ..display import Block, Displayed, Table
+from ..engine.friction_catalogue import FrictionDescription
 from ..engine.model_catalogue import ModelDescription
 from ..errors import UsageError
 from . import calibration, sensitivity
@@ -120,7 +122,9 @@ class Studies(Displayed):
                 yield Table(sensitivity.index_rows(study), sensitivity.INDEX_HEADINGS)
 
 
-def describe(item: xr.Dataset | ForceModel) -> Fits | Studies | ModelDescription:
+def describe(
+    item: xr.Dataset | ForceModel | FrictionLaw,
+) -> Fits | Studies | ModelDescription | FrictionDescription:
     """Describe a calibration, a sensitivity study or a law, as its command prints it and a notebook shows it.
 
     Raises
@@ -138,6 +142,8 @@ def describe(item: xr.Dataset | ForceModel) -> Fits | Studies | ModelDescription
     """
     if isinstance(item, ForceModel):
         return ModelDescription(item)
+    if isinstance(item, FrictionLaw):
+        return FrictionDescription(item)
     if is_calibration(item):
         return Fits(item)
     if is_sensitivity(item):

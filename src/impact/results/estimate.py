@@ -17,13 +17,12 @@ import numpy as np
 
 from ..config.grid import MAX_POINTS
 from ..contact.model import ForceModel
-from ..contact.simulate import TABLE_COLUMNS
 from ..display import Block, Displayed, Table, Wrapped
 from ..engine.checkpoint import write_range
 from ..engine.execute import context_of, integrate_columns
 from ..engine.plan import Plan
 from ..engine.run import Run, ignore
-from ..engine.trajectories import RANGE_TRAJECTORIES, TrajectoryMap
+from ..engine.trajectories import RANGE_TRAJECTORIES, TrajectoryMap, keys_of
 from .layouts import LAYOUTS
 from .schema import dataset_template, stored_variables
 from .sweep import prepare
@@ -161,11 +160,11 @@ def estimate(
     plan = prepare(source, overrides, plugins, Run(max_points=max_points, on_note=on_note))
     # a range in the middle, to avoid the extreme values at both ends
     chosen = plan.ranges[len(plan.ranges) // 2]
-    model = plan.models[chosen.model]
+    law = plan.laws[chosen.model]
     # the first run loads or compiles the core
     for _ in range(2):
         with _timed() as integrating:
-            collisions, _ = integrate_columns(model, plan.columns_of(chosen), plan.solver)
+            collisions, _ = integrate_columns(law, plan.columns_of(chosen), plan.solver)
     with _timed() as driving:
         sent = len(pickle.dumps((plan.columns_of(chosen), context_of(plan)), pickle.HIGHEST_PROTOCOL))
         back = pickle.dumps(collisions, pickle.HIGHEST_PROTOCOL)
@@ -173,7 +172,9 @@ def estimate(
         write_range(io.BytesIO(), "", collisions)
     # the time of a slab does not depend on the values of its trajectories: repeat those of the range
     positions = np.arange(RANGE_TRAJECTORIES) % chosen.size
-    table = table_of(plan, lambda _, start, stop: collisions.take(positions[: stop - start]))
+    blank = {number: trajectory_map.record.blank(chosen.size) for number, trajectory_map in enumerate(plan.maps)}
+    blank[chosen.model] = collisions
+    table = table_of(plan, lambda number, start, stop: blank[number].take(positions[: stop - start]))
     with _timed() as assembling:
         values = next(expanded_slabs(table, stored_variables(plan))).values
         for array in values.values():
@@ -182,7 +183,9 @@ def estimate(
     each, seconds_per_trajectory_of_driver = integrating() / chosen.size, DASK_OVERHEAD * driving() / chosen.size
     writing_seconds = assembling() / slab * plan.stored_points if plan.layout == "full" else 0.0
     busy = min(max(round(each / seconds_per_trajectory_of_driver), 1), len(plan.ranges))
-    work_folder_bytes = plan.trajectories * sum(getattr(collisions, name).itemsize for name in TABLE_COLUMNS)
+    work_folder_bytes = sum(
+        trajectory_map.count * trajectory_map.record.row_bytes() for trajectory_map in plan.maps
+    )
     counts = [*(count for count in WORKER_COUNTS if count < busy), busy]
     return Estimate(
         plan.points,
@@ -211,8 +214,10 @@ def _timed() -> Iterator[Callable[[], float]]:
 
 def _model_counts(plan: Plan, trajectory_map: TrajectoryMap) -> ModelCounts:
     axes = tuple(plan.config.axes[axis].name for axis in trajectory_map.axes)
-    key = plan.models[trajectory_map.model].key
+    keys = keys_of(plan.laws[trajectory_map.model])
     within: Literal["plan", "block", "not"] = "block" if not trajectory_map.is_shared else "plan"
     if not plan.config.solver.collapse:
         within = "not"
-    return ModelCounts(key, plan.inputs.points_of(key), trajectory_map.cells, trajectory_map.count, axes, within)
+    return ModelCounts(
+        " with ".join(keys), plan.inputs.points_of(*keys), trajectory_map.cells, trajectory_map.count, axes, within
+    )

@@ -20,7 +20,6 @@ from ..config.grid import MAX_POINTS, Axis
 from ..config.input_names import InputName
 from ..config.tables import CORES
 from ..contact.model import ForceModel
-from ..contact.simulate import CollisionResult
 from ..contact.status import STATUS_OK, Status
 from ..engine.execute import ReusedPart
 from ..engine.executors import SERIAL, ExecutorSpec
@@ -28,7 +27,7 @@ from ..engine.inputs import Inputs
 from ..engine.plan import Plan
 from ..engine.plugins import Plugins, read_plugins
 from ..engine.run import ProgressCallback, Run, ignore, never
-from ..engine.trajectories import TrajectoryMap, TrajectoryRange
+from ..engine.trajectories import TrajectoryMap, TrajectoryRange, keys_of
 from ..errors import ResultError, UsageError
 from ..formatting import safe_text
 from .attributes import read_attribute
@@ -187,7 +186,8 @@ def _check_whole(before: xr.Dataset, old: Plan, name: str) -> None:
     version = safe_text(str(before.attrs.get("impact_version")), 40)
     if version != __version__:
         raise ResultError(f"{name}: was written by impact {version}, this is {__version__}; run its sweep again")
-    sizes = {"model": len(old.models), **{axis.name: axis.size for axis in old.config.axes}}
+    sizes = {"model": len(old.models), **({"friction": len(old.frictions)} if old.frictions else {})}
+    sizes |= {axis.name: axis.size for axis in old.config.axes}
     if before.attrs.get("fingerprint") != old.fingerprint or dict(before.sizes) != sizes:
         raise UsageError(f"{name}: got a part of a result, expected the whole result")
 
@@ -212,10 +212,13 @@ def _extended_plan(
             new_values = (value for value in axis.columns[name] if value not in old_values.tolist())
             values = [*old_values.tolist(), *new_values]
             added.append(override_text(InputName.parse(name).path, values))
-    missing = [model.key for model in old.models if model not in config.models]
-    if missing:
-        keys = [*(model.key for model in old.models), *(m.key for m in config.models if m not in old.models)]
-        added.append(override_text(("models",), keys))
+    for table, laws, now in (
+        ("models", old.models, config.models),
+        ("frictions", old.frictions, config.frictions),
+    ):
+        if any(law not in now for law in laws):
+            keys = [*(law.key for law in laws), *(law.key for law in now if law not in laws)]
+            added.append(override_text((table,), keys))
     if added:
         config = stored_config(before.attrs, [*overrides, *added], plugins, source, max_points)
     return Plan(config, plugins.of(config.models))
@@ -224,7 +227,7 @@ def _extended_plan(
 def _check_changes(old: Plan, new: Plan, name: str) -> None:
     """Refuse changes of anything but values of axes and models."""
     old_physics, new_physics = dict(old.physics), dict(new.physics)
-    free = ("models", "axes", "scalars", "materials", "plugins")
+    free = ("models", "frictions", "axes", "scalars", "materials", "plugins")
     changed = [key for key in old_physics if key not in free and old_physics[key] != new_physics[key]]
     changed += [
         f"model {key}" for key in old.plugins.hashes if old.plugins.hashes[key] != new.plugins.hashes.get(key)
@@ -253,7 +256,7 @@ def _check_changes(old: Plan, new: Plan, name: str) -> None:
             f"{name}: --set changes {', '.join([*changed, *moved])}, expected more values of an axis, "
             "such as --set 'sweep.m2=[1.0, 2.0]', or more models"
         )
-    if old.models == new.models and old.config.axes == new.config.axes:
+    if old.laws == new.laws and old.config.axes == new.config.axes:
         raise UsageError(f"{name}: already has all of these; expected more values of an axis, or more models")
 
 
@@ -316,29 +319,29 @@ class _OldPositions:
     old: Plan
     new: Plan
     axes: tuple[_AxisPositions, ...]
-    # by model, for each trajectory its row in the old table, or -1
+    # by law, for each trajectory its row in the old table, or -1
     _rows: dict[int, IndexArray] = field(default_factory=dict)
 
-    def model(self, model: int) -> int | None:
-        """Find the number that a model had in the old plan, or None."""
-        keys = [old_model.key for old_model in self.old.models]
-        key = self.new.models[model].key
-        return keys.index(key) if key in keys else None
+    def law(self, number: int) -> int | None:
+        """Find the number that a model or a pair had in the old plan, or None."""
+        keys = [keys_of(law) for law in self.old.laws]
+        of_law = keys_of(self.new.laws[number])
+        return keys.index(of_law) if of_law in keys else None
 
     def from_table(self, trajectory_range: TrajectoryRange, table: TrajectoryTable) -> ReusedPart:
         """Take the trajectories of a range that the old result has in its table."""
-        model = self.model(trajectory_range.model)
-        if model is None:
+        law = self.law(trajectory_range.model)
+        if law is None:
             return None
-        old_rows = self._old_rows(trajectory_range, table.maps[model])
+        old_rows = self._old_rows(trajectory_range, table.maps[law])
         is_known = old_rows >= 0
-        stored = table.rows.take(model, np.maximum(old_rows, 0))
+        stored = table.rows.take(law, np.maximum(old_rows, 0))
         # a status that was assigned before integration may differ between the two sweeps
         status = self.new.columns_of(trajectory_range)["status"]
         is_known &= np.where(
             status == STATUS_OK, ~np.isin(stored.status, CHECKED_STATUSES), stored.status == status
         )
-        collisions = CollisionResult.blank(trajectory_range.size)
+        collisions = trajectory_range.record.blank(trajectory_range.size)
         collisions.put(np.flatnonzero(is_known), stored.take(np.flatnonzero(is_known)))
         return is_known, collisions
 
@@ -347,7 +350,7 @@ class _OldPositions:
         trajectory_map = self.new.maps[trajectory_range.model]
         others = [axis for axis in range(len(self.axes)) if axis not in trajectory_map.axes]
         is_new_along = [(self.axes[axis].positions < 0).any() for axis in others]
-        if self.model(trajectory_range.model) is None or any(is_new_along):
+        if self.law(trajectory_range.model) is None or any(is_new_along):
             return None
         if trajectory_map.of_cell is None:
             is_old = self._is_old(trajectory_map, trajectory_range.rows)
@@ -355,7 +358,7 @@ class _OldPositions:
             needed = np.zeros(trajectory_map.count, bool)
             needed[trajectory_map.of_cell[~self._is_old(trajectory_map, np.arange(trajectory_map.cells))]] = True
             is_old = ~needed[trajectory_range.rows]
-        return is_old, CollisionResult.blank(trajectory_range.size)
+        return is_old, trajectory_range.record.blank(trajectory_range.size)
 
     def _is_old(self, trajectory_map: TrajectoryMap, cells: IndexArray) -> NDArray[np.bool_]:
         along = np.unravel_index(cells, trajectory_map.shape) if trajectory_map.shape else ()
@@ -397,9 +400,12 @@ class _OldPositions:
         names = [axis.name for axis in self.old.config.axes]
 
         def fill(slab: ExpandedSlab) -> None:
-            old_model = self.model(slab.model)
-            if old_model is None:
+            old_number = self.law(slab.number)
+            if old_number is None:
                 return
+            models, frictions = len(self.old.models), len(self.old.frictions)
+            place = (old_number,) if old_number < models else divmod(old_number - models, frictions)
+            of_law = dict(zip(("model", "friction"), place, strict=False))
             old_positions = [axis.positions[part] for axis, part in zip(self.axes, slab.region, strict=True)]
             inside = np.ix_(*(np.flatnonzero(positions >= 0) for positions in old_positions))
             if any(positions.size == 0 for positions in inside):
@@ -414,7 +420,7 @@ class _OldPositions:
             for name, array in slab.values.items():
                 if "model" not in before[name].dims:
                     continue
-                old_values = before[name].isel(model=old_model, **chosen).transpose(*order).values
+                old_values = before[name].isel({**of_law, **chosen}).transpose(*order).values
                 shape = tuple(positions.size for positions in inside)
                 if not array.flags.writeable:
                     # a view of computed values that was not copied

@@ -12,7 +12,7 @@ import math
 import operator
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -25,17 +25,19 @@ from ..config.input_names import is_input
 from ..contact.formula_calls import Formula
 from ..contact.materials import Material
 from ..contact.model import Law, Parameter
-from ..contact.simulate import TABLE_COLUMNS, CollisionResult
-from ..contact.status import STATUSES, Status
+from ..contact.records import Record
+from ..contact.simulate import CollisionResult
+from ..contact.status import FRICTION_STATUSES, STATUSES, Status
+from ..contact.tangential import FrictionKind, TangentialResult
 from ..contact.variables import OUTPUTS, Variable
-from ..engine.build_impacts import Stiffness, has_stiffness_rule, mass_at, values_at
+from ..engine.build_impacts import Stiffness, has_stiffness_rule, mass_at, radius_at, values_at, velocity_at
 from ..engine.inputs import Index, Inputs
 from ..engine.trajectories import TrajectoryMap
 from ..errors import ResultError, UsageError
 from ..formatting import number, safe_text
-from .attributes import LawRecord, SummaryRecord, read_attribute
+from .attributes import LawRecord, PairRecord, SummaryRecord, read_attribute
 from .netcdf import RegionValues
-from .schema import attributes_of, count_points, derived_names, scale_of
+from .schema import SLIP_INPUTS, attributes_of, count_points, derived_names, scale_of
 from .trajectory_table import MAX_STIFFNESS_VALUES, TrajectoryRows, TrajectoryTable, expand, whole_stiffness
 
 N_WITNESSES = 1_000
@@ -43,7 +45,14 @@ N_WITNESSES = 1_000
 WITNESS_TOLERANCE = 1e-12
 SLAB_ROWS = 2**16
 # by the bits of a status, whether it is one
-IS_STATUS = np.isin(np.arange(2**8), STATUSES)
+IS_STATUS = {
+    CollisionResult: np.isin(np.arange(2**8), STATUSES),
+    TangentialResult: np.isin(np.arange(2**8), FRICTION_STATUSES),
+}
+# what the variables of each type of trajectories begin with, which is also the name of their dimension
+PREFIXES: Mapping[type[Record], str] = {CollisionResult: "trajectory", TangentialResult: "tangential"}
+# by whether they are of pairs, the dimension of witnesses and the variable of their places
+WITNESSES = {False: ("witness", "witness_index"), True: ("pair_witness", "witness_pair_index")}
 
 # reads some values of a variable of the table, by its name; and the parts of some lengths that it consists of
 ReadVariable = Callable[[str, slice | NDArray[np.intp]], NDArray[Any]]
@@ -61,6 +70,13 @@ class StoredLaw:
     quantities: frozenset[str]
     is_permanent: bool
     stiffness: Formula | None = None
+
+
+class StoredFriction(NamedTuple):
+    """A friction law as stored in a file."""
+
+    key: str
+    kind: FrictionKind
 
 
 def stored_stiffness(
@@ -91,7 +107,7 @@ def factored_template(
     """Build the dataset of a factored file, with placeholder values, from the coordinates of the result."""
     names = [axis.name for axis in table.inputs.axes]
     laws, stiffness = {}, _stiffness_of_laws(table)
-    for law, trajectory_map, rule in zip(table.laws, table.maps, stiffness, strict=True):
+    for law, trajectory_map, rule in zip(table.laws, table.maps, stiffness, strict=False):
         record = LawRecord(
             exponent=law.exponent,
             parameters=[parameter.name for parameter in law.parameters],
@@ -104,31 +120,38 @@ def factored_template(
             stiffness_axes=None if rule is None else [names[axis] for axis in rule[0]],
         )
         laws[law.key] = vars(record)
-    rows = sum(trajectory_map.count for trajectory_map in table.maps)
+    pairs = [
+        vars(PairRecord([names[axis] for axis in pair.axes], pair.count, pair.is_shared))
+        for pair in table.maps[len(table.laws) :]
+    ]
     cells = sum(trajectory_map.cells for trajectory_map in table.maps if trajectory_map.is_shared)
-    witnesses = len(witness_indices(len(table.laws) * table.inputs.cells))
-    blank = CollisionResult.blank(1)
 
     def placeholder(dim: str, size: int, dtype: Any, attributes: Mapping[str, object] | str) -> tuple[Any, ...]:
         described = {"long_name": attributes} if isinstance(attributes, str) else attributes
         return dim, np.broadcast_to(np.zeros((), dtype), size), described
 
-    stored = {
-        f"trajectory_{name}": placeholder(
-            "trajectory", rows, getattr(blank, name).dtype, f"{name} of a trajectory"
-        )
-        for name in TABLE_COLUMNS
-    }
+    stored = {}
+    for record_type, prefix in PREFIXES.items():
+        if rows := sum(
+            trajectory_map.count for trajectory_map in table.maps if trajectory_map.record is record_type
+        ):
+            for name, array in vars(record_type.blank(1)).items():
+                stored[f"{prefix}_{name}"] = placeholder(prefix, rows, array.dtype, f"{name} of a trajectory")
     if cells:
         stored["trajectory_of_cell"] = placeholder("cell", cells, "i4", "number of the trajectory of a cell")
     if values := sum(rule[1].size for rule in stiffness if rule is not None):
         stored["law_stiffness"] = placeholder("stiffness_value", values, "f8", "K by the rules of the laws")
-    stored["witness_index"] = placeholder("witness", witnesses, "i8", "place in C order of (model, axes)")
-    for variable in variables:
-        stored[f"witness_{variable.name}"] = placeholder(
-            "witness", witnesses, variable.dtype, attributes_of(variable)
-        )
+    for of_friction, indices, chosen in _witnesses(table, variables):
+        dim, index_name = WITNESSES[of_friction]
+        stored[index_name] = placeholder(dim, indices.size, "i8", "place in C order of (model, axes)")
+        for variable in chosen:
+            stored[f"witness_{variable.name}"] = placeholder(
+                dim, indices.size, variable.dtype, attributes_of(variable)
+            )
     attributes = {**result_template.attrs, "axes": json.dumps(names), "laws": json.dumps(laws)}
+    if pairs:
+        frictions = {friction.key: friction.kind for friction in table.frictions}
+        attributes |= {"frictions": json.dumps(frictions), "pairs": json.dumps(pairs)}
     template = xr.Dataset(stored, result_template.coords, attributes)
     # readers of netCDF take coordinates that no variable names for variables
     others = [str(name) for name in result_template.coords if name not in result_template.dims]
@@ -137,25 +160,34 @@ def factored_template(
 
 def table_values(table: TrajectoryTable, variables: Sequence[Variable]) -> Iterator[RegionValues]:
     """Yield the values of a factored file, a few at a time: name of the variable, region and values."""
-    start = 0
-    for model, trajectory_map in enumerate(table.maps):
+    starts = dict.fromkeys(PREFIXES, 0)
+    for law, trajectory_map in enumerate(table.maps):
+        start, prefix = starts[trajectory_map.record], PREFIXES[trajectory_map.record]
         for first in range(0, trajectory_map.count, SLAB_ROWS):
             rows = np.arange(first, min(first + SLAB_ROWS, trajectory_map.count))
-            part = table.rows.take(model, rows)
-            for name in TABLE_COLUMNS:
-                region = slice(start + first, start + first + rows.size)
-                yield f"trajectory_{name}", (region,), getattr(part, name)
-        start += trajectory_map.count
+            for name, array in vars(table.rows.take(law, rows)).items():
+                yield f"{prefix}_{name}", (slice(start + first, start + first + rows.size),), array
+        starts[trajectory_map.record] += trajectory_map.count
     cells = [trajectory_map.of_cell for trajectory_map in table.maps if trajectory_map.of_cell is not None]
     stiffness = [rule[1].reshape(-1) for rule in _stiffness_of_laws(table) if rule is not None]
     stored: dict[str, Sequence[NDArray[Any]]] = {"trajectory_of_cell": cells, "law_stiffness": stiffness}
     for name, arrays in stored.items():
         for region, array in zip(_consecutive([array.size for array in arrays]), arrays, strict=True):
             yield name, (region,), array
-    indices = witness_indices(len(table.laws) * table.inputs.cells)
-    yield "witness_index", (slice(0, indices.size),), indices
-    for name, values in witness_values(table, variables, indices).items():
-        yield f"witness_{name}", (slice(0, indices.size),), values
+    for of_friction, indices, chosen in _witnesses(table, variables):
+        yield WITNESSES[of_friction][1], (slice(0, indices.size),), indices
+        for name, values in witness_values(table, chosen, indices).items():
+            yield f"witness_{name}", (slice(0, indices.size),), values
+
+
+def _witnesses(
+    table: TrajectoryTable, variables: Sequence[Variable]
+) -> Iterator[tuple[bool, NDArray[np.int64], list[Variable]]]:
+    """Choose witnesses of the models, and of the pairs if there are some: their places, and their variables."""
+    for of_friction in (False, True):
+        if numbers := table.numbers(of_friction):
+            indices = witness_indices(len(numbers) * table.inputs.cells)
+            yield of_friction, indices, [variable for variable in variables if variable.of_friction == of_friction]
 
 
 def _consecutive(sizes: Sequence[int]) -> list[slice]:
@@ -185,12 +217,13 @@ def witness_indices(points: int) -> NDArray[np.int64]:
 def witness_values(
     table: TrajectoryTable, variables: Sequence[Variable], indices: NDArray[np.int64]
 ) -> dict[str, NDArray[Any]]:
-    """Compute the values of some points of a result, by name; arrays of shape (len(indices),)."""
+    """Compute the values of some points of models, or of pairs, by name; arrays of shape (len(indices),)."""
     models, cells = np.divmod(indices, table.inputs.cells)
+    numbers = table.numbers(any(variable.of_friction for variable in variables))
     values_by_name = {variable.name: np.empty(indices.size, variable.dtype) for variable in variables}
     for model in np.unique(models).tolist():
         rows = np.flatnonzero(models == model)
-        _, values = expand(table, model, _unravel_cells(table.inputs, cells[rows]), list(values_by_name))
+        _, values = expand(table, numbers[model], _unravel_cells(table.inputs, cells[rows]), list(values_by_name))
         for name, array in values_by_name.items():
             array[rows] = np.broadcast_to(values[name], rows.shape)
     return values_by_name
@@ -217,27 +250,38 @@ def stored_table(dataset: xr.Dataset, sizes: Mapping[str, int], read: ReadVariab
             raise ValueError
         return (read(name, part) for part in _consecutive(lengths))
 
+    pairs: list[PairRecord] = read_attribute(dataset.attrs, "pairs")
+    frictions = tuple(StoredFriction(*item) for item in read_attribute(dataset.attrs, "frictions").items())
+    if len(pairs) != len(laws) * len(frictions) or [friction.key for friction in frictions] != [
+        str(key) for key in dataset.get("friction", xr.DataArray([], dims="friction")).values
+    ]:
+        raise ResultError("is not a readable result (pairs: not those of its models and friction laws)")
     try:
-        maps = _stored_maps(inputs, laws.values(), parts)
+        maps = _stored_maps(inputs, [*laws.values(), *pairs], len(laws), parts)
         rules = _stored_rules(inputs, laws.values(), parts)
-        rows = _consecutive([trajectory_map.count for trajectory_map in maps])
-        if {sizes[f"trajectory_{name}"] for name in TABLE_COLUMNS} != {rows[-1].stop}:
-            raise ValueError
-        _check_trajectory_statuses(rows[-1].stop, read)
+        rows: list[slice] = []
+        for record_type, prefix in PREFIXES.items():
+            of_type = [trajectory_map.count for trajectory_map in maps if trajectory_map.record is record_type]
+            if of_type:
+                rows += _consecutive(of_type)
+                if {sizes[f"{prefix}_{name}"] for name in record_type.columns()} != {sum(of_type)}:
+                    raise ValueError
+                _check_trajectory_statuses(record_type, sum(of_type), read)
     except (KeyError, TypeError, ValueError, IndexError, OverflowError):
         raise ResultError("is not a readable result (its laws do not fit its table)") from None
 
-    def read_rows(model: int, part: slice | NDArray[np.intp]) -> CollisionResult:
-        start = rows[model].start
+    def read_rows(law: int, part: slice | NDArray[np.intp]) -> Record:
+        start, record_type = rows[law].start, maps[law].record
         chosen = slice(start + part.start, start + part.stop) if isinstance(part, slice) else start + part
-        return CollisionResult(**{name: read(f"trajectory_{name}", chosen) for name in TABLE_COLUMNS})
+        prefix = PREFIXES[record_type]
+        return record_type(**{name: read(f"{prefix}_{name}", chosen) for name in record_type.columns()})
 
-    trajectory_rows = TrajectoryRows(maps, lambda model, *ends: read_rows(model, slice(*ends)), pick=read_rows)
+    trajectory_rows = TrajectoryRows(maps, lambda law, *ends: read_rows(law, slice(*ends)), pick=read_rows)
     summary = read_attribute(dataset.attrs, "summary") or None
     if summary is not None:
         _check_summary(summary, dataset, inputs.shape)
     stored_laws = tuple(_stored_law(key, law) for key, law in laws.items())
-    return TrajectoryTable(inputs, stored_laws, tuple(maps), trajectory_rows, tuple(rules), summary)
+    return TrajectoryTable(inputs, stored_laws, tuple(maps), trajectory_rows, tuple(rules), summary, frictions)
 
 
 def _axis_numbers(inputs: Inputs, names: Sequence[str]) -> tuple[int, ...]:
@@ -248,16 +292,19 @@ def _axis_numbers(inputs: Inputs, names: Sequence[str]) -> tuple[int, ...]:
     return tuple(numbers[name] for name in names)
 
 
-def _stored_maps(inputs: Inputs, laws: Collection[LawRecord], parts: ReadParts) -> list[TrajectoryMap]:
-    """Read the trajectory of each cell, of each law; raise a ValueError for one that does not exist."""
+def _stored_maps(
+    inputs: Inputs, laws: Sequence[LawRecord | PairRecord], models: int, parts: ReadParts
+) -> list[TrajectoryMap]:
+    """Read the trajectory of each cell, of each model and pair; raise a ValueError for one that does not exist."""
     maps = []
-    for model, law in enumerate(laws):
+    for position, law in enumerate(laws):
         axes = _axis_numbers(inputs, law.axes)
-        maps.append(TrajectoryMap(model, axes, tuple(inputs.shape[axis] for axis in axes)))
+        record = CollisionResult if position < models else TangentialResult
+        maps.append(TrajectoryMap(position, axes, tuple(inputs.shape[axis] for axis in axes), record=record))
     shared = [model for model, law in enumerate(laws) if law.is_shared]
     cells = parts("trajectory_of_cell", [maps[model].cells for model in shared])
     for model, of_cell in zip(shared, cells, strict=True):
-        count = [*laws][model].trajectories
+        count = laws[model].trajectories
         if of_cell.dtype.kind != "i" or of_cell.min() < 0 or of_cell.max() >= count:
             raise ValueError
         # the first cell of a trajectory is not needed to read it
@@ -291,11 +338,11 @@ def _check_summary(summary: SummaryRecord, dataset: xr.Dataset, shape: tuple[int
         raise ResultError("is not a readable result (summary: not that of its points)")
 
 
-def _check_trajectory_statuses(rows: int, read: ReadVariable) -> None:
+def _check_trajectory_statuses(record: type[Record], rows: int, read: ReadVariable) -> None:
     """Refuse unknown statuses, since the computed ones would be unknown as well."""
     for first in range(0, rows, SLAB_ROWS):
-        values = read("trajectory_status", slice(first, min(first + SLAB_ROWS, rows)))
-        if values.dtype != np.int8 or not IS_STATUS[values.view(np.uint8)].all():
+        values = read(f"{PREFIXES[record]}_status", slice(first, min(first + SLAB_ROWS, rows)))
+        if values.dtype != np.int8 or not IS_STATUS[record][values.view(np.uint8)].all():
             raise ValueError
 
 
@@ -363,15 +410,25 @@ def _stored_axis_names(dataset: xr.Dataset) -> list[str]:
 
 def check_witnesses(table: TrajectoryTable, variables: Sequence[Variable], stored: xr.Dataset) -> None:
     """Refuse a file whose witnesses, stored with their index, expand to other numbers; name both versions."""
-    indices = np.asarray(stored["witness_index"].values, np.int64)
-    points = len(table.laws) * table.inputs.cells
-    if not np.array_equal(indices, witness_indices(points)):
-        raise ResultError("is not a readable result (its witnesses are not at the expected positions)")
+    for of_friction, expected, chosen in _witnesses(table, variables):
+        indices = np.asarray(stored[WITNESSES[of_friction][1]].values, np.int64)
+        if not np.array_equal(indices, expected):
+            raise ResultError("is not a readable result (its witnesses are not at the expected positions)")
+        _check_witnesses_at(table, chosen, indices, stored)
+
+
+def _check_witnesses_at(
+    table: TrajectoryTable, variables: Sequence[Variable], indices: NDArray[np.int64], stored: xr.Dataset
+) -> None:
+    """Refuse stored values at some points, of models or of pairs, that expand to other numbers."""
     expanded = witness_values(table, variables, indices)
     cells = indices % table.inputs.cells
     index = _unravel_cells(table.inputs, cells)
-    inputs = {name: values_at(table.inputs, name, index) for name in ("v1", "v2")}
+    inputs = {name: values_at(table.inputs, name, index) for name in table.inputs.names() if name in SLIP_INPUTS}
+    inputs |= {f"v{ball}": velocity_at(table.inputs, ball, index) for ball in "12"}
     inputs |= {f"m{ball}": mass_at(table.inputs, ball, index) for ball in "12"}
+    if any(variable.of_friction for variable in variables):
+        inputs |= {f"R{ball}": radius_at(table.inputs, ball, index, inputs[f"m{ball}"]) for ball in "12"}
     for variable in variables:
         expected, got = stored[f"witness_{variable.name}"].values, expanded[variable.name]
         columns = {**inputs, variable.name: expected}

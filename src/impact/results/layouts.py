@@ -83,7 +83,7 @@ class FullLayout:
                 if fill:
                     fill(slab)
                 for name, array in slab.values.items():
-                    yield name, (slab.model, *slab.region) if "model" in result[name].dims else slab.region, array
+                    yield name, slab.region_in(result[name].dims), array
                 add_slab(summary, table, slab)
                 on_slab(summary.points, summary.failed)
 

@@ -59,6 +59,9 @@ class SweepOutcome(Displayed):
             "models": self.dataset.sizes["model"],
             "trajectories": self.trajectories,
             "status": counts_by_name(self.summary.counts),
+            **(
+                {"friction_status": counts_by_name(friction)} if (friction := self.summary.friction_counts) else {}
+            ),
             "failed": self.summary.failed,
             "first_failed": self.records(),
             "layout": self.dataset.encoding.get("layout"),
@@ -85,6 +88,11 @@ class SweepOutcome(Displayed):
         counts = ", ".join(f"{count:,} {name}" for name, count in counts_by_name(summary.counts).items())
         distinct = "" if self.trajectories is None else f" from {self.trajectories:,} trajectories"
         yield Wrapped(f"{self.output}: {summary.points:,} points{distinct} ({counts})")
+        if summary.friction_counts:
+            counts = ", ".join(
+                f"{count:,} {name}" for name, count in counts_by_name(summary.friction_counts).items()
+            )
+            yield Wrapped(f"with each friction law: {counts}")
         failures = self.records()
         for failure in failures:
             inputs = ", ".join(f"{name}={label(value)}" for name, value in failure["at"].items())
@@ -100,7 +108,10 @@ class SweepOutcome(Displayed):
     def failed_line(self) -> str:
         """The number of failed points by status."""
         counts, failed = self.summary.counts, self.summary.failed
-        reasons = (f"{counts[s]:,} {s.name.lower()}" for s in sorted(counts) if s >= FIRST_FAILURE)
+        failures = {
+            s: count for s, count in counts.items() if s >= FIRST_FAILURE
+        } or self.summary.friction_failures
+        reasons = (f"{count:,} {name}" for name, count in counts_by_name(failures).items())
         return f"{self.output}: {failed:,} of {self.summary.points:,} points failed ({', '.join(reasons)})"
 
 

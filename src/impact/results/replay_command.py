@@ -49,7 +49,7 @@ def describe_point(at: Mapping[str, float | str]) -> str:
 
 
 def replay_command(start: Sequence[str], at: Mapping[str, object]) -> str:
-    """Complete the command by the model and the inputs of the point.
+    """Complete the command by the model, the friction law and the inputs of the point.
 
     >>> replay_command(("impact", "run", "new.h5"), {"model": "hertz", "case": 3})
     'impact run new.h5 --model hertz --at case=3'
@@ -59,5 +59,5 @@ def replay_command(start: Sequence[str], at: Mapping[str, object]) -> str:
     command = list(start)
     for name, value in at.items():
         text = repr(value) if isinstance(value, float) else str(value)
-        command += ["--model", text] if name == "model" else ["--at", f"{name}={text}"]
+        command += [f"--{name}", text] if name in ("model", "friction") else ["--at", f"{name}={text}"]
     return safe_text(shlex.join(command), 2000)

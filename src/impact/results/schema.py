@@ -24,9 +24,9 @@ from ..config.load import Config
 from ..config.tables import MATERIAL_KEYS
 from ..contact.fixed_step import EXACT
 from ..contact.materials import effective_mass
-from ..contact.variables import AXES, BY_DEFAULT, HISTORY, OUTPUTS, Variable, by_name
-from ..engine.build_impacts import mass_at, restitution_at
-from ..engine.inputs import Index
+from ..contact.variables import AXES, HISTORY, OUTPUTS, Variable, by_name, default_variables
+from ..engine.build_impacts import mass_at, radius_at, restitution_at, velocity_at
+from ..engine.inputs import Index, Inputs
 from ..engine.plan import Plan
 from ..formatting import number
 from .kinds import Kind
@@ -150,6 +150,9 @@ STUDY_COORDINATES: Mapping[Kind, Mapping[str, str]] = {
 }
 CALIBRATION_TEXTS = ("parameter", "other_parameter", "output_name", "output", "determined", "specimen")
 
+# inputs that the slip before an impact follows from, besides v1 and v2
+SLIP_INPUTS = ("u1", "u2", "angle", "omega1", "omega2", "R1", "R2")
+
 RECORDED_PACKAGES = ("numpy", "h5py", "h5netcdf", "xarray")
 
 
@@ -173,11 +176,36 @@ def scale_of(variable: Variable, read: Callable[[str], NDArray[Any]], *, has_pea
         case "m v0^2/2":
             v0 = number("v1") - number("v2")
             return np.asarray(0.5 * effective_mass(number("m1"), number("m2")) * v0 * v0)
+        case "the slip":
+            return np.abs(number("v1") - number("v2")) + _slip_before(number)
+        case "the spin":
+            speed = np.abs(number("v1") - number("v2")) + _slip_before(number)
+            return np.asarray(speed / number(f"R{variable.name[len('omega')]}"))
+        case "m (v0^2 + g0^2)/2":
+            v0, slip = number("v1") - number("v2"), _slip_before(number)
+            return np.asarray(0.5 * effective_mass(number("m1"), number("m2")) * (v0 * v0 + slip * slip))
         case "the peak" if has_peak:
             return np.asarray(np.abs(number("peak_indentation")))
         case "itself" | "the peak":
             return np.asarray(np.abs(number(variable.name)))
     return np.ones(())
+
+
+def _slip_before(read: Callable[[str], NDArray[np.float64]]) -> NDArray[np.float64]:
+    """The size of the slip before oblique impacts [m/s], from those of their inputs that a result has."""
+
+    def given(name: str) -> NDArray[np.float64] | float:
+        try:
+            return read(name)
+        except KeyError:
+            return 0.0
+
+    spins = (given(f"omega{ball}") for ball in "12")
+    spinning = sum(
+        read(f"R{ball}") * spin if np.any(spin) else 0.0 for ball, spin in zip("12", spins, strict=True)
+    )
+    along = given("u1") - given("u2") + (read("v1") - read("v2")) * np.tan(given("angle"))
+    return np.asarray(np.abs(along + spinning))
 
 
 def template(variables: Iterable[Variable], sizes: Mapping[Hashable, int], axes: Sequence[str]) -> dict[str, Any]:
@@ -199,8 +227,10 @@ def template(variables: Iterable[Variable], sizes: Mapping[Hashable, int], axes:
 
 
 def stored_variables(plan: Plan) -> tuple[Variable, ...]:
-    """Choose the variables of the result of a plan; always with the status, which explains NaNs."""
-    chosen = {"status", *(plan.config.output.variables or BY_DEFAULT)}
+    """Choose the variables of the result of a plan; always with the statuses, which explain NaNs."""
+    has_friction = bool(plan.frictions)
+    chosen = {"status", *(plan.config.output.variables or default_variables(has_friction))}
+    chosen |= {"friction_status"} if has_friction else set()
     return tuple(
         replace(variable, dtype=plan.config.output.dtype if variable.dtype == "f8" else variable.dtype)
         for name, variable in OUTPUTS.items()
@@ -244,6 +274,9 @@ def plan_coordinates(plan: Plan) -> xr.Coordinates:
         },
         "year": ("model", [model.year for model in models], {"long_name": "year of the model"}),
     }
+    if plan.frictions:
+        keys = [friction.key for friction in plan.frictions]
+        coordinates["friction"] = ("friction", keys, {"long_name": "friction law"})
     for axis in plan.config.axes:
         if axis.numbered:
             meaning = f"number of the {axis.name.partition('_')[0]}"
@@ -259,12 +292,23 @@ def plan_coordinates(plan: Plan) -> xr.Coordinates:
         restitutions = _derived_values(plan, ("alpha", "v1", "v2"), partial(restitution_at, plan.inputs))
         coordinates["e"] = (*restitutions, attributes)
     for ball in "12":
+        material = (
+            "material",
+            f"material{ball}",
+            *(f"materials.{name}.rho" for name in plan.inputs.materials_of(ball)),
+        )
         if f"m{ball}" not in plan.inputs.names():
-            densities = [f"materials.{name}.rho" for name in plan.inputs.materials_of(ball)]
-            names = (f"R{ball}", "material", f"material{ball}", *densities)
             attributes = coordinate_attributes(plan, f"m{ball}") | {"equation": "m = (4/3) pi R^3 rho"}
-            masses = _derived_values(plan, names, partial(mass_at, plan.inputs, ball))
+            masses = _derived_values(plan, (f"R{ball}", *material), partial(mass_at, plan.inputs, ball))
             coordinates[f"m{ball}"] = (*masses, attributes)
+        elif plan.frictions and f"R{ball}" not in plan.inputs.names():
+            attributes = coordinate_attributes(plan, f"R{ball}") | {"equation": "m = (4/3) pi R^3 rho"}
+            radii = _derived_values(plan, (f"m{ball}", *material), partial(_radius, plan.inputs, ball))
+            coordinates[f"R{ball}"] = (*radii, attributes)
+    if "speed" in plan.inputs.names():
+        attributes = coordinate_attributes(plan, "v1") | {"equation": "v1 = v2 + speed cos(angle)"}
+        velocities = _derived_values(plan, ("speed", "angle", "v2"), partial(velocity_at, plan.inputs, "1"))
+        coordinates["v1"] = (*velocities, attributes)
     return xr.Coordinates(coordinates, indexes={})
 
 
@@ -329,9 +373,11 @@ def is_case(name: str) -> bool:
 
 
 def derived_names(coords: Mapping[Any, xr.DataArray]) -> frozenset[str]:
-    """Name the coordinates of inputs that were computed: e from alpha, masses from R and rho."""
-    masses = {name for name in ("m1", "m2") if name in coords and "equation" in coords[name].attrs}
-    return frozenset(masses | ({"e"} if "alpha" in coords else set()))
+    """Name the coordinates that were computed: e from alpha, masses and radii from rho, v1 from speed."""
+    derived = {
+        name for name in ("m1", "m2", "R1", "R2", "v1") if "equation" in getattr(coords.get(name), "attrs", ())
+    }
+    return frozenset(derived | ({"e"} if "alpha" in coords else set()))
 
 
 def columns_along(dataset: xr.Dataset, dim: Hashable) -> list[str]:
@@ -341,9 +387,9 @@ def columns_along(dataset: xr.Dataset, dim: Hashable) -> list[str]:
     return [name for name in along if is_input(name) and name not in derived]
 
 
-def foreign_dims(dataset: xr.Dataset, key: str) -> list[Hashable]:
-    """List the dimensions along which only parameters of other models vary, so that this model does not."""
-    return [dim for dim in dataset.dims if is_foreign(columns_along(dataset, dim), key)]
+def foreign_dims(dataset: xr.Dataset, model: str, friction: str = "") -> list[Hashable]:
+    """List the dimensions along which only parameters of other laws vary, so that this model or pair does not."""
+    return [dim for dim in dataset.dims if is_foreign(columns_along(dataset, dim), model, friction)]
 
 
 def parts_of_models(dataset: xr.Dataset) -> Iterator[xr.Dataset]:
@@ -353,11 +399,18 @@ def parts_of_models(dataset: xr.Dataset) -> Iterator[xr.Dataset]:
         yield dataset.isel({"model": model, **first})
 
 
+def parts_of_pairs(dataset: xr.Dataset) -> Iterator[xr.Dataset]:
+    """Select each pair of a result, at the first position along the parameters of other models and frictions."""
+    for model, key in enumerate(dataset["model"].values):
+        for friction, friction_key in enumerate(dataset["friction"].values):
+            first = dict.fromkeys(foreign_dims(dataset, str(key), str(friction_key)), slice(0, 1))
+            yield dataset.isel({"model": model, "friction": friction, **first})
+
+
 def count_points(dataset: xr.Dataset) -> int:
-    """Count the points of a result, without repetitions along parameters of other models."""
-    if "model" not in dataset.dims:
-        return math.prod(dataset.sizes.values())
-    return sum(math.prod(part.sizes.values()) for part in parts_of_models(dataset))
+    """Count the points of a result: cells for a model, without repetitions along parameters of other laws."""
+    sizes = [part.sizes for part in parts_of_models(dataset)] if "model" in dataset.dims else [dataset.sizes]
+    return sum(math.prod(size for dim, size in of_model.items() if dim != "friction") for of_model in sizes)
 
 
 def _exponents(plan: Plan) -> tuple[tuple[str, ...], Array]:
@@ -368,6 +421,10 @@ def _exponents(plan: Plan) -> tuple[tuple[str, ...], Array]:
     axis = plan.config.axes[axes[0]]
     values = np.asarray(axis.columns["n"], float)
     return ("model", axis.name), np.where(np.isnan(own)[:, None], values, own[:, None])
+
+
+def _radius(inputs: Inputs, ball: str, index: Index) -> Array:
+    return radius_at(inputs, ball, index, mass_at(inputs, ball, index))
 
 
 def _derived_values(

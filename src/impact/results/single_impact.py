@@ -22,7 +22,7 @@ from ..config.input_names import SWEEP_INPUTS, InputName, input_values
 from ..config.load import Config, build, inline_files
 from ..config.rules import has_other_stiffness
 from ..config.starter import STARTER_CONFIG
-from ..config.tables import MATERIAL_QUANTITIES, SWEEP_DEFAULTS, expand_models, model_quantities
+from ..config.tables import MATERIAL_QUANTITIES, SWEEP_DEFAULTS, expand_models, law_quantities
 from ..contact.fixed_step import EXACT
 from ..contact.force_expressions import unload_to_residual, unload_with_stiffness
 from ..contact.history import History, integrate_history
@@ -132,7 +132,7 @@ class Impact(Displayed):
                 rows[name] = f"{quantity(self.derived[name], self._with_numbers(plain_unit(unit)), 10)}  {meaning}"
         rows["status"] = f"{self.status.name.lower()}: {self.status.meaning}"
         for name, variable in OUTPUTS.items():
-            if variable.dtype == "f8" and name not in ("e_kinetic", "e_energetic"):
+            if name in self.values and variable.dtype == "f8" and name not in ("e_kinetic", "e_energetic"):
                 rows[name] = quantity(self.values[name], self._with_numbers(variable.unit), 10)
         rows["e_kinematic"] = quantity(self.e_kinematic, "1", 12) + "  (1), from the velocities"
         rows["e_kinetic"] = quantity(self.e_kinetic, "1", 12) + "  (2), tau_r/tau_c"
@@ -475,7 +475,7 @@ def _has_input(draft: Draft, name: InputName) -> bool:
         value = as_table(draft.table("materials").get(name.material)).get(name.key)
         return isinstance(value, list | dict)
     if name.model:
-        return any(model.key == name.model and name.key in model_quantities(model) for model in draft.models)
+        return any(model.key == name.model and name.key in law_quantities(model) for model in draft.models)
     return name.key in SWEEP_INPUTS
 
 

@@ -12,9 +12,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ..contact.status import FIRST_FAILURE, Status
+from ..contact.status import FIRST_FAILURE, FrictionStatus, Status
 from .attributes import SummaryRecord
-from .schema import parts_of_models
+from .schema import parts_of_models, parts_of_pairs
 from .slabs import MAX_SUMMARY_POINTS, distinct_points, is_computed, slabs
 from .trajectory_table import ExpandedSlab, TrajectoryTable, computed_array, expand
 
@@ -32,6 +32,7 @@ class Summary:
     worst : the largest absolute value by error variable and number of the model; NaN if all are NaN, missing if
         not evaluated
     failed_at : the first points that failed: status, number of the model, and index along the axes
+    friction_counts : numbers of points of pairs by friction status
     deep, deepest : number of points with a peak indentation above `MAX_SMALL_INDENTATION`, and the largest one, as
         fractions of the smaller radius; only of points with known radii
     """
@@ -42,13 +43,25 @@ class Summary:
     failed_at: list[tuple[Status, int, tuple[int, ...]]] = field(default_factory=list)
     max_failed_at: int = field(default=MAX_FAILED_AT, compare=False)
     not_counted: int = 0
+    friction_counts: dict[FrictionStatus, int] = field(default_factory=dict)
     # a file does not hold the radii: these are available after a sweep only
     deep: int = field(default=0, compare=False)
     deepest: float = field(default=0.0, compare=False)
 
     @property
     def failed(self) -> int:
-        return sum(count for status, count in self.counts.items() if status >= FIRST_FAILURE)
+        """Points of models without a result, or of pairs if those are more; a pair may be without a meaning."""
+        failed = sum(count for status, count in self.counts.items() if status >= FIRST_FAILURE)
+        return max(failed, sum(self.friction_failures.values()))
+
+    @property
+    def friction_failures(self) -> dict[FrictionStatus, int]:
+        """Numbers of points of pairs that failed, by status."""
+        return {
+            status: count
+            for status, count in self.friction_counts.items()
+            if FIRST_FAILURE <= status != FrictionStatus.NOT_COMBINABLE
+        }
 
     def add(
         self,
@@ -66,6 +79,14 @@ class Summary:
                 self._judge(name, model, values[name])
         if radius is not None and "peak_indentation" in values:
             self._measure(values["peak_indentation"], radius, weight)
+        return self
+
+    def add_friction(self, values: Mapping[str, NDArray[Any]], weight: int = 1) -> Summary:
+        """Count the points of a pair by their friction status, each `weight` times."""
+        statuses, counts = np.unique(values["friction_status"], return_counts=True)
+        for number, count in zip(statuses.tolist(), counts.tolist(), strict=True):
+            status = FrictionStatus(number)
+            self.friction_counts[status] = self.friction_counts.get(status, 0) + weight * count
         return self
 
     def _measure(self, indentation: NDArray[Any], radius: NDArray[Any], weight: int) -> None:
@@ -94,13 +115,16 @@ class Summary:
 
 def add_slab(summary: Summary, table: TrajectoryTable, slab: ExpandedSlab) -> None:
     """Add the points of a slab; points that differ only by parameters of other models count once."""
-    axes = table.inputs.axes_of_model(table.laws[slab.model].key)
+    axes = table.inputs.axes_of_law(*table.keys(slab.number))
     if any(part.start > 0 for axis, part in enumerate(slab.region) if axis not in axes):
         return
     first = tuple(slice(None) if axis in axes else slice(1) for axis in range(len(slab.region)))
     counted = {name: array[first or ...] for name, array in slab.values.items()}
+    if len(slab.place) > 1:
+        summary.add_friction(counted)
+        return
     radius = np.fmin(slab.impacts.R1, slab.impacts.R2)
-    summary.add(counted, slab.model, [part.start for part in slab.region], radius)
+    summary.add(counted, slab.number, [part.start for part in slab.region], radius)
 
 
 def summarize(
@@ -125,6 +149,8 @@ def summarize(
     ):
         return _stored_summary(record, dataset, names, max_failed_at)
     summary = Summary(max_failed_at=max_failed_at)
+    if "friction_status" in dataset:
+        count_friction(summary, dataset, max_points)
     for model, model_data in enumerate(parts_of_models(dataset)):
         for name in names:
             variable, weight = distinct_points(model_data, name)
@@ -136,6 +162,15 @@ def summarize(
                 summary.points += weight * variable.size
                 summary.not_counted += weight * variable.size
     return summary
+
+
+def count_friction(summary: Summary, dataset: xr.Dataset, max_points: float) -> None:
+    """Count the points of pairs of a model and a friction law by their friction status."""
+    for pair in parts_of_pairs(dataset):
+        variable, weight = distinct_points(pair, "friction_status")
+        if variable.size <= max_points or not is_computed(variable):
+            for slab in slabs(variable.sizes):
+                summary.add_friction({"friction_status": variable.isel(slab).values}, weight)
 
 
 class Extremes(NamedTuple):
@@ -176,8 +211,9 @@ def extremes_of(dataset: xr.Dataset, name: str) -> Extremes | None:
 
 def _distinct_parts(dataset: xr.Dataset, name: str) -> list[tuple[xr.Variable, int]] | None:
     """List the distinct points of a variable of each model, and their weights; None if they are too many."""
-    models = parts_of_models(dataset) if "model" in dataset.variables[name].dims else (dataset,)
-    parts = [distinct_points(part, name) for part in models]
+    dims = dataset.variables[name].dims
+    laws = parts_of_pairs if "friction" in dims else parts_of_models
+    parts = [distinct_points(part, name) for part in (laws(dataset) if "model" in dims else (dataset,))]
     evaluations = sum(variable.size for variable, _ in parts)
     return None if evaluations > MAX_SUMMARY_POINTS and is_computed(dataset.variables[name]) else parts
 
@@ -191,9 +227,11 @@ def summarize_table(dataset: xr.Dataset, table: TrajectoryTable) -> tuple[Summar
     for name in map(str, dataset.data_vars):
         parts = _distinct_parts(dataset, name)
         extremes[name] = None if parts is None else Extremes()
-        distinct = parts or [distinct_points(part, name) for part in parts_of_models(dataset)]
-        for model, (variable, weight) in enumerate(distinct):
-            is_judged = name == "status" or name in ERROR_VARIABLES
+        of_friction = "friction" in dataset[name].dims
+        laws = parts_of_pairs if of_friction else parts_of_models
+        distinct = parts or [distinct_points(part, name) for part in laws(dataset)]
+        for model, (variable, weight) in enumerate(distinct, len(table.laws) if of_friction else 0):
+            is_judged = name in ("status", "friction_status", *ERROR_VARIABLES)
             if parts is not None or (is_judged and variable.size <= MAX_SUMMARY_POINTS):
                 sizes = tuple(variable.sizes[axis] for axis in axes)
                 groups.setdefault((model, sizes), (weight, []))[1].append(name)
@@ -211,7 +249,10 @@ def summarize_table(dataset: xr.Dataset, table: TrajectoryTable) -> tuple[Summar
                 values[name] = np.broadcast_to(typed if region else typed.reshape(()), size)
                 so_far = extremes[name]
                 extremes[name] = so_far and so_far.add(values[name], weight)
-            summary.add(values, model, [part.start for part in region], weight=weight)
+            if "friction_status" in values:
+                summary.add_friction(values, weight)
+            if model < len(table.laws):
+                summary.add(values, model, [part.start for part in region], weight=weight)
     return summary, extremes
 
 
@@ -226,6 +267,7 @@ def summary_record(
         worst=worst_by_model(summary, dataset),
         failed_at=[(status.name.lower(), keys[model], [*index]) for status, model, index in summary.failed_at],
         extremes=dict(extremes),
+        friction_status=counts_by_name(summary.friction_counts),
     )
 
 
@@ -263,6 +305,7 @@ def _stored_summary(
         ][:max_failed_at],
         max_failed_at=max_failed_at,
         not_counted=has_status * record.not_evaluated,
+        friction_counts={FrictionStatus[name.upper()]: count for name, count in record.friction_status.items()},
     )
 
 
@@ -275,6 +318,6 @@ def worst_by_model(summary: Summary, dataset: xr.Dataset) -> dict[str, dict[str,
     }
 
 
-def counts_by_name(counts: Mapping[Status, int]) -> dict[str, int]:
+def counts_by_name(counts: Mapping[Any, int]) -> dict[str, int]:
     """Count by the names of the statuses, in their order."""
     return {status.name.lower(): counts[status] for status in sorted(counts)}

@@ -12,22 +12,26 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
+import numpy as np
 import xarray as xr
 
 from ..atomic import atomic_write, check_output, check_outputs
 from ..config.grid import MAX_POINTS
 from ..config.input_names import InputName
 from ..config.load import read_config
+from ..contact.friction import Pair, check_friction, friction_problems
 from ..contact.model import ForceModel
-from ..contact.simulate import TABLE_COLUMNS, CollisionResult
+from ..contact.records import Record
+from ..contact.status import FrictionStatus
 from ..engine import checkpoint
+from ..engine.build_impacts import build_impacts, build_oblique
 from ..engine.execute import FindReused, integrate_ranges, reuse_nothing
 from ..engine.executors import SERIAL, ExecutorSpec, choose_executor
 from ..engine.plan import Plan
 from ..engine.plugins import read_plugins
 from ..engine.run import DEFAULT_RUN, ProgressCallback, ProgressCounter, Run, ignore, never, report_kept_ranges
-from ..engine.trajectories import RANGE_TRAJECTORIES, TrajectoryRange
-from ..errors import ResultError, StoreError, UnfinishedError, UsageError
+from ..engine.trajectories import RANGE_TRAJECTORIES, TrajectoryRange, probe_index
+from ..errors import ConfigError, ResultError, StoreError, UnfinishedError, UsageError
 from .layouts import LAYOUTS, FillSlab
 from .netcdf import MAX_LABEL_BYTES, encode_text, is_text
 from .outcome import SweepOutcome
@@ -220,17 +224,35 @@ def prepare(
     plugin_set = read_plugins(plugins)
     config = read_config(source, overrides, plugin_set.models, run.max_points)
     plan = Plan(config, plugin_set.of(config.models))
-    plan.check_count(run.max_points, str(source) if isinstance(source, Path) else "config")
+    name = str(source) if isinstance(source, Path) else "config"
+    plan.check_count(run.max_points, name)
     columns = {name: values for axis in config.axes for name, values in axis.columns.items()}
-    for note in material_notes(plan.material_record, columns):
+    notes = [*material_notes(plan.material_record, columns), *_pair_notes(plan, name)]
+    for note in notes:
         run.on_note(note)
     return plan
+
+
+def _pair_notes(plan: Plan, name: str) -> list[str]:
+    """Note each pair that has no meaning at some points; refuse a sweep whose pairs have none at all."""
+    index = probe_index(plan.inputs)
+    problems, combinable = [], not plan.frictions
+    for law in plan.laws[len(plan.models) :]:
+        assert isinstance(law, Pair)
+        impacts = build_impacts(plan.inputs, law.model, index)
+        oblique = build_oblique(plan.inputs, impacts, index, law.friction)
+        with np.errstate(all="ignore"):
+            combinable |= bool((check_friction(law, oblique) != FrictionStatus.NOT_COMBINABLE).any())
+            problems += [f"{law.key}: {reason}" for reason in friction_problems(law, oblique)]
+    if not combinable:
+        raise ConfigError(*(f"{name}: frictions: {problem}" for problem in problems))
+    return [f"{problem}; these points are NaN" for problem in problems]
 
 
 def sweep_in_memory(plan: Plan, run: Run = DEFAULT_RUN) -> xr.Dataset:
     """Run a plan; a small result is in memory, a large one is computed when it is indexed."""
     check_labels(plan)
-    finished: dict[TrajectoryRange, CollisionResult] = {}
+    finished: dict[TrajectoryRange, Record] = {}
     counter = ProgressCounter.start(plan.ranges, plan.points, run)
     try:
         integrate(plan, plan.ranges, finished.__setitem__, counter, run)
@@ -252,7 +274,7 @@ def sweep_into(
     few = plan.stored_points <= NO_CHECKPOINT_POINTS or plan.layout == "factored"
     folder = checkpoint.work_folder_of(output)
     if plan.trajectories <= RANGE_TRAJECTORIES and few and not os.path.lexists(folder):
-        finished: dict[TrajectoryRange, CollisionResult] = {}
+        finished: dict[TrajectoryRange, Record] = {}
         # so short that it is neither stopped nor reported
         counter = ProgressCounter.start(plan.ranges, plan.points, DEFAULT_RUN)
         integrate(plan, plan.ranges, finished.__setitem__, counter, DEFAULT_RUN, extension.find_reused)
@@ -303,7 +325,7 @@ def complete_ranges(
 def integrate(
     plan: Plan,
     ranges: Sequence[TrajectoryRange],
-    store: Callable[[TrajectoryRange, CollisionResult], None],
+    store: Callable[[TrajectoryRange, Record], None],
     counter: ProgressCounter,
     run: Run,
     find_reused: FindReused = reuse_nothing,
@@ -317,7 +339,7 @@ def integrate(
         raise UnfinishedError
 
 
-def reload_range(work_folder: checkpoint.WorkFolder, trajectory_range: TrajectoryRange) -> CollisionResult:
+def reload_range(work_folder: checkpoint.WorkFolder, trajectory_range: TrajectoryRange) -> Record:
     """Load a finished range, or raise a `StoreError` if it is damaged."""
     collisions = work_folder.load(trajectory_range)
     if collisions is None:
@@ -358,7 +380,8 @@ def find_finished(path: Path, plan: Plan) -> SweepOutcome | None:
         dataset.close()
         return None
     axes = dict(zip((axis.name for axis in plan.config.axes), plan.shape, strict=True))
-    if dict(dataset.sizes) != {"model": len(plan.models), **axes}:
+    frictions = {"friction": len(plan.frictions)} if plan.frictions else {}
+    if dict(dataset.sizes) != {"model": len(plan.models), **frictions, **axes}:
         dataset.close()
         return None
     return SweepOutcome(dataset, summarize(dataset), plan.trajectories, is_new=False, output=path)
@@ -369,7 +392,7 @@ def _missing_space(error: Exception, output: Path, plan: Plan, counter: Progress
     cause = error.__cause__
     if not isinstance(cause, OSError) or cause.errno not in (errno.ENOSPC, errno.EDQUOT):
         return []
-    row = sum(getattr(CollisionResult.blank(1), name).nbytes for name in TABLE_COLUMNS)
+    row = max(trajectory_map.record.row_bytes() for trajectory_map in plan.maps)
     result = counter.progress.of_trajectories * row if plan.layout == "factored" else dataset_template(plan).nbytes
     needed = result + OVERHEAD_BYTES + (counter.progress.of_trajectories - counter.progress.trajectories) * row
     free = shutil.disk_usage(output.parent).free

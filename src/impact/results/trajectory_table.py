@@ -10,8 +10,9 @@ import math
 import os
 from collections.abc import Callable, Hashable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from enum import IntEnum
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 import xarray as xr
@@ -22,14 +23,16 @@ from xarray.core import indexing
 from ..array_types import Array
 from ..config.grid import Axis
 from ..config.input_names import InputName
-from ..config.tables import FIXED_STEP_INPUTS
+from ..config.tables import FIXED_STEP_INPUTS, OBLIQUE_INPUTS
 from ..contact.impacts import CHECKS, Impacts, check_inputs
 from ..contact.model import Law
 from ..contact.output_formulas import Outputs, outputs
+from ..contact.records import Record
 from ..contact.simulate import CollisionResult
-from ..contact.status import Status
-from ..contact.variables import Variable
-from ..engine.build_impacts import Stiffness, build_impacts, has_stiffness_rule
+from ..contact.status import FrictionStatus, Status
+from ..contact.tangential import FrictionKind, TangentialResult
+from ..contact.variables import AXES, Variable
+from ..engine.build_impacts import Stiffness, build_impacts, build_oblique, has_stiffness_rule
 from ..engine.inputs import Index, Inputs, dimensions
 from ..engine.plan import Plan
 from ..engine.trajectories import (
@@ -56,21 +59,21 @@ MAX_INDEXED_BYTES = 16 * 2**30
 
 @dataclass(frozen=True)
 class TrajectoryRows:
-    """The integrated trajectories of each model, read in segments when they are needed.
+    """The integrated trajectories of each law, read in segments when they are needed.
 
-    read : returns the trajectories of a model from a start to a stop: `read(model, start, stop)`
-    pick : returns a few trajectories of a model by their increasing row numbers; None if there are only segments
+    read : returns the trajectories of a law from a start to a stop: `read(law, start, stop)`
+    pick : returns a few trajectories of a law by their increasing row numbers; None if there are only segments
     """
 
     maps: Sequence[TrajectoryMap]
-    read: Callable[[int, int, int], CollisionResult]
+    read: Callable[[int, int, int], Record]
     segment: int = RANGE_TRAJECTORIES
-    pick: Callable[[int, NDArray[np.intp]], CollisionResult] | None = None
-    # all trajectories of the model that was read last, if its cells share them
-    _whole: dict[int, CollisionResult] = field(default_factory=dict)
+    pick: Callable[[int, NDArray[np.intp]], Record] | None = None
+    # all trajectories of the model and of the pair that were read last, if their cells share them
+    _whole: dict[int, Record] = field(default_factory=dict)
 
-    def take(self, model: int, rows: NDArray[np.intp]) -> CollisionResult:
-        """Read trajectories of a model by their row numbers; arrays of the shape of `rows`."""
+    def take(self, model: int, rows: NDArray[np.intp]) -> Any:
+        """Read trajectories of a law by their row numbers, a record of arrays of the shape of `rows`."""
         trajectory_map = self.maps[model]
         if self.pick is not None and model not in self._whole and rows.size < trajectory_map.count // FEW_ROWS:
             distinct, position = np.unique(rows, return_inverse=True)
@@ -82,14 +85,16 @@ class TrajectoryRows:
         if whole is None:
             # cells share trajectories in any order: keep all of them
             whole = self._segments(model, np.arange(trajectory_map.count))
-            self._whole.clear()
+            others = [number for number in self._whole if self.maps[number].record is trajectory_map.record]
+            for number in others:
+                del self._whole[number]
             self._whole[model] = whole
         return whole.take(rows)
 
-    def _segments(self, model: int, rows: NDArray[np.intp]) -> CollisionResult:
+    def _segments(self, model: int, rows: NDArray[np.intp]) -> Record:
         count = self.maps[model].count
         size = even_size(count, self.segment)
-        trajectories, segment = CollisionResult.blank(rows.size), rows // size
+        trajectories, segment = self.maps[model].record.blank(rows.size), rows // size
         for number in np.unique(segment).tolist():
             positions, start = np.flatnonzero(segment == number), number * size
             read = self.read(model, start, min(start + size, count))
@@ -97,13 +102,24 @@ class TrajectoryRows:
         return trajectories
 
 
+class NamedFriction(Protocol):
+    """What outputs depend on of a friction law: a `FrictionLaw`, or what a file stores of it."""
+
+    @property
+    def key(self) -> str: ...
+    @property
+    def kind(self) -> FrictionKind: ...
+
+
 @dataclass(frozen=True)
 class TrajectoryTable:
     """The trajectories of a sweep, with everything else that the outputs depend on.
 
     laws : the models; those of a file have no formulas
+    maps : of each model, then of the pairs of each model with each friction law
     stiffness : K of each law that has a rule for it but no formula (a law of a file); None otherwise
     summary : of all points, if the file contains one
+    frictions : the friction laws
     """
 
     inputs: Inputs
@@ -112,6 +128,22 @@ class TrajectoryTable:
     rows: TrajectoryRows
     stiffness: tuple[Stiffness | None, ...]
     summary: SummaryRecord | None = None
+    frictions: tuple[NamedFriction, ...] = ()
+
+    def numbers(self, of_friction: bool) -> range:
+        """The numbers of the maps of the models, or of the pairs."""
+        models = len(self.laws)
+        return range(models, models * (1 + len(self.frictions))) if of_friction else range(models)
+
+    def place(self, number: int) -> tuple[int, ...]:
+        """The model of a map, or the model and the friction law of the map of a pair."""
+        models = len(self.laws)
+        return (number,) if number < models else divmod(number - models, len(self.frictions))
+
+    def keys(self, number: int) -> tuple[str, ...]:
+        """The key of the model of a map, and that of the friction law of a pair."""
+        model, *friction = self.place(number)
+        return (self.laws[model].key, *(self.frictions[law].key for law in friction))
 
     @cached_property
     def checks(self) -> tuple[frozenset[str], ...]:
@@ -122,34 +154,40 @@ class TrajectoryTable:
         )
 
 
-def table_of(plan: Plan, read: Callable[[int, int, int], CollisionResult]) -> TrajectoryTable:
+def table_of(plan: Plan, read: Callable[[int, int, int], Record]) -> TrajectoryTable:
     """Build the trajectory table of a plan; for `read` see `TrajectoryRows`."""
     rows, no_rules = TrajectoryRows(plan.maps, read), (None,) * len(plan.models)
-    return TrajectoryTable(plan.inputs, plan.models, plan.maps, rows, no_rules)
+    return TrajectoryTable(plan.inputs, plan.models, plan.maps, rows, no_rules, frictions=plan.frictions)
 
 
-def table_of_ranges(plan: Plan, load: Callable[[TrajectoryRange], CollisionResult]) -> TrajectoryTable:
+def table_of_ranges(plan: Plan, load: Callable[[TrajectoryRange], Record]) -> TrajectoryTable:
     """Build the trajectory table of a plan from its finished ranges."""
     range_at = {(finished.model, finished.start): finished for finished in plan.ranges}
     return table_of(plan, lambda model, start, stop: load(range_at[model, start]))
 
 
-def expand(table: TrajectoryTable, model: int, index: Index, names: Sequence[str]) -> tuple[Impacts, Outputs]:
-    """Compute the inputs and some outputs of a model at some cells of the grid.
+def expand(table: TrajectoryTable, number: int, index: Index, names: Sequence[str]) -> tuple[Impacts, Outputs]:
+    """Compute the inputs and some outputs of a model, or of a pair by the number of its map, at cells of the grid.
 
     `index` has an integer array for each axis, which broadcast against each other; a plan without axes has one
     cell. The outputs broadcast to the shape of the index, with length one along axes on which they do not vary.
     """
+    model, *friction = table.place(number)
     law = table.laws[model]
     impacts = build_impacts(table.inputs, law, index, table.stiffness[model])
     with np.errstate(all="ignore"):
         checked = check_inputs(law, impacts, table.checks[model])
     result = table.rows.take(model, table.maps[model].rows(index))
-    return impacts, outputs(law, impacts, result, names, checked)
+    if not friction:
+        return impacts, outputs(law, impacts, result, names, checked)
+    tangential = table.rows.take(number, table.maps[number].rows(index))
+    of_friction = (build_oblique(table.inputs, impacts, index), tangential, table.frictions[friction[0]].kind)
+    return impacts, outputs(law, impacts, result, names, checked, of_friction)
 
 
-def varies_along(table: TrajectoryTable, model: int, names: Sequence[str]) -> dict[str, tuple[int, ...]]:
-    """Find the axes of the grid along which outputs of a model vary, at most."""
+def varies_along(table: TrajectoryTable, number: int, names: Sequence[str]) -> dict[str, tuple[int, ...]]:
+    """Find the axes of the grid along which outputs of a model, or of a pair, vary at most."""
+    model, *friction = table.place(number)
     law, inputs = table.laws[model], table.inputs
     # K may depend on the value of n: Hertz's K is for n = 3/2
     index = probe_index(inputs, {"n"})
@@ -164,14 +202,21 @@ def varies_along(table: TrajectoryTable, model: int, names: Sequence[str]) -> di
     shapes = [array.shape for check in table.checks[model] for array in checked_arrays[check]]
     checked = np.broadcast_shapes((1,) * dimensions(index), *shapes)
     status = _alternating_statuses(checked, Status.NO_IMPACT, Status.OUT_OF_RANGE)
-    shape = table.maps[model].rows(index).shape
-    blank = CollisionResult.blank(1).take(np.zeros(shape, np.intp))
-    collisions = replace(blank, status=_alternating_statuses(shape, Status.MAX_STEPS))
-    values = outputs(law, impacts, collisions, names, status)
+
+    def blank(record: type[Record], number: int, *statuses: IntEnum) -> Any:
+        shape = table.maps[number].rows(index).shape
+        one = record.blank(1).take(np.zeros(shape, np.intp))
+        return replace(one, status=_alternating_statuses(shape, *statuses))
+
+    collisions, of_friction = blank(CollisionResult, model, Status.MAX_STEPS), None
+    if friction:
+        tangential = blank(TangentialResult, number, FrictionStatus.MAX_STEPS, FrictionStatus.LIMIT)
+        of_friction = (build_oblique(inputs, impacts, index), tangential, table.frictions[friction[0]].kind)
+    values = outputs(law, impacts, collisions, names, status, of_friction)
     return {name: tuple(sorted(axes_of_arrays([values[name]]))) for name in names}
 
 
-def _alternating_statuses(shape: tuple[int, ...], *statuses: Status) -> NDArray[np.int8]:
+def _alternating_statuses(shape: tuple[int, ...], *statuses: IntEnum) -> NDArray[np.int8]:
     """Build an array in which OK and each of some statuses alternate; OK only if it has one element."""
     status_array = np.full(shape, Status.OK, np.int8)
     if status_array.size > 1:
@@ -195,7 +240,7 @@ def checks_that_may_fail(inputs: Inputs, law: Law, stiffness: Stiffness | None =
     for axis in inputs.axes:
         for name, values in axis.columns.items():
             is_used = InputName.parse(name).applies_to(law.key)
-            if is_used and name not in ("v1", "v2", "e", "alpha", *FIXED_STEP_INPUTS):
+            if is_used and name not in ("v1", "v2", "e", "alpha", *FIXED_STEP_INPUTS, *OBLIQUE_INPUTS):
                 is_text = isinstance(values[0], str)
                 ends[name] = tuple(sorted({*values})) if is_text else tuple({min(values), max(values)})
     if stiffness is not None or has_stiffness_rule(inputs, law):
@@ -205,7 +250,8 @@ def checks_that_may_fail(inputs: Inputs, law: Law, stiffness: Stiffness | None =
         ends[f"{law.key}.K"] = (float(K.min()), float(K.max()))
     if math.prod(map(len, ends.values())) > MAX_STIFFNESS_VALUES:
         return CHECKS
-    scalars = {**inputs.scalars, "v2": 0.0, "e": 1.0}
+    scalars = {name: value for name, value in inputs.scalars.items() if name not in OBLIQUE_INPUTS}
+    scalars |= {"v2": 0.0, "e": 1.0}
     axes = tuple(Axis({name: values}) for name, values in ends.items())
     corners = Inputs({name: scalars[name] for name in scalars.keys() - ends.keys()}, axes, inputs.materials)
     with np.errstate(all="ignore"):
@@ -226,6 +272,11 @@ def checks_that_may_fail(inputs: Inputs, law: Law, stiffness: Stiffness | None =
 
 def _closing_speeds(inputs: Inputs) -> tuple[float, float, float]:
     """Find the least and the greatest closing speed v1 - v2 [m/s], and a lower bound of the positive ones."""
+    if "speed" in inputs.names():
+        speeds = np.asarray(inputs.values("speed"), float)
+        angles = np.asarray(inputs.values("angle") if "angle" in inputs.names() else 0.0, float)
+        slowest, fastest = float(speeds.min() * np.cos(angles.max())), float(speeds.max() * np.cos(angles.min()))
+        return slowest, fastest, slowest
     v1, v2 = (np.asarray(inputs.values(name), float) for name in ("v1", "v2"))
     slowest, fastest = float(v1.min() - v2.max()), float(v1.max() - v2.min())
     magnitudes = np.abs(np.concatenate([v1.reshape(-1), v2.reshape(-1)]))
@@ -251,7 +302,9 @@ class ExpandedArray(BackendArray):
 
     def __init__(self, table: TrajectoryTable, variable: Variable) -> None:
         self.table, self.variable = table, variable
-        self.shape = ((len(table.laws),) if variable.per_model else ()) + table.inputs.shape
+        outer = {"model": len(table.laws), "friction": len(table.frictions)}
+        self.outer = tuple(size for dim, size in outer.items() if dim in variable.dims)
+        self.shape = self.outer + table.inputs.shape
         self.dtype = np.dtype(variable.dtype)
 
     def __getitem__(self, key: indexing.ExplicitIndexer) -> Any:
@@ -262,15 +315,18 @@ class ExpandedArray(BackendArray):
         shape = tuple(part.size for part in positions)
         check_memory(self.variable.name, shape, self.dtype)
         values = np.empty(shape, self.dtype)
-        name, per_model = self.variable.name, self.variable.per_model
-        models, axes = (positions[0], positions[1:]) if per_model else (np.zeros(1, np.intp), positions)
-        for row, model in enumerate(models.tolist()):
+        name, numbers = self.variable.name, self.table.numbers(self.variable.of_friction)
+        outer, axes = positions[: len(self.outer)], positions[len(self.outer) :]
+        for row in np.ndindex(shape[: len(outer)]):
             # a view, also if there is no axis
-            out = values[row, ...] if per_model else values
+            out = values[(*row, ...)]
+            place = [int(chosen[position]) for chosen, position in zip(outer, row, strict=True)]
+            number = numbers[int(np.ravel_multi_index(place, self.outer)) if place else 0]
             for slab in slabs(dict(enumerate(out.shape))):
                 region = tuple(slab.values())
                 index = np.ix_(*(axis[part] for axis, part in zip(axes, region, strict=True)))
-                out[region or ...] = _without_dummy_axis(expand(self.table, model, index, [name])[1][name], region)
+                part = expand(self.table, number, index, [name])[1][name]
+                out[region or ...] = _without_dummy_axis(part, region)
         selected = tuple(0 if isinstance(part, int | np.integer) else slice(None) for part in key)
         return np.asarray(values[selected])
 
@@ -318,19 +374,26 @@ def max_indexed_bytes() -> int:
 def lazy_dataset(template: xr.Dataset, table: TrajectoryTable, variables: Sequence[Variable]) -> xr.Dataset:
     """Build a result, from its coordinates and attributes, whose variables are computed when they are read."""
     axes = [axis.name for axis in table.inputs.axes]
-    names = [variable.name for variable in variables]
-    along = [varies_along(table, model, names) for model in range(len(table.laws))]
     computed = {}
-    for variable in variables:
-        dims = ["model", *axes] if variable.per_model else axes
-        by_model = {
-            law.key: tuple(axes[axis] for axis in axes_by_variable[variable.name])
-            for law, axes_by_variable in zip(table.laws, along, strict=True)
+    for of_friction in (False, True):
+        chosen = [variable for variable in variables if variable.of_friction == of_friction]
+        along: dict[str, dict[str, set[int]]] = {
+            variable.name: {law.key: set() for law in table.laws} for variable in chosen
         }
-        array = indexing.LazilyIndexedArray(ExpandedArray(table, variable))
-        computed[variable.name] = xr.Variable(
-            dims, array, attributes_of(variable), {VARIES_ALONG: by_model, ORIGINAL_DIMS: tuple(dims)}
-        )
+        for number in table.numbers(of_friction) if chosen else ():
+            for name, varying in varies_along(table, number, list(along)).items():
+                along[name][table.keys(number)[0]].update(varying)
+        for variable in chosen:
+            dims = [*(dim for dim in variable.dims if dim != AXES), *axes]
+            own = [dim for dim in variable.dims if dim == "friction"]
+            by_model = {
+                key: (*own, *(axes[axis] for axis in sorted(varying)))
+                for key, varying in along[variable.name].items()
+            }
+            array = indexing.LazilyIndexedArray(ExpandedArray(table, variable))
+            encoding = {VARIES_ALONG: by_model, ORIGINAL_DIMS: tuple(dims)}
+            computed[variable.name] = xr.Variable(dims, array, attributes_of(variable), encoding)
+    computed = {variable.name: computed[variable.name] for variable in variables}
     dataset = template.drop_vars(list(template.data_vars)).assign(computed)
     for dim in map(str, dataset.dims):
         dataset = dataset if dim in dataset.xindexes else dataset.set_xindex(dim)
@@ -338,12 +401,20 @@ def lazy_dataset(template: xr.Dataset, table: TrajectoryTable, variables: Sequen
 
 
 class ExpandedSlab(NamedTuple):
-    """All values of a model in a region of the grid, by name, and the impacts that they are of."""
+    """All values of a model, or of a pair, in a region of the grid, by name, and the impacts that they are of.
 
-    model: int
+    `number` is that of the map, and `place` the model, or the model and the friction law, see `TrajectoryTable`.
+    """
+
+    number: int
+    place: tuple[int, ...]
     region: tuple[slice, ...]
     impacts: Impacts
     values: dict[str, NDArray[Any]]
+
+    def region_in(self, dims: Sequence[Hashable]) -> tuple[int | slice, ...]:
+        """The region of these values in a variable with some dimensions."""
+        return (*self.place, *self.region) if "model" in dims else self.region
 
 
 def expanded_slabs(
@@ -354,19 +425,24 @@ def expanded_slabs(
     Variables that do not depend on the model are in the slabs of the first model only.
     """
     sizes: dict[Hashable, int] = dict(enumerate(table.inputs.shape))
-    for model in range(len(table.laws)):
-        chosen = [variable for variable in variables if variable.per_model or model == 0]
+    for number in range(len(table.maps)):
+        of_friction = number >= len(table.laws)
+        chosen = [
+            variable
+            for variable in variables
+            if variable.of_friction == of_friction and (variable.per_model or number == 0)
+        ]
         for slab in aligned_slabs(sizes, chunks) if chunks else slabs(sizes):
             region = tuple(slab.values())
             index = table.inputs.index(region)
-            impacts, arrays = expand(table, model, index, [variable.name for variable in chosen])
+            impacts, arrays = expand(table, number, index, [variable.name for variable in chosen])
             shape = tuple(part.stop - part.start for part in region)
             values = {}
             for variable in chosen:
                 array = np.broadcast_to(_without_dummy_axis(arrays.pop(variable.name), region), shape)
                 # copied only if it is a broadcast view or has another dtype
                 values[variable.name] = np.asarray(array, variable.dtype, order="C")
-            yield ExpandedSlab(model, region, impacts, values)
+            yield ExpandedSlab(number, table.place(number), region, impacts, values)
 
 
 def in_memory(dataset: xr.Dataset) -> xr.Dataset:
@@ -377,8 +453,7 @@ def in_memory(dataset: xr.Dataset) -> xr.Dataset:
     # all variables of a slab together: they share most of the computation
     for slab in expanded_slabs(expanded[0].table, [array.variable for array in expanded]):
         for name, part in slab.values.items():
-            region: tuple[Any, ...] = (slab.model, *slab.region) if "model" in dataset[name].dims else slab.region
-            values[name][region or ...] = part
+            values[name][slab.region_in(dataset[name].dims) or ...] = part
     return dataset.assign(
         {name: (dataset[name].dims, array, dataset[name].attrs) for name, array in values.items()}
     )

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 import xarray as xr
@@ -14,7 +14,8 @@ import xarray as xr
 from ..config.input_names import InputName
 from ..config.tables import MATERIAL_KEYS, MATERIAL_QUANTITIES, SWEEP_QUANTITIES
 from ..contact.simulate import TABLE_COLUMNS
-from ..contact.status import STATUSES
+from ..contact.status import FRICTION_STATUSES, STATUSES
+from ..contact.tangential import TangentialResult
 from ..contact.variables import AXES, OUTPUTS
 from ..errors import ResultError
 from ..formatting import safe_text
@@ -23,14 +24,18 @@ from .kinds import kind_of
 from .schema import CALIBRATION_TEXTS, FIT_STATUSES, MODEL_METADATA, SCHEMA, STUDY_COORDINATES, is_case
 from .slabs import VARIES_ALONG, is_lazy, slabs
 
-TEXT_COORDINATES = frozenset({"model", *MODEL_METADATA, *MATERIAL_KEYS, *CALIBRATION_TEXTS, "input"} - {"year"})
+TEXT_COORDINATES = frozenset(
+    {"model", "friction", *MODEL_METADATA, *MATERIAL_KEYS, *CALIBRATION_TEXTS, "input"} - {"year"}
+)
 # the trajectory table of a factored file, see `impact.results.factored`
 TABLE_VARIABLES = frozenset(
     {
         *(f"trajectory_{name}" for name in TABLE_COLUMNS),
+        *(f"tangential_{name}" for name in TangentialResult.columns()),
         "trajectory_of_cell",
         "law_stiffness",
         "witness_index",
+        "witness_pair_index",
         *(f"witness_{name}" for name in OUTPUTS),
     }
 )
@@ -40,8 +45,8 @@ ALLOWED_NAMES = TEXT_COORDINATES.union(
     *STUDY_COORDINATES.values(),
     ("t", "year", "exponent", *SWEEP_QUANTITIES),
 )
-# a parameter of one model: the key of the model, and a Python identifier
-PARAMETER_NAME = re.compile(r"[a-z0-9]+(-[a-z0-9]+)*\.[^\W\d]\w*")
+# a parameter of one model or friction law: the key of the law, and a Python identifier
+PARAMETER_NAME = re.compile(r"(friction\.)?[a-z0-9]+(-[a-z0-9]+)*\.[^\W\d]\w*")
 
 
 def is_name(name: str) -> bool:
@@ -69,7 +74,7 @@ TEXT_ATTRIBUTES = ("title", "config", "config_set", "fingerprint", "impact_versi
 NUMBER_ATTRIBUTES = ("rtol", "max_steps")
 CALIBRATION_ATTRIBUTES = ("noise", "data_file", "varied", "fit_paths", "fit_bounds")
 # attributes of factored files, which a dataset does not have
-FACTORED_ATTRIBUTES = ("laws", "axes", "summary")
+FACTORED_ATTRIBUTES = ("laws", "axes", "summary", "pairs", "frictions")
 # statuses that are checked at a time
 STATUS_SLAB_POINTS = 2**22
 
@@ -147,8 +152,9 @@ def _result_violations(dataset: xr.Dataset) -> Iterator[str]:
     for name, variable in OUTPUTS.items():
         if name in dataset and not variable.per_model and "model" in dataset[name].dims:
             yield f"{name}: lies along model"
-    if "status" in dataset and _has_unknown_status(dataset["status"]):
-        yield "status: got a number that is no status"
+    for name, statuses in (("status", STATUSES), ("friction_status", FRICTION_STATUSES)):
+        if name in dataset and _has_unknown_status(dataset[name], statuses):
+            yield f"{name}: got a number that is no status"
     yield from _missing_texts(dataset, TEXT_ATTRIBUTES)
     for key in NUMBER_ATTRIBUTES:
         if not isinstance(dataset.attrs.get(key), int | float | np.number):
@@ -204,9 +210,9 @@ def _sensitivity_violations(dataset: xr.Dataset) -> Iterator[str]:
         yield "no design"
 
 
-def _has_unknown_status(status: xr.DataArray) -> bool:
+def _has_unknown_status(status: xr.DataArray, known: Sequence[int]) -> bool:
     """Whether a status is unknown; computed statuses are always known."""
     if is_lazy(status.variable) and VARIES_ALONG in status.encoding:
         return False
     parts = (status.isel(where).values for where in slabs(status.sizes, STATUS_SLAB_POINTS))
-    return any(not np.isin(np.unique(part), STATUSES).all() for part in parts)
+    return any(not np.isin(np.unique(part), known).all() for part in parts)

@@ -164,7 +164,7 @@ YADE_VISCOELASTIC = FrictionLaw(
     equation=f"f = k_t ξ + c_t g,  ξ̇ = g,  {YADE_LIMIT.replace('f_e', 'k_t ξ')}",
     reference="YADE, Law2_ScGeom_ViscElPhys_Basic, ks and cs",
     kind="spring",
-    evidence=Evidence("seen", f"{YADE_2025}, ViscoelasticPM.cpp"),
+    evidence=Evidence("seen", f"{YADE_2025}, ViscoelasticPM.cpp", note="the year is that of its contact force"),
     parameters=(
         *CONSTANT_STIFFNESS,
         Parameter("c_t", "N s/m", "tangential damping", default=0.0, least=0.0),

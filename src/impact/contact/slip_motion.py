@@ -1,0 +1,627 @@
+"""The slip of a contact under friction, with its events, integrated together with the normal motion of a phase.
+
+The components are s and v, or its substitute, of the normal motion, Gamma = G/G0, and the memory z of the spring,
+whose force over G0 is phi_e = sqrt(kappa') X^r z with X = x^kp. In the smooth time of `impact.contact.motion`, in
+which dt = w dsigma with w = p s^(p-1),
+
+    dGamma/dsigma = -w phi,  dz/dsigma = sqrt(kappa') w X^(1-r) Gamma,  phi = phi_e + c' x^q Gamma
+
+while the contact sticks, in the mode 0. In the modes -1 and 1 it slips, and phi is the limit -N or N, over G0. The
+modes -2 and 2 belong to a cap of the spring alone: phi_e stays at its limit without plastic slip, which codes
+reach by alternating between the others. Then phi_e and its rate determine Gamma.
+
+A slip begins where the trial force reaches the limit, and ends where it would grow less than the limit.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..array_types import Array, Mask
+from ..ode.problem import Margins, Params, Problem
+from . import motion
+from .formula_calls import Formula, call_by_name
+from .velocity_coordinates import signed_power
+
+FrictionKind = Literal["coulomb", "spring", "dashpot", "regularized"]
+
+# rows of the joint state and its rates: s and v, Gamma and z; time, work against the limit while slipping, damping
+# work, and memory work; the rates also have the normal force
+SLIP_ROW, SPRING_ROW, TIME_ROW, SLIP_WORK_ROW, DAMPING_ROW, MEMORY_ROW, FORCE_ROW = 2, 3, 4, 5, 6, 7, 8
+# those rows of the joint rates that a normal problem has; it does not use its work, the fourth
+NORMAL_ROWS = [0, 1, TIME_ROW, TIME_ROW, FORCE_ROW]
+# errors of Gamma and z are judged against 1, ten times as strictly as those of the normal motion
+JOINT_FLOOR, STRICTNESS = (*motion.ERROR_FLOOR, 1.0, 1.0), (10.0, 10.0)
+# numbers of the margins: of the mode, and of the sign of the normal force
+MODE_MARGIN, SIGN_MARGIN = 0, 1
+# a margin counts as positive down to this part of the largest normal force, which is of the order of 1
+MARGIN_TOLERANCE = 1e-12
+# a force within this part of the limit is at the limit where the formulas change
+CAP_TOLERANCE = 1e-9
+# powers of x that differ by less are the same
+ORDER_TOLERANCE = 1e-6
+# steps of the central difference quotients for the rate of N and the rate of the slip that it determines
+RATE_OF_LIMIT_STEP, RATE_OF_SLIP_STEP = 1e-5, 1e-3
+# s at which leading powers of x are compared at first contact, and their rates; and the least s for what
+# is singular at s = 0
+START_S, RATE_S, LEAST_S = 1e-7, 1e-4, 1e-10
+# s below which a mode does not change any more
+END_S = 1e-7
+# step of the central difference quotient there, relative to s; it sees the rate of N beside a force that jumps
+RATE_STEP = 1e-2
+
+
+@dataclass(frozen=True)
+class TangentialForm:
+    """What all tangential trajectories of a pair at one exponent n have in common.
+
+    Parameters
+    ----------
+    kind : see `impact.contact.friction.FrictionLaw`
+    stiffness_power, damping_power : powers of x in the tangential stiffness k x^kp and damping c x^q
+    memory : r on loading and on unloading; while the contact grows or shrinks, 0 keeps the force, 1 the
+        displacement
+    cap : what mu N limits, the "total" force, or that of the "spring" alone
+    coefficient : of kind "regularized": the coefficient of friction over mu as a formula of y, which is
+        `SLIP_SCALE` abs(G), and of other values of the problem, by their names without `PREFIX`
+    """
+
+    kind: FrictionKind
+    stiffness_power: float = 0.0
+    damping_power: float = 0.0
+    memory: tuple[float, float] = (0.0, 0.0)
+    cap: Literal["total", "spring"] = "total"
+    coefficient: Formula | None = None
+
+
+class Columns(NamedTuple):
+    """Params of a joint problem after those of the normal problem, shape (n,) each; modes change the first seven.
+
+    `limit`, `spring` and `dashpot` are the factors of F, X^r z and x^q Gamma in the force, zero in other modes;
+    `memory_limit` is the factor of F in phi_e for the memory work. `press` is N/F: 1, and in tension -1 or 0;
+    `sign` is the sign of F. `root` is the root of kappa'.
+    """
+
+    mode: Array
+    press: Array
+    sign: Array
+    limit: Array
+    memory_limit: Array
+    spring: Array
+    dashpot: Array
+    row: Array
+    root: Array
+    damping: Array
+    G0: Array
+    is_positive: Array
+
+    def changed(self, mode: Array, sign: Array) -> Columns:
+        """Make the columns of other modes and signs of the normal force."""
+        press = np.where(sign > 0.0, 1.0, self.is_positive - 1.0)
+        limit = np.sign(mode) * press / self.G0
+        sticks = mode == 0.0
+        return self._replace(
+            mode=mode,
+            press=press,
+            sign=sign,
+            limit=np.where(np.abs(mode) == 1.0, limit, 0.0),
+            memory_limit=limit,
+            spring=np.where(sticks, self.root, 0.0),
+            dashpot=np.where(sticks, self.damping, 0.0),
+        )
+
+
+@dataclass(frozen=True)
+class Track:
+    """What is known of each trajectory besides its integrated rows, in arrays of shape (n,) that are written to.
+
+    `force` and `energy` are phi_e and its energy at the end of the last part, `v` the velocity to which the
+    impulse of N is complete: `impulse`, and `signed` in the direction of the slip. `slip_work` and `damping_work`
+    complete the quadratures by what happens where a mode begins and ends. `slip_memory` is the memory work of
+    slips, `order` the leading power of x in N at first contact, and `touches` tells that a slip began or ended at
+    x = 0. `modes` has a bit for sticking, slipping forwards and backwards.
+    """
+
+    mode: Array
+    sign: Array
+    force: Array
+    energy: Array
+    v: Array
+    impulse: Array
+    signed: Array
+    slip_work: Array
+    damping_work: Array
+    slip_memory: Array
+    order: Array
+    touches: Mask
+    modes: NDArray[np.int8]
+    changes: NDArray[np.int32]
+    is_slow: Mask
+
+    @classmethod
+    def of(cls, n: int) -> Track:
+        """Begin n trajectories."""
+        arrays: dict[str, Any] = {name: np.zeros(n) for name in cls.__annotations__}
+        flags = {
+            "modes": np.zeros(n, np.int8),
+            "changes": np.zeros(n, np.int32),
+        }
+        flags |= {"touches": np.zeros(n, bool), "is_slow": np.zeros(n, bool)}
+        return cls(**{**arrays, **flags, "sign": np.ones(n), "v": np.ones(n)})
+
+    def add_impulse(self, index: NDArray[np.intp], columns: Columns, v: Array) -> None:
+        """Complete the impulses up to velocities v."""
+        impulse = columns.press * (self.v[index] - v)
+        self.impulse[index] += impulse
+        self.signed[index] += np.sign(columns.mode) * impulse
+        self.v[index] = v
+
+    def set_mode(
+        self, index: NDArray[np.intp], old: Array, new: Array, y: Array, before: Array, after: Array
+    ) -> None:
+        """Change modes, with the energies of the spring before and after."""
+        entered, left = before + y[MEMORY_ROW], after + y[MEMORY_ROW]
+        was_slip, is_slip = np.abs(old) == 1.0, np.abs(new) == 1.0
+        self.slip_work[index] += np.where(
+            is_slip, np.where(was_slip, 0.0, entered), np.where(was_slip, -left, before - after)
+        )
+        memory = y[MEMORY_ROW]
+        self.slip_memory[index] += np.where(was_slip & ~is_slip, memory, 0.0) - np.where(
+            is_slip & ~was_slip, memory, 0.0
+        )
+        was_held, is_held = np.abs(old) == 2.0, np.abs(new) == 2.0
+        kinetic = 0.5 * y[SLIP_ROW] * y[SLIP_ROW]
+        self.damping_work[index] += np.where(is_held & ~was_held, kinetic + left, 0.0) - np.where(
+            was_held & ~is_held, kinetic + entered, 0.0
+        )
+        self.mode[index] = new
+        self.changes[index] += old != new
+        self.see(index, new)
+
+    def see(self, index: NDArray[np.intp], mode: Array) -> None:
+        """Note modes."""
+        self.modes[index] |= np.where(mode == 0.0, 1, np.where(mode > 0.0, 2, 4)).astype(np.int8)
+        self.modes[index] |= np.where(np.abs(mode) == 2.0, 1, 0).astype(np.int8)
+
+
+class Local(NamedTuple):
+    """The state of friction at a point of a trajectory, over G0; rates are those in smooth time.
+
+    `spring_force` is phi_e, `trial` the force that the limit caps, `drag` is c' x^q Gamma.
+    """
+
+    N: Array
+    dN: Array
+    dF: Array
+    weight: Array
+    spring_force: Array
+    drag: Array
+    trial: Array
+
+
+@dataclass(frozen=True)
+class SlipPhase:
+    """The joint motion of a phase: `Problem.rates` and the `Switch` of its modes.
+
+    Parameters
+    ----------
+    form : of the tangential problems
+    law : of the normal motion
+    normal : the normal problem of the phase
+    first : number of the first of the `Columns` among the params
+    memory : r in this phase
+    track : of all trajectories
+    arguments : names of the params after the columns, besides y over Gamma: those of `TangentialForm.coefficient`
+    """
+
+    form: TangentialForm
+    law: motion.MotionLaw
+    normal: Problem
+    first: int
+    memory: float
+    track: Track
+    arguments: tuple[str, ...] = ()
+
+    @property
+    def stiffness_power(self) -> float:
+        """The exponent of s in X."""
+        return self.law.model.coordinate_power * self.form.stiffness_power
+
+    @property
+    def drag_power(self) -> float:
+        """The exponent of s in x^q."""
+        return self.law.model.coordinate_power * self.form.damping_power
+
+    @property
+    def has_modes(self) -> bool:
+        """Whether the contact sticks and slips."""
+        return self.form.kind in ("spring", "dashpot")
+
+    @property
+    def is_total(self) -> bool:
+        """Whether the limit caps spring and dashpot together."""
+        return self.form.cap == "total" and self.form.kind == "spring"
+
+    def columns(self, params: Params) -> Columns:
+        """Find the columns among the params."""
+        return Columns(*params[self.first : self.first + len(Columns._fields)])
+
+    def problem(self) -> Problem:
+        """Pose the joint problem."""
+        normal = self.normal
+        return Problem(
+            rates=self.rates,
+            event=lambda y, k, params: normal.event(y[:2], k[NORMAL_ROWS], params),
+            unreachable=lambda y, k, params: normal.unreachable(y[:2], k[NORMAL_ROWS], params),
+            floor=JOINT_FLOOR,
+            step_at_unit_error=normal.step_at_unit_error,
+            n_quadratures=4,
+            strictness=STRICTNESS,
+            switch=self,
+        )
+
+    def rates(self, y: Array, params: Params, out: Array | None = None) -> Array:
+        """Compute the rates of the joint problem, see `Problem`."""
+        n, columns, p = y.shape[1], self.columns(params), self.law.model.coordinate_power
+        out = np.empty((FORCE_ROW + 1, n)) if out is None else out
+        v, out[1], weight, _, force = self.normal.rates(y[:2], params, np.empty((5, n)))
+        s, slip, z = y[0], y[SLIP_ROW], y[SPRING_ROW]
+        out[0] = v
+        spring_force = columns.spring * self._power(s, self.memory * self.stiffness_power) * z
+        drag = self._power(s, self.drag_power) * slip
+        stick_drag = columns.dashpot * drag
+        slip_force = columns.limit * force * self._coefficient(slip, params)
+        out[SLIP_ROW] = -weight * (slip_force + spring_force + stick_drag)
+        exponent = p - 1.0 + (1.0 - self.memory) * self.stiffness_power
+        out[SPRING_ROW] = columns.spring * p * self._power(s, exponent) * slip
+        if len(out) <= TIME_ROW:
+            return out
+        out[TIME_ROW] = weight
+        power = weight * slip
+        # the dashpot works on while a cap of the total force slips, and takes from what the spring does
+        working_drag = columns.damping * drag if self.is_total else stick_drag
+        slip_drag = working_drag - stick_drag
+        out[SLIP_WORK_ROW] = power * (slip_force - slip_drag)
+        out[DAMPING_ROW] = power * working_drag
+        held_force = spring_force + columns.memory_limit * force - slip_drag
+        out[MEMORY_ROW] = (
+            (1.0 - 2.0 * self.memory) * self.stiffness_power * v * self._energy(s, held_force, columns)
+        )
+        if self.stiffness_power:
+            out[MEMORY_ROW] /= _away_from_zero(s)
+        if len(out) > FORCE_ROW:
+            out[FORCE_ROW] = force
+        return out
+
+    def _coefficient(self, slip: Array, params: Params) -> Array | float:
+        """Compute the coefficient of friction over mu, with the sign of the slip where it depends on that."""
+        if self.form.coefficient is None:
+            return 1.0
+        first = self.first + len(Columns._fields)
+        arguments = dict(zip(("y", *self.arguments), params[first:], strict=False))
+        arguments["y"] = arguments["y"] * np.abs(slip)
+        return np.sign(slip) * call_by_name(self.form.coefficient, arguments)
+
+    def _power(self, s: Array, exponent: float) -> Array | float:
+        power: Array | float = signed_power(s, exponent) if exponent else 1.0
+        return power
+
+    def _energy(self, s: Array, force: Array, columns: Columns) -> Array:
+        """Compute the energy of a spring of this force, over G0^2; zero without a spring."""
+        stiffness = 2.0 * columns.root * columns.root * self._power(_away_from_zero(s), self.stiffness_power)
+        return np.asarray(np.where(columns.root > 0.0, force * force / stiffness, 0.0))
+
+    def local(self, y: Array, k: Array, params: Params) -> Local:
+        """Compute the state of friction at components y with rates k."""
+        columns, s, force = self.columns(params), y[0], k[FORCE_ROW]
+        d_force = self._rate_of_force(y, k, params)
+        share = columns.press / columns.G0
+        N = share * force
+        drag = columns.damping * self._power(s, self.drag_power) * y[SLIP_ROW]
+        capped_drag = drag if self.is_total else np.zeros_like(drag)
+        spring_force = np.where(
+            columns.mode == 0.0,
+            columns.root * self._power(s, self.memory * self.stiffness_power) * y[SPRING_ROW],
+            np.sign(columns.mode) * N - capped_drag,
+        )
+        trial = drag if self.form.kind == "dashpot" else spring_force + capped_drag
+        return Local(N, share * d_force, d_force, k[TIME_ROW], spring_force, drag, trial)
+
+    def _rate_of_force(self, y: Array, k: Array, params: Params) -> Array:
+        """Compute the rate of the normal force by a difference quotient."""
+        reach = np.clip(np.abs(y[0]), motion.MIN_RELEASE_S, 1.0)
+        if self.form.cap == "total":
+            small = motion.RELEASE_STEP * reach
+            return np.asarray((self.normal.rates(y[:2] + small * k[:2], params)[4] - k[FORCE_ROW]) / small)
+        # the friction force jumps where a slip ends, which makes the time of it matter
+        small = RATE_OF_LIMIT_STEP * reach
+        ahead, behind = (self.normal.rates(y[:2] + step * k[:2], params)[4] for step in (small, -small))
+        return np.asarray((ahead - behind) / (2.0 * small))
+
+    def trial_rate(
+        self, y: Array, k: Array, columns: Columns, local: Local, spring_force: Array, phi: Array
+    ) -> Array:
+        """Compute the rate of the trial force if the contact sticks, at a force phi and one of the spring."""
+        s = _away_from_zero(y[0])
+        growth = k[0] / s
+        drag_per_slip = columns.damping * self._power(s, self.drag_power)
+        drag_rate: Array = self.drag_power * growth * local.drag - drag_per_slip * (local.weight * phi)
+        if self.form.kind == "dashpot":
+            return drag_rate
+        stiffness = columns.root * columns.root * local.weight * self._power(y[0], self.stiffness_power)
+        rate: Array = self.memory * self.stiffness_power * growth * spring_force + stiffness * y[SLIP_ROW]
+        return rate + drag_rate if self.is_total else rate
+
+    # ---- the switch
+
+    def margins(self, y: Array, k: Array, params: Params) -> Margins:
+        """Compute the margin of the mode and that of the sign of the normal force, see `Switch`."""
+        columns, local = self.columns(params), self.local(y, k, params)
+        tolerance = MARGIN_TOLERANCE / columns.G0
+        sign_margin, sign_rate = columns.sign * k[FORCE_ROW] + MARGIN_TOLERANCE, columns.sign * local.dF
+        if not self.has_modes:
+            return sign_margin[None], sign_rate[None]
+        sticks = columns.mode == 0.0
+        direction = np.where(sticks, np.sign(local.trial), np.sign(columns.mode))
+        phi = -k[SLIP_ROW] / np.where(local.weight == 0.0, 1.0, local.weight)
+        rate = self.trial_rate(y, k, columns, local, local.spring_force, phi)
+        growth = direction * rate - local.dN
+        room = local.N - np.abs(local.trial)
+        if self.form.kind == "dashpot":
+            margin, margin_rate = np.where(sticks, room, -room) + tolerance, np.where(sticks, -growth, growth)
+        else:
+            margin = np.where(sticks, room + tolerance, growth)
+            margin_rate = np.where(sticks, -growth, np.nan)
+        held = np.flatnonzero(np.abs(columns.mode) == 2.0)
+        if held.size:
+            margin[held], margin_rate[held] = self._held_margin(y[:, held], _taken(params, held))[0], np.nan
+        # without a limit the mode does not matter, and where the contact ends all margins vanish
+        free = (columns.press == 0.0) | (y[0] < END_S)
+        margin, margin_rate = np.where(free, 1.0, margin), np.where(free, 0.0, margin_rate)
+        return np.array([margin, sign_margin]), np.array([margin_rate, sign_rate])
+
+    def change(self, which: NDArray[np.intp], y: Array, k: Array, params: Params) -> tuple[Array, Params]:
+        """Change the modes and signs of trajectories where margins vanish, see `Switch`."""
+        y, columns = self._released(y, params), self.columns(params)
+        local = self.local(y, k, params)
+        if not self.has_modes:
+            which = np.full_like(which, SIGN_MARGIN)
+        index = columns.row.astype(np.intp)
+        self.track.add_impulse(index, columns, k[0])
+        turned = which == SIGN_MARGIN
+        sign = np.where(turned, -columns.sign, columns.sign)
+        self.track.sign[index] = sign
+        old, other = columns.mode, columns.changed(columns.mode, sign)
+        # at a change of the sign there is neither a limit nor a force
+        spring_force = np.where(turned, local.spring_force - local.trial, local.spring_force)
+        # the rate of N changes its sign with the sign of the force
+        dN = other.press / other.G0 * local.dF
+        phi = np.where(turned, 0.0, np.where(old == 0.0, local.trial, np.sign(old) * local.N))
+        rate = self.trial_rate(y, k, other, local, spring_force, phi)
+        direction = np.sign(np.where(turned, rate, local.trial))
+        new = self._mode_at_limit(direction * rate - dN, direction, y, other)
+        new = np.where(~turned & (np.abs(old) == 1.0), 0.0, new)
+        new = self._held_mode(~turned & (old != 0.0), np.abs(old) == 2.0, np.sign(old), new, y, params)
+        capped_drag = local.drag if self.is_total else 0.0
+        spring_force = np.where(~turned & (old == 0.0), direction * local.N - capped_drag, spring_force)
+        return self._enter(index, old, new, sign, local.spring_force, spring_force, y, params)
+
+    def _mode_at_limit(self, growth: Array, direction: Array, y: Array, columns: Columns) -> Array:
+        """Find the modes at the limit, where the trial force grows by this more than the limit."""
+        if not self.has_modes:
+            return columns.mode
+        # without a limit the mode does not matter
+        free = columns.press == 0.0
+        forwards = np.where(y[SLIP_ROW] < 0.0, -1.0, 1.0)
+        kept = np.where(columns.mode == 0.0, forwards, np.sign(columns.mode))
+        if self.form.kind == "dashpot":
+            return np.where(free, kept, np.where(columns.mode == 0.0, forwards, 0.0))
+        return np.where(free, kept, np.where(growth > 0.0, direction, 0.0))
+
+    def _enter(
+        self,
+        index: NDArray[np.intp],
+        old: Array,
+        new: Array,
+        sign: Array,
+        force_before: Array,
+        force: Array,
+        y: Array,
+        params: Params,
+    ) -> tuple[Array, Params]:
+        """Go on in other modes, with a force of the spring if the contact sticks."""
+        columns = self.columns(params)
+        before, after = self._energy(y[0], force_before, columns), self._energy(y[0], force, columns)
+        self.track.set_mode(index, old, new, y, before, after)
+        scale = columns.root * self._power(_away_from_zero(y[0]), self.memory * self.stiffness_power)
+        z = np.where(columns.root > 0.0, force / scale, 0.0)
+        y = y.copy()
+        y[SPRING_ROW] = np.where(new == 0.0, z, y[SPRING_ROW])
+        changed = columns.changed(new, sign)
+        end = self.first + len(changed)
+        return y, (*params[: self.first], *changed, *params[end:])
+
+    # ---- the modes -2 and 2, in which a spring at its limit determines the slip
+
+    def _held_slip(self, y: Array, params: Params, direction: Array) -> tuple[Array, Array]:
+        """Compute Gamma for which the trial force of the spring grows as its limit does, and N."""
+        k, columns = self.rates(y, params), self.columns(params)
+        share = columns.press / columns.G0
+        N, dN = share * k[FORCE_ROW], share * self._rate_of_force(y, k, params)
+        stiffness = columns.root * columns.root * k[TIME_ROW] * self._power(y[0], self.stiffness_power)
+        fading = self.memory * self.stiffness_power * k[0] / _away_from_zero(y[0]) * N
+        return direction * (dN - fading) / stiffness, N
+
+    def _held_margin(self, y: Array, params: Params, direction: Array | None = None) -> tuple[Array, Mask]:
+        """Compute a margin, positive while the force is between slip and stick, and where it is nearer to slip."""
+        columns, y = self.columns(params), y[:TIME_ROW]
+        direction = np.sign(columns.mode) if direction is None else direction
+        slip, N = self._held_slip(y, params, direction)
+        small = RATE_OF_SLIP_STEP * np.clip(np.abs(y[0]), motion.MIN_RELEASE_S, 1.0)
+        k = self.rates(y, params)
+        step = small * k[:TIME_ROW]
+        ahead, behind = (self._held_slip(y + sign * step, params, direction)[0] for sign in (1.0, -1.0))
+        force = (behind - ahead) / (2.0 * small * k[TIME_ROW])
+        drag = columns.damping * self._power(y[0], self.drag_power) * slip
+        above_slip = (force - direction * N) * np.sign(drag)
+        return np.minimum(above_slip, np.abs(drag) - above_slip), above_slip < 0.5 * np.abs(drag)
+
+    def _held_mode(
+        self, at_limit: Mask, leaves: Mask, direction: Array, new: Array, y: Array, params: Params
+    ) -> Array:
+        """Replace new modes at the limit, where growth is zero, by a held mode, or by that to which it leaves."""
+        if self.form.cap == "total" or self.form.kind != "spring":
+            return new
+        rows = np.flatnonzero(
+            at_limit & (self.columns(params).damping > 0.0) & (self.columns(params).press != 0.0)
+        )
+        if rows.size:
+            ahead = direction[rows]
+            margin, is_near_slip = self._held_margin(y[:, rows], _taken(params, rows), ahead)
+            left = np.where(is_near_slip, ahead, 0.0)
+            new = new.copy()
+            new[rows] = np.where(leaves[rows], left, np.where(margin > 0.0, 2.0 * ahead, new[rows]))
+        return new
+
+    def _released(self, y: Array, params: Params) -> Array:
+        """Set Gamma where a held mode determines it."""
+        held = np.flatnonzero(np.abs(self.columns(params).mode) == 2.0)
+        if held.size:
+            part, y = _taken(params, held), y.copy()
+            direction = np.sign(self.columns(part).mode)
+            y[SLIP_ROW, held] = self._held_slip(y[:TIME_ROW, held], part, direction)[0]
+        return y
+
+    # ---- the start and the end of a part
+
+    def begin(self, start: Array, params: Params) -> tuple[Array, Params]:
+        """Find the rows and params at the start of a part of the phase, where its formulas may change."""
+        y = np.zeros((FORCE_ROW, start.shape[1]))
+        y[: len(start)] = start
+        index = self.columns(params).row.astype(np.intp)
+        is_contact = self.track.modes[index[0]] == 0
+        return self._at_contact(y, params, index) if is_contact else self._at_change(y, params, index)
+
+    def _at_change(self, y: Array, params: Params, index: NDArray[np.intp]) -> tuple[Array, Params]:
+        """Find the modes where the formulas of the normal motion, or r, have changed."""
+        columns = self.columns(params)
+        old, force_before = self.track.mode[index], self.track.force[index]
+        k = self.rates(y[:TIME_ROW], params)
+        force = k[FORCE_ROW]
+        sign = np.where(np.abs(force) > MARGIN_TOLERANCE, np.sign(force), self.track.sign[index])
+        self.track.sign[index] = sign
+        columns = columns.changed(old, sign)
+        params = self._replaced(params, columns)
+        local = self.local(y, k, params)
+        if not self.has_modes:
+            return self._enter(index, old, old, sign, force_before, force_before, y, params)
+        capped_drag = local.drag if self.is_total else 0.0
+        trial = local.drag if self.form.kind == "dashpot" else force_before + capped_drag
+        at_limit = np.abs(trial) >= local.N * (1.0 - CAP_TOLERANCE) - MARGIN_TOLERANCE / columns.G0
+        direction = np.where(trial < 0.0, -1.0, 1.0)
+        spring_force = np.where(at_limit, direction * local.N - capped_drag, force_before)
+        rate = self.trial_rate(y, k, columns, local, spring_force, direction * local.N)
+        if self.form.kind == "dashpot":
+            new = np.where(at_limit, direction, 0.0)
+        else:
+            new = self._mode_at_limit(direction * rate - local.dN, direction, y, columns)
+            new = np.where(at_limit, new, 0.0)
+            was_held = np.abs(old) == 2.0
+            new = self._held_mode(at_limit & was_held, ~was_held, direction, new, y, params)
+        return self._enter(index, old, new, sign, force_before, spring_force, y, params)
+
+    def _replaced(self, params: Params, columns: Columns) -> Params:
+        return (*params[: self.first], *columns, *params[self.first + len(columns) :])
+
+    def _at_contact(self, y: Array, params: Params, index: NDArray[np.intp]) -> tuple[Array, Params]:
+        """Find the modes at first contact, where leading powers of x decide whether the trial force is below N."""
+        form, columns, n = self.form, self.columns(params), y.shape[1]
+        near, twice = (
+            self._rows_near_contact(y, params, START_S),
+            self._rows_near_contact(y, params, 2.0 * START_S),
+        )
+        k = self.rates(near[:TIME_ROW], params)
+        force, twice_force = k[FORCE_ROW], self.rates(twice[:TIME_ROW], params)[FORCE_ROW]
+        self.track.order[index] = np.log2(twice_force / force) / self.law.model.coordinate_power
+        sign = np.where(force < 0.0, -1.0, 1.0)
+        self.track.sign[index] = sign
+        columns = columns.changed(np.zeros(n), sign)
+        params = self._replaced(params, columns)
+        if not self.has_modes:
+            mode = np.full(n, 1.0 if form.kind == "regularized" else 0.0)
+            return self._enter(index, mode, mode, sign, np.zeros(n), np.zeros(n), y, params)
+        local = self.local(near, k, params)
+        kp = form.stiffness_power
+        spring_force = (
+            columns.root**2
+            * START_S ** (self.law.model.coordinate_power * (kp + 1.0))
+            / (kp + 1.0 - self.memory * kp)
+        )
+        capped_drag = local.drag if self.is_total else 0.0
+        trial = local.drag if form.kind == "dashpot" else spring_force + capped_drag
+        below = trial < local.N
+        spring_force = np.where(below, 0.0, local.N - capped_drag)
+        if form.kind == "dashpot":
+            new = np.where(below, 0.0, 1.0)
+        else:
+            growth = self._growth_at_contact(y, params)
+            if self.is_total and kp * self.memory == form.damping_power > 0.0:
+                # the leading powers cancel
+                growth = np.where(capped_drag >= local.N, columns.root**2 * columns.G0 - 1.0, growth)
+            new = np.where(below, 0.0, np.where(growth > 0.0, 1.0, 0.0))
+            if self.is_total and self.memory == 1.0 and form.damping_power < kp:
+                self.track.is_slow[index] = is_slow = local.drag > local.N
+                new = np.where(is_slow, -1.0, new)
+        self.track.touches[index] = new != 0.0
+        near, params = self._enter(index, new, new, sign, np.zeros(n), spring_force, near, params)
+        y[SPRING_ROW] = near[SPRING_ROW]
+        return y, params
+
+    def _rows_near_contact(self, y: Array, params: Params, s: float) -> Array:
+        """Make rows at an indentation so small that the velocities are those at first contact."""
+        near = y.copy()
+        near[0], near[1] = s, self.law.coordinate.of(np.full(y.shape[1], s), 1.0, self.law.strength(params))
+        return near
+
+    def _growth_at_contact(self, y: Array, params: Params) -> Array:
+        """Compute by how much the trial force at the limit grows more than the limit, near first contact."""
+        near = self._rows_near_contact(y, params, RATE_S)
+        columns, k = self.columns(params), self.rates(near[:TIME_ROW], params)
+        small = RATE_STEP * RATE_S * k[:TIME_ROW]
+        ahead, behind = (self.rates(near[:TIME_ROW] + step, params)[FORCE_ROW] for step in (small, -small))
+        dN: Array = columns.press / columns.G0 * (ahead - behind) / (2.0 * RATE_STEP * RATE_S)
+        local = self.local(near, k, params)
+        spring_force = local.N - (local.drag if self.is_total else 0.0)
+        return self.trial_rate(near, k, columns, local, spring_force, local.N) - dN
+
+    def finish(self, y: Array, params: Params) -> None:
+        """Note the state of friction at the end of a part, from its rows; complete the rows."""
+        columns = self.columns(params)
+        index = columns.row.astype(np.intp)
+        columns = columns.changed(self.track.mode[index], self.track.sign[index])
+        params = self._replaced(params, columns)
+        y[SLIP_ROW] = self._released(y, params)[SLIP_ROW]
+        near = y.copy()
+        near[0] = np.where(np.abs(y[0]) < LEAST_S, LEAST_S, y[0])
+        k = self.rates(near[:TIME_ROW], params)
+        force = self.local(near, k, params).spring_force
+        self.track.force[index] = force
+        # an energy that grows without bound towards x = 0 counts as slip work
+        is_finite = 2.0 * self.track.order[index] > self.form.stiffness_power - ORDER_TOLERANCE
+        is_finite |= np.abs(columns.mode) != 1.0
+        self.track.energy[index] = np.where(is_finite, self._energy(near[0], force, columns), 0.0)
+        self.track.add_impulse(index, columns, k[0])
+
+
+def _taken(params: Params, rows: NDArray[np.intp]) -> Params:
+    """Take the params of some trajectories."""
+    return tuple(column[rows] for column in params)
+
+
+def _away_from_zero(s: Array) -> Array:
+    """s, or the least value for what is singular at zero."""
+    return np.where(np.abs(s) < LEAST_S, LEAST_S, s)

@@ -1,0 +1,119 @@
+"""Switches: changes of the formulas within an integration, where a margin of the present mode vanishes.
+
+A step across the zero of a margin is rejected and tried again with the length to it, as for an event that ends the
+trajectory. The change takes place at the end of a step near enough to the zero: an error of its time is one of
+second order in the solution where the rates are continuous, and of first order where they jump.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..array_types import Array, Mask
+from .events import event_offset, is_event_ahead
+from .problem import Problem, Switch
+from .state import RUNNING, State, TrialStep
+
+# a mode changes at the end of a step within this part of the last two steps, or within this time, of the zero
+SWITCH_RTOL, SWITCH_ATOL = 1e-8, 1e-12
+# a step ends at the least value of a margin in its inside if that is less than this part of those at its ends, and
+# not as near to the start as the second number, in steps
+LOW_MARGIN, NEAR_START = 0.05, 0.01
+
+
+def locate_switches(problem: Problem, switch: Switch, state: State, trial: TrialStep, accepted: Mask) -> None:
+    """Change the modes of trajectories whose step ends where a margin vanishes; shorten steps to such an end.
+
+    A step across the zero of a margin, or across a low minimum, is rejected and tried again with the length to it.
+    """
+    before, rates_before = state.margins or switch.margins(state.y, state.k, state.params)
+    margins, rates = switch.margins(trial.y, trial.k, state.params)
+    secant = (margins - before) / state.h
+    slopes = np.where(np.isnan(rates), secant, rates)
+    slopes_before = np.where(np.isnan(rates_before), secant, rates_before)
+    turns = (slopes_before < 0.0) & (slopes > 0.0)
+    # a trajectory that has ended has no next step
+    h_ahead = np.where(state.termination == RUNNING, trial.h_next, 0.0)
+    falls = is_event_ahead(margins, slopes, h_ahead) | turns
+    positions = (falls.any(axis=0) & accepted).nonzero()[0]
+    if positions.size:
+        g, dg, g_before, dg_before = (values[:, positions] for values in (margins, slopes, before, slopes_before))
+        which, offset = _first_zero(g, dg, g_before, dg_before, state.h[positions])
+        near = SWITCH_RTOL * (state.h[positions] + state.h_last[positions]) + SWITCH_ATOL
+        reached = (np.abs(offset) <= near) & (state.termination[positions] == RUNNING)
+        crossed = (offset < -near) & ~reached
+        _shorten(
+            state, trial, positions, offset, crossed, crossed | ((offset > near) & (offset < h_ahead[positions]))
+        )
+    state.margins = (
+        np.where(trial.is_accurate, margins, before),
+        np.where(trial.is_accurate, rates, rates_before),
+    )
+    if positions.size and reached.any():
+        _change_modes(problem, switch, state, trial, positions[reached], which[reached])
+
+
+def _first_zero(
+    g: Array, dg: Array, g_before: Array, dg_before: Array, h: Array
+) -> tuple[NDArray[np.intp], Array]:
+    """Find the margin that vanishes first, and the offset from the end of the step, shape (n,)."""
+    offset, certain = event_offset(g, dg, g_before, dg_before, h)
+    inside = (offset < 0.0) & (offset > -h)
+    crossing = np.where(g_before > 0.0, -h * g / (g - g_before), -h * (1.0 - NEAR_START))
+    crossing = np.where(inside, offset, crossing)
+    ahead = np.where(certain & (offset >= 0.0), offset, np.inf)
+    turns = (dg_before < 0.0) & (dg > 0.0)
+    ahead = np.where(turns, _low_minimum(g, dg, g_before, dg_before, h), ahead)
+    offset = np.where(g < 0.0, crossing, ahead)
+    which = offset.argmin(axis=0)
+    return which, offset[which, np.arange(which.size)]
+
+
+def _low_minimum(g: Array, dg: Array, g_before: Array, dg_before: Array, h: Array) -> Array:
+    """Compute the offset of a low minimum of the cubic from the end of the step; infinity without one."""
+    rise, first, last = g - g_before, dg_before * h, dg * h
+    cubic, square = first + last - 2.0 * rise, 3.0 * rise - 2.0 * first - last
+    # the root of the derivative at which it grows
+    theta = -first / (square + np.sqrt(square * square - 3.0 * cubic * first))
+    least = g_before + theta * (first + theta * (square + theta * cubic))
+    is_low = (least < LOW_MARGIN * np.maximum(g, g_before)) & (theta > NEAR_START) & (theta < 1.0)
+    return np.where(is_low, (theta - 1.0) * h, np.inf)
+
+
+def _shorten(
+    state: State, trial: TrialStep, positions: NDArray[np.intp], offset: Array, crossed: Mask, is_shorter: Mask
+) -> None:
+    """Give steps the length to a zero; the present one is tried again where it crossed the zero."""
+    assert state.h_free is not None
+    h_next = trial.h_next[positions]
+    state.h_free[positions] = np.where(
+        is_shorter, np.fmax(state.h_free[positions], h_next), state.h_free[positions]
+    )
+    shorter = np.where(crossed, state.h[positions] + offset, offset)
+    trial.h_next[positions] = np.where(is_shorter, shorter, h_next)
+    back = positions[crossed]
+    trial.is_accurate[back], state.termination[back] = False, RUNNING
+
+
+def _change_modes(
+    problem: Problem,
+    switch: Switch,
+    state: State,
+    trial: TrialStep,
+    positions: NDArray[np.intp],
+    which: NDArray[np.intp],
+) -> None:
+    """Change the modes of trajectories at the ends of their steps; they go on with the step of before."""
+    assert state.h_free is not None
+    assert state.margins is not None
+    params = tuple(column[positions] for column in state.params)
+    y, params = switch.change(which, trial.y[:, positions], trial.k[:, positions], params)
+    for column, values in zip(state.params, params, strict=True):
+        column[positions] = values
+    k = problem.rates(y[: problem.n_components], params)
+    trial.y[:, positions], trial.k[:, positions] = y, k
+    trial.h_next[positions] = np.fmax(trial.h_next[positions], state.h_free[positions])
+    state.h_free[positions] = 0.0
+    for rows, values in zip(state.margins, switch.margins(y, k, params), strict=True):
+        rows[:, positions] = values

@@ -1,0 +1,131 @@
+"""Outputs of oblique impacts where a quantity is zero, infinite, unknown or not defined."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import impact
+
+BALL = {"e": 0.8, "m1": 0.2, "m2": 0.5, "R1": 0.03, "R2": 0.04, "K": 1e6, "v1": 2.0, "v2": -1.0, "mu": 0.3}
+SPRING = "cundall-strack-1979"
+
+
+def oblique(**sweep: Any) -> xr.Dataset:
+    """The impact of two balls by Coulomb's friction and a spring, some inputs replaced; None removes one."""
+    inputs = {name: value for name, value in (BALL | sweep).items() if value is not None}
+    return impact.sweep({
+        "models": sweep.pop("models", "tsuji-1992"),
+        "frictions": ["coulomb-1785", SPRING],
+        "sweep": {name: value for name, value in inputs.items() if name != "models"},
+        "friction": {SPRING: {"k_t": 3e3}},
+    })  # fmt: skip
+
+
+def values(result: xr.Dataset, name: str) -> list[float]:
+    return list(result[name].values.ravel().tolist())
+
+
+def test_without_friction_nothing_but_the_normal_velocities_changes() -> None:
+    result = oblique(mu=0.0, u1=1.0, omega1=20.0)
+    central = impact.sweep({"models": "tsuji-1992", "sweep": {name: BALL[name] for name in BALL if name != "mu"}})
+    for name in ("v1_post", "v2_post", "e_out"):
+        assert result[name].values.tobytes() == central[name].values.tobytes()
+    assert values(result, "beta") == [-1.0, -1.0]
+    assert values(result, "u1_post") == [1.0, 1.0]
+    assert values(result, "omega1_post") == [20.0, 20.0]
+    assert values(result, "impulse_ratio") == values(result, "friction_loss") == [0.0, 0.0]
+    assert values(result, "contact_regime") == [2, 2]
+    assert values(result, "friction_status") == [1, 1]
+
+
+def test_without_a_slip_there_is_no_impulse_and_no_tangential_restitution() -> None:
+    # the spin turns the contact point as fast as the centre moves
+    result = oblique(u1=1.5, omega1=-50.0)
+    assert values(result, "u1_post") == [1.5, 1.5]
+    assert values(result, "omega1_post") == [-50.0, -50.0]
+    assert values(result, "slip_post") == values(result, "impulse_ratio") == [0.0, 0.0]
+    assert np.isnan(values(result, "beta")).all()
+    assert values(result, "contact_regime") == [1, 1]
+    assert values(result, "e_t") == [1.0, 1.0]
+
+
+def test_a_spin_alone_has_no_restitution_of_the_centres() -> None:
+    result = oblique(omega1=30.0)
+    assert np.isnan(values(result, "e_t")).all()
+    assert np.all(np.abs(values(result, "u1_post")) > 0.0)
+    assert np.isfinite(values(result, "beta")).all()
+
+
+def test_a_ball_of_unknown_radius_has_an_unknown_spin_and_a_known_velocity() -> None:
+    result = oblique(R1=None, R2=None, u1=1.0)
+    assert np.isnan([values(result, "omega1_post"), values(result, "omega2_post")]).all()
+    assert np.isfinite([values(result, "u1_post"), values(result, "beta")]).all()
+
+
+@pytest.mark.parametrize("body", [{"m2": math.inf}, {"R2": math.inf}])
+def test_a_wall_and_a_plane_do_not_turn(body: dict[str, float]) -> None:
+    result = oblique(u1=1.0, **body)
+    assert values(result, "omega2_post") == [0.0, 0.0]
+    # the slip after the impact is that of the velocities after it
+    slip = result["u1_post"] + 0.03 * result["omega1_post"] - result["u2_post"]
+    assert slip.values.ravel() == pytest.approx(values(result, "slip_post"), rel=1e-14)
+
+
+def test_balls_that_do_not_meet_keep_their_motion() -> None:
+    result = oblique(v1=-2.0, u1=1.0, omega1=5.0)
+    assert values(result, "friction_status") == [2, 2]
+    assert values(result, "u1_post") == [1.0, 1.0]
+    assert values(result, "omega1_post") == [5.0, 5.0]
+    assert values(result, "friction_loss") == [0.0, 0.0]
+    assert values(result, "contact_regime") == [0, 0]
+    assert np.isnan(values(result, "beta")).all()
+
+
+def test_at_a_limit_of_the_normal_motion_only_coulomb_has_an_answer() -> None:
+    # with e = 0 the damping is infinite and the balls stay together
+    result = oblique(models="gharib-hurmuzlu-2012", e=0.0, u1=9.0)
+    assert values(result, "status") == [3]
+    assert values(result, "friction_status") == [3, 3]
+    beta, ratio = values(result, "beta"), values(result, "impulse_ratio")
+    assert ratio[0] == pytest.approx(0.3, rel=1e-14)
+    assert math.isnan(beta[1])
+    # nothing rebounds along the normal
+    assert values(result, "rebound_angle")[0] == pytest.approx(0.5 * math.pi, rel=1e-15)
+
+
+def test_coulomb_is_its_closed_form() -> None:
+    result = oblique(u1=[0.1, 9.0])
+    beta = result["beta"].sel(friction="coulomb-1785").values.ravel()
+    m_t = 1.0 / (3.5 / 0.2 + 3.5 / 0.5)
+    m = 1.0 / (1.0 / 0.2 + 1.0 / 0.5)
+    # sticks in the end; slides throughout with an impulse above mu (1 + e_out), since the force pulls in the end
+    assert beta[0] == 0.0
+    assert result["contact_regime"].sel(friction="coulomb-1785").values.ravel().tolist() == [3, 2]
+    rigid = 0.3 * 1.8 * m * 3.0 / (m_t * 9.0) - 1.0
+    assert 0.0 < beta[1] - rigid < 0.01
+    ratio = result["impulse_ratio"].sel(friction="coulomb-1785").values.ravel()[1]
+    assert 0.3 < ratio < 0.303
+    # without tension Lambda is 1 + e exactly
+    elastic = oblique(models="hertz", u1=[0.1, 9.0]).sel(friction="coulomb-1785")
+    assert elastic["beta"].values.ravel()[1] == pytest.approx(0.3 * 2.0 * m * 3.0 / (m_t * 9.0) - 1.0, rel=1e-9)
+    assert np.abs(elastic["beta_error"].values).max() < 1e-9
+
+
+def test_works_make_up_the_loss_and_momenta_are_kept() -> None:
+    rng = np.random.default_rng(1)
+    u1, omega1, omega2 = rng.uniform(-3.0, 3.0, 20), rng.uniform(-100.0, 100.0, 20), rng.uniform(-100.0, 100.0, 20)
+    cases = {"u1": u1.tolist(), "omega1": omega1.tolist(), "omega2": omega2.tolist()}
+    result = oblique(cases=cases)
+    assert np.nanmax(np.abs(result["friction_residual"].values)) < 1e-8
+    m1, m2, I1, I2 = 0.2, 0.5, 0.4 * 0.2 * 0.03**2, 0.4 * 0.5 * 0.04**2
+    impulse = m1 * (u1 - result["u1_post"].values)
+    largest = np.abs(impulse).max()
+    assert m2 * result["u2_post"].values == pytest.approx(impulse, abs=1e-14 * max(largest, m1 * 3.0))
+    for spin, name, R, inertia in ((omega1, "omega1_post", 0.03, I1), (omega2, "omega2_post", 0.04, I2)):
+        change = inertia * (spin - result[name].values)
+        assert change == pytest.approx(R * impulse, abs=1e-14 * inertia * 100.0 + 1e-14 * R * m1 * 3.0)
