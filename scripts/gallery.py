@@ -33,6 +33,8 @@ RESULTS = {
     "figure6": "sweep configs/figure6.toml",
     "timestep": "sweep docs/timestep.toml",
     "speeds": "sweep docs/gallery/speeds.toml",
+    "oblique": "sweep configs/oblique.toml",
+    "slips": """sweep configs/oblique.toml --set 'output.variables=["psi1", "psi2"]'""",
     "drops": "calibrate docs/calibrate/drops.toml",
     "samples": "sweep docs/uncertainty/ball.toml --set 'sweep.e.linspace=[0.05, 0.95, 19]'",
     "study": "sensitivity docs/uncertainty/ball.toml --of peak_force",
@@ -99,6 +101,29 @@ EXAMPLES = {
         "figure6",
         "--sel e=0.5 --model lankarani-nikravesh-1990 --model gharib-hurmuzlu-2012",
         "The impulse-velocity diagram, Figure 2. All models follow the same lines and differ in the end point.",
+    ),
+    "beta": (
+        "oblique",
+        "",
+        "Oblique impacts with friction over the angle, of a ball of alumina on glass: what is left of the slip of "
+        "the contact points, by four friction laws. From about 30° on the contact slides throughout.",
+    ),
+    "e-t": (
+        "oblique",
+        "",
+        "The same impacts: tangential velocity of the ball after over before the impact, as it is measured.",
+    ),
+    "impulse-ratio": (
+        "oblique",
+        "",
+        "Tangential over normal impulse: below mu the contact sticks for a part of the impact.",
+    ),
+    "spin": ("oblique", "", "Spin that the ball gets from friction."),
+    "psi": (
+        "slips",
+        "",
+        "Slip after over slip before the impact in the units of Maw, Barber and Fawcett (1976), in which the "
+        "curves do not depend on mu and hardly on the materials. Below the line of sticking the slip is reversed.",
     ),
     "calibration": (
         "drops",

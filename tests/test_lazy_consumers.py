@@ -14,7 +14,7 @@ import impact
 from impact.contact.status import FIRST_FAILURE, Status
 from impact.errors import UsageError
 from impact.plots.draw import get_plot_data
-from impact.plots.kinds import KINDS, Choice
+from impact.plots.kinds import KINDS, Choice, find_kind
 from impact.plots.slices import MAX_DRAWN
 from impact.reporting.figures import iterate_choices
 from impact.results.slabs import SLAB_POINTS, distinct_points, slabs, varying_dims
@@ -299,7 +299,9 @@ def test_coordinates_may_be_lazy(figure6: xr.Dataset, capsys: pytest.CaptureFixt
 OTHER_RESULTS = ("timestep", "calibration", "uncertainty", "sensitivity")
 
 
-@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind not in OTHER_RESULTS])
+@pytest.mark.parametrize(
+    "kind", [kind for kind in KINDS if kind not in OTHER_RESULTS and not find_kind(kind).of_friction]
+)
 def test_a_picture_reads_only_what_it_draws(small: xr.Dataset, big: tuple[xr.Dataset, Reads], kind: str) -> None:
     dataset, reads = big
     reads.clear()

@@ -34,9 +34,11 @@ from .conftest import ROOT, Run, one_line
 from .fork_server import ForkServer
 
 OTHER_RESULTS = ("timestep", "calibration", "uncertainty", "sensitivity")
-MOTION_KINDS = [kind for kind in KINDS if find_kind(kind).source == "history"]
+MOTION_KINDS = [kind for kind in KINDS if find_kind(kind).source == "history" and not find_kind(kind).of_friction]
 # those of the result of an ordinary sweep
-CURVES = [kind for kind in KINDS if kind not in ("map", "validity", *OTHER_RESULTS)]
+CURVES = [
+    kind for kind in KINDS if kind not in ("map", "validity", *OTHER_RESULTS) and not find_kind(kind).of_friction
+]
 
 
 def selection_of(kind: str) -> dict[str, float]:
@@ -623,7 +625,7 @@ def test_measured_points_are_drawn_over_the_curves(speeds: xr.Dataset, tmp_path:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("speed, e_out\n1, 2\n", 'data.csv:1: got "speed"; '),
+        ("pace, e_out\n1, 2\n", 'data.csv:1: got "pace"; '),
         ("v1, v1\n1, 2\n", 'data.csv:1: got "v1" twice'),
         ("v1 [kg], e_out\n1, 2\n", "data.csv:1: v1: got [kg], expected a unit of m/s"),
         ("v1, e_out\n1, 2\n2, high\n", 'data.csv:3: e_out: got "high", expected a'),

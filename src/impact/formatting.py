@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from unicodedata import category
 
@@ -69,6 +70,15 @@ def quantity(value: object, unit: str = "1", digits: int = 6) -> str:
     return text if unit in ("", "1") or text == "–" else f"{text} {unit}"
 
 
+def degrees(angle: float) -> str:
+    """Write an angle, given in rad, in degrees.
+
+    >>> degrees(math.pi / 6.0)
+    '30°'
+    """
+    return f"{label(math.degrees(angle))}°"
+
+
 def heading(name: str, of: str = "", unit: str = "1") -> str:
     """Write the heading of a column: a name, the model or ball it belongs to, and its unit in brackets.
 
@@ -94,7 +104,7 @@ def typographic(value: float, *, powers: bool = False) -> str:
 
 
 def scaled_unit(unit: str, largest: float) -> tuple[float, str]:
-    """Choose the prefix of a unit that suits a number: the size in the given unit, and the name.
+    """Choose the prefix of a unit that suits a number: the size in the given unit, and the name; degrees for rad.
 
     Parameters
     ----------
@@ -103,7 +113,11 @@ def scaled_unit(unit: str, largest: float) -> tuple[float, str]:
 
     >>> scaled_unit("m", 1.2e-4), scaled_unit("m/s", 0.5), scaled_unit("N", 6200.0), scaled_unit("kg", 2e-3)
     ((1e-06, 'µm'), (1.0, 'm/s'), (1000.0, 'kN'), (0.001, 'g'))
+    >>> scaled_unit("rad", 1.5)
+    (0.017453292519943295, '°')
     """
+    if unit == "rad":
+        return math.radians(1.0), "°"
     if unit.startswith("kg") and largest < 0.1 and not unit.startswith("kg^"):
         power, text = _prefixed(largest * 1e3)
         return 10.0 ** (power - 3), f"{text}g{unit[2:]}"

@@ -19,6 +19,11 @@ def complete_model(incomplete: str) -> list[str]:
     return _beginning_with(incomplete, _models())
 
 
+def complete_friction(incomplete: str) -> list[str]:
+    """The keys of friction laws."""
+    return _beginning_with(incomplete, impact.frictions())
+
+
 def complete_family(incomplete: str) -> list[str]:
     """The families of models."""
     from ..contact.models import FAMILIES
@@ -129,7 +134,7 @@ def _axes(context: typer.Context) -> list[str]:
     # an option without its value yet leaves the arguments unparsed
     for path in filter(None, (context.params.get("result"), *context.args)):
         try:
-            return [str(name) for name in impact.load(path).dims if name != "model"]
+            return [str(name) for name in impact.load(path).dims if name not in ("model", "friction")]
         except (OSError, ImpactError):
             continue
     return []

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from .completion import complete_input, complete_model, complete_selection, complete_setting
+from .completion import complete_friction, complete_input, complete_model, complete_selection, complete_setting
 from .parsing import (
     Setting,
     Tolerance,
@@ -69,6 +69,15 @@ ModelOption = Annotated[
     list[str] | None,
     typer.Option(
         "--model", metavar="KEY", autocompletion=complete_model, help="Only this model; may be repeated."
+    ),
+]
+FrictionOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--friction",
+        metavar="KEY",
+        autocompletion=complete_friction,
+        help="Only this friction law; may be repeated.",
     ),
 ]
 JobsOption = Annotated[

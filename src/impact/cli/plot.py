@@ -16,7 +16,7 @@ from ..formatting import safe_text
 from ..plots.kinds import KINDS, WIDTHS
 from . import exits
 from .completion import complete_axis, complete_kind, complete_output
-from .options import JsonOption, ModelOption, OverwriteOption, PluginOption, SelectOption
+from .options import FrictionOption, JsonOption, ModelOption, OverwriteOption, PluginOption, SelectOption
 
 if TYPE_CHECKING:
     from ..plots.data import PlotData
@@ -72,6 +72,7 @@ def plot(
     ] = None,
     sel: SelectOption = None,
     model: ModelOption = None,
+    friction: FrictionOption = None,
     log: Annotated[str, typer.Option("--log", metavar="AXES", help="Logarithmic axes: x, y or xy.")] = "",
     points: Annotated[
         Path | None,
@@ -151,6 +152,7 @@ def plot(
         title=not no_title,
         labels=_parse_labels(label),
         equations=equations,
+        frictions=friction,
         data=data,
         data_form=data_form,
         overwrite=overwrite,

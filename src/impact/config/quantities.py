@@ -552,6 +552,18 @@ class Quantity:
         return factor
 
 
+def number_in(unit: str, text: str) -> float | None:
+    """Convert a text with a unit to a number in an SI unit; None if it is not one.
+
+    >>> number_in("m", "35 mm"), number_in("m", "35"), number_in("m", "35 kg")
+    (0.035, None, None)
+    """
+    try:
+        return Quantity(unit, "").read(text)
+    except PydanticCustomError:
+        return None
+
+
 class UnitError(ValueError):
     """A unit is unknown or has another dimension; the message is what is expected."""
 

@@ -49,7 +49,14 @@ def outputs(
         computed |= dict(zip(("oblique", "tangential", "kind"), friction, strict=True))
 
     with np.errstate(all="ignore"):
-        return {name: _compute(name, computed) for name in names}
+        values = {name: _compute(name, computed) for name in names}
+    # which of two NaN an operation passes on, with its sign, depends on the position of an element in its array
+    return values if friction is None else {name: _replace_nan(array) for name, array in values.items()}
+
+
+def _replace_nan(values: NDArray[Any]) -> NDArray[Any]:
+    """Give every NaN of an array the same bits."""
+    return _replace_where(values, _mask_if_any(np.isnan(values)), np.nan) if values.dtype.kind == "f" else values
 
 
 def _compute(name: str, computed: dict[str, Any]) -> Any:

@@ -29,13 +29,17 @@ from .velocity_coordinates import signed_power
 
 FrictionKind = Literal["coulomb", "spring", "dashpot", "regularized"]
 
-# rows of the joint state and its rates: s and v, Gamma and z; time, work against the limit while slipping, damping
-# work, and memory work; the rates also have the normal force
-SLIP_ROW, SPRING_ROW, TIME_ROW, SLIP_WORK_ROW, DAMPING_ROW, MEMORY_ROW, FORCE_ROW = 2, 3, 4, 5, 6, 7, 8
+# rows of the joint state and its rates: s and v, Gamma and z; memory work while sticking, time, work against the
+# limit while slipping, damping work, and memory work while slipping; the rates also have the normal force
+SLIP_ROW, SPRING_ROW, STICK_MEMORY_ROW, TIME_ROW, SLIP_WORK_ROW, DAMPING_ROW, SLIP_MEMORY_ROW, FORCE_ROW = range(
+    2, 10
+)
+N_COMPONENTS = 4
 # those rows of the joint rates that a normal problem has; it does not use its work, the fourth
 NORMAL_ROWS = [0, 1, TIME_ROW, TIME_ROW, FORCE_ROW]
-# errors of Gamma and z are judged against 1, ten times as strictly as those of the normal motion
-JOINT_FLOOR, STRICTNESS = (*motion.ERROR_FLOOR, 1.0, 1.0), (10.0, 10.0)
+# errors of Gamma, z and the memory work while sticking are judged against 1; the latter may grow fast where the
+# contact area vanishes
+JOINT_FLOOR = (*motion.ERROR_FLOOR, 1.0, 1.0, 1.0)
 # numbers of the margins: of the mode, and of the sign of the normal force
 MODE_MARGIN, SIGN_MARGIN = 0, 1
 # a margin counts as positive down to this part of the largest normal force, which is of the order of 1
@@ -83,7 +87,8 @@ class Columns(NamedTuple):
 
     `limit`, `spring` and `dashpot` are the factors of F, X^r z and x^q Gamma in the force, zero in other modes;
     `memory_limit` is the factor of F in phi_e for the memory work. `press` is N/F: 1, and in tension -1 or 0;
-    `sign` is the sign of F. `root` is the root of kappa'.
+    `sign` is the sign of F. `root` is the root of kappa', and
+    `compliance` its inverse, zero without a spring.
     """
 
     mode: Array
@@ -95,6 +100,7 @@ class Columns(NamedTuple):
     dashpot: Array
     row: Array
     root: Array
+    compliance: Array
     damping: Array
     G0: Array
     is_positive: Array
@@ -121,9 +127,9 @@ class Track:
 
     `force` and `energy` are phi_e and its energy at the end of the last part, `v` the velocity to which the
     impulse of N is complete: `impulse`, and `signed` in the direction of the slip. `slip_work` and `damping_work`
-    complete the quadratures by what happens where a mode begins and ends. `slip_memory` is the memory work of
-    slips, `order` the leading power of x in N at first contact, and `touches` tells that a slip began or ended at
-    x = 0. `modes` has a bit for sticking, slipping forwards and backwards.
+    complete the quadratures by what happens where a mode begins and ends. `order` is the leading power of x in N
+    at first contact, and `touches` tells that a slip began or ended at x = 0. `modes` has a bit for sticking,
+    slipping forwards and backwards.
     """
 
     mode: Array
@@ -135,7 +141,6 @@ class Track:
     signed: Array
     slip_work: Array
     damping_work: Array
-    slip_memory: Array
     order: Array
     touches: Mask
     modes: NDArray[np.int8]
@@ -164,14 +169,11 @@ class Track:
         self, index: NDArray[np.intp], old: Array, new: Array, y: Array, before: Array, after: Array
     ) -> None:
         """Change modes, with the energies of the spring before and after."""
-        entered, left = before + y[MEMORY_ROW], after + y[MEMORY_ROW]
+        memory = y[SLIP_MEMORY_ROW]
+        entered, left = before + memory, after + memory
         was_slip, is_slip = np.abs(old) == 1.0, np.abs(new) == 1.0
         self.slip_work[index] += np.where(
             is_slip, np.where(was_slip, 0.0, entered), np.where(was_slip, -left, before - after)
-        )
-        memory = y[MEMORY_ROW]
-        self.slip_memory[index] += np.where(was_slip & ~is_slip, memory, 0.0) - np.where(
-            is_slip & ~was_slip, memory, 0.0
         )
         was_held, is_held = np.abs(old) == 2.0, np.abs(new) == 2.0
         kinetic = 0.5 * y[SLIP_ROW] * y[SLIP_ROW]
@@ -216,6 +218,7 @@ class SlipPhase:
     memory : r in this phase
     track : of all trajectories
     arguments : names of the params after the columns, besides y over Gamma: those of `TangentialForm.coefficient`
+    has_drag : whether any trajectory has a dashpot
     """
 
     form: TangentialForm
@@ -225,6 +228,7 @@ class SlipPhase:
     memory: float
     track: Track
     arguments: tuple[str, ...] = ()
+    has_drag: bool = True
 
     @property
     def stiffness_power(self) -> float:
@@ -235,6 +239,11 @@ class SlipPhase:
     def drag_power(self) -> float:
         """The exponent of s in x^q."""
         return self.law.model.coordinate_power * self.form.damping_power
+
+    @property
+    def has_spring(self) -> bool:
+        """Whether there is a tangential spring."""
+        return self.form.kind == "spring"
 
     @property
     def has_modes(self) -> bool:
@@ -259,8 +268,8 @@ class SlipPhase:
             unreachable=lambda y, k, params: normal.unreachable(y[:2], k[NORMAL_ROWS], params),
             floor=JOINT_FLOOR,
             step_at_unit_error=normal.step_at_unit_error,
-            n_quadratures=4,
-            strictness=STRICTNESS,
+            n_components=N_COMPONENTS,
+            n_quadratures=FORCE_ROW - N_COMPONENTS,
             switch=self,
         )
 
@@ -271,28 +280,43 @@ class SlipPhase:
         v, out[1], weight, _, force = self.normal.rates(y[:2], params, np.empty((5, n)))
         s, slip, z = y[0], y[SLIP_ROW], y[SPRING_ROW]
         out[0] = v
-        spring_force = columns.spring * self._power(s, self.memory * self.stiffness_power) * z
-        drag = self._power(s, self.drag_power) * slip
-        stick_drag = columns.dashpot * drag
-        slip_force = columns.limit * force * self._coefficient(slip, params)
-        out[SLIP_ROW] = -weight * (slip_force + spring_force + stick_drag)
-        exponent = p - 1.0 + (1.0 - self.memory) * self.stiffness_power
-        out[SPRING_ROW] = columns.spring * p * self._power(s, exponent) * slip
-        if len(out) <= TIME_ROW:
+        phi = slip_force = columns.limit * force * self._coefficient(slip, params)
+        if self.has_spring:
+            spring_force = columns.spring * self._power(s, self.memory * self.stiffness_power) * z
+            phi = slip_force + spring_force
+            weighted_slip = columns.spring * slip
+            out[SPRING_ROW] = (
+                weighted_slip * p * self._power(s, p - 1.0 + (1.0 - self.memory) * self.stiffness_power)
+            )
+        else:
+            out[SPRING_ROW] = 0.0
+        if self.has_drag:
+            drag = self._power(s, self.drag_power) * slip
+            stick_drag = columns.dashpot * drag
+            phi = phi + stick_drag
+        np.multiply(weight, phi, out[SLIP_ROW])
+        np.negative(out[SLIP_ROW], out[SLIP_ROW])
+        if len(out) == N_COMPONENTS:
             return out
         out[TIME_ROW] = weight
+        slip_spring = columns.memory_limit * force if self.has_spring else slip_force
+        out[DAMPING_ROW] = 0.0
         power = weight * slip
-        # the dashpot works on while a cap of the total force slips, and takes from what the spring does
-        working_drag = columns.damping * drag if self.is_total else stick_drag
-        slip_drag = working_drag - stick_drag
-        out[SLIP_WORK_ROW] = power * (slip_force - slip_drag)
-        out[DAMPING_ROW] = power * working_drag
-        held_force = spring_force + columns.memory_limit * force - slip_drag
-        out[MEMORY_ROW] = (
-            (1.0 - 2.0 * self.memory) * self.stiffness_power * v * self._energy(s, held_force, columns)
-        )
-        if self.stiffness_power:
-            out[MEMORY_ROW] /= _away_from_zero(s)
+        if self.has_drag:
+            # the dashpot works on while a cap of the total force slips, and takes from what the spring does
+            working_drag = columns.damping * drag if self.is_total else stick_drag
+            slip_drag = working_drag - stick_drag
+            slip_force, slip_spring = slip_force - slip_drag, slip_spring - slip_drag
+            out[DAMPING_ROW] = power * working_drag
+        out[SLIP_WORK_ROW] = power * slip_force
+        if self.has_spring and self.stiffness_power and self.memory != 0.5:
+            safe = _away_from_zero(s)
+            fading = (0.5 - self.memory) * self.stiffness_power * columns.compliance * v
+            fading /= self._power(safe, self.stiffness_power + 1.0)
+            np.multiply(fading, spring_force * spring_force, out[STICK_MEMORY_ROW])
+            np.multiply(fading, slip_spring * slip_spring, out[SLIP_MEMORY_ROW])
+        else:
+            out[STICK_MEMORY_ROW] = out[SLIP_MEMORY_ROW] = 0.0
         if len(out) > FORCE_ROW:
             out[FORCE_ROW] = force
         return out
@@ -312,8 +336,8 @@ class SlipPhase:
 
     def _energy(self, s: Array, force: Array, columns: Columns) -> Array:
         """Compute the energy of a spring of this force, over G0^2; zero without a spring."""
-        stiffness = 2.0 * columns.root * columns.root * self._power(_away_from_zero(s), self.stiffness_power)
-        return np.asarray(np.where(columns.root > 0.0, force * force / stiffness, 0.0))
+        half = 0.5 * columns.compliance * force * force
+        return np.asarray(half / self._power(_away_from_zero(s), self.stiffness_power))
 
     def local(self, y: Array, k: Array, params: Params) -> Local:
         """Compute the state of friction at components y with rates k."""
@@ -403,15 +427,17 @@ class SlipPhase:
         phi = np.where(turned, 0.0, np.where(old == 0.0, local.trial, np.sign(old) * local.N))
         rate = self.trial_rate(y, k, other, local, spring_force, phi)
         direction = np.sign(np.where(turned, rate, local.trial))
-        new = self._mode_at_limit(direction * rate - dN, direction, y, other)
+        new = self._mode_at_limit(direction * rate - dN, direction, y, other, turned)
         new = np.where(~turned & (np.abs(old) == 1.0), 0.0, new)
         new = self._held_mode(~turned & (old != 0.0), np.abs(old) == 2.0, np.sign(old), new, y, params)
         capped_drag = local.drag if self.is_total else 0.0
         spring_force = np.where(~turned & (old == 0.0), direction * local.N - capped_drag, spring_force)
         return self._enter(index, old, new, sign, local.spring_force, spring_force, y, params)
 
-    def _mode_at_limit(self, growth: Array, direction: Array, y: Array, columns: Columns) -> Array:
-        """Find the modes at the limit, where the trial force grows by this more than the limit."""
+    def _mode_at_limit(
+        self, growth: Array, direction: Array, y: Array, columns: Columns, turned: Mask | bool = False
+    ) -> Array:
+        """Find the modes at the limit, where the trial force grows by this more; where `turned` it is zero."""
         if not self.has_modes:
             return columns.mode
         # without a limit the mode does not matter
@@ -419,7 +445,7 @@ class SlipPhase:
         forwards = np.where(y[SLIP_ROW] < 0.0, -1.0, 1.0)
         kept = np.where(columns.mode == 0.0, forwards, np.sign(columns.mode))
         if self.form.kind == "dashpot":
-            return np.where(free, kept, np.where(columns.mode == 0.0, forwards, 0.0))
+            return np.where(free, kept, np.where((columns.mode == 0.0) | turned, forwards, 0.0))
         return np.where(free, kept, np.where(growth > 0.0, direction, 0.0))
 
     def _enter(
@@ -458,12 +484,12 @@ class SlipPhase:
 
     def _held_margin(self, y: Array, params: Params, direction: Array | None = None) -> tuple[Array, Mask]:
         """Compute a margin, positive while the force is between slip and stick, and where it is nearer to slip."""
-        columns, y = self.columns(params), y[:TIME_ROW]
+        columns, y = self.columns(params), y[:N_COMPONENTS]
         direction = np.sign(columns.mode) if direction is None else direction
         slip, N = self._held_slip(y, params, direction)
         small = RATE_OF_SLIP_STEP * np.clip(np.abs(y[0]), motion.MIN_RELEASE_S, 1.0)
         k = self.rates(y, params)
-        step = small * k[:TIME_ROW]
+        step = small * k[:N_COMPONENTS]
         ahead, behind = (self._held_slip(y + sign * step, params, direction)[0] for sign in (1.0, -1.0))
         force = (behind - ahead) / (2.0 * small * k[TIME_ROW])
         drag = columns.damping * self._power(y[0], self.drag_power) * slip
@@ -493,7 +519,7 @@ class SlipPhase:
         if held.size:
             part, y = _taken(params, held), y.copy()
             direction = np.sign(self.columns(part).mode)
-            y[SLIP_ROW, held] = self._held_slip(y[:TIME_ROW, held], part, direction)[0]
+            y[SLIP_ROW, held] = self._held_slip(y[:N_COMPONENTS, held], part, direction)[0]
         return y
 
     # ---- the start and the end of a part
@@ -510,7 +536,7 @@ class SlipPhase:
         """Find the modes where the formulas of the normal motion, or r, have changed."""
         columns = self.columns(params)
         old, force_before = self.track.mode[index], self.track.force[index]
-        k = self.rates(y[:TIME_ROW], params)
+        k = self.rates(y[:N_COMPONENTS], params)
         force = k[FORCE_ROW]
         sign = np.where(np.abs(force) > MARGIN_TOLERANCE, np.sign(force), self.track.sign[index])
         self.track.sign[index] = sign
@@ -544,8 +570,8 @@ class SlipPhase:
             self._rows_near_contact(y, params, START_S),
             self._rows_near_contact(y, params, 2.0 * START_S),
         )
-        k = self.rates(near[:TIME_ROW], params)
-        force, twice_force = k[FORCE_ROW], self.rates(twice[:TIME_ROW], params)[FORCE_ROW]
+        k = self.rates(near[:N_COMPONENTS], params)
+        force, twice_force = k[FORCE_ROW], self.rates(twice[:N_COMPONENTS], params)[FORCE_ROW]
         self.track.order[index] = np.log2(twice_force / force) / self.law.model.coordinate_power
         sign = np.where(force < 0.0, -1.0, 1.0)
         self.track.sign[index] = sign
@@ -590,9 +616,9 @@ class SlipPhase:
     def _growth_at_contact(self, y: Array, params: Params) -> Array:
         """Compute by how much the trial force at the limit grows more than the limit, near first contact."""
         near = self._rows_near_contact(y, params, RATE_S)
-        columns, k = self.columns(params), self.rates(near[:TIME_ROW], params)
-        small = RATE_STEP * RATE_S * k[:TIME_ROW]
-        ahead, behind = (self.rates(near[:TIME_ROW] + step, params)[FORCE_ROW] for step in (small, -small))
+        columns, k = self.columns(params), self.rates(near[:N_COMPONENTS], params)
+        small = RATE_STEP * RATE_S * k[:N_COMPONENTS]
+        ahead, behind = (self.rates(near[:N_COMPONENTS] + step, params)[FORCE_ROW] for step in (small, -small))
         dN: Array = columns.press / columns.G0 * (ahead - behind) / (2.0 * RATE_STEP * RATE_S)
         local = self.local(near, k, params)
         spring_force = local.N - (local.drag if self.is_total else 0.0)
@@ -607,7 +633,7 @@ class SlipPhase:
         y[SLIP_ROW] = self._released(y, params)[SLIP_ROW]
         near = y.copy()
         near[0] = np.where(np.abs(y[0]) < LEAST_S, LEAST_S, y[0])
-        k = self.rates(near[:TIME_ROW], params)
+        k = self.rates(near[:N_COMPONENTS], params)
         force = self.local(near, k, params).spring_force
         self.track.force[index] = force
         # an energy that grows without bound towards x = 0 counts as slip work

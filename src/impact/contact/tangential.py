@@ -34,10 +34,11 @@ from .simulate import (
 )
 from .slip_motion import (
     DAMPING_ROW,
-    MEMORY_ROW,
     ORDER_TOLERANCE,
+    SLIP_MEMORY_ROW,
     SLIP_ROW,
     SLIP_WORK_ROW,
+    STICK_MEMORY_ROW,
     TIME_ROW,
     Columns,
     FrictionKind,
@@ -66,8 +67,8 @@ class TangentialResult(Record):
 
     `slip` is G at the end for a positive G0; works are in units of mu^2 (m v0)^2/m_t; `sliding_impulse` is the
     integral of the limiting normal force, Lambda; `exact` is `slip` in closed form, NaN without one; `stiffness`
-    is kappa', NaN for a kind without a spring. For the kind "coulomb" there is only `sliding_impulse`, and the
-    slip follows from it.
+    is kappa m/m_t, where kappa is that of Maw, Barber and Fawcett, NaN for a kind without a spring. For the kind
+    "coulomb" there is only `sliding_impulse`, and the slip follows from it.
     """
 
     slip: Array
@@ -135,7 +136,8 @@ def _simulate_distinct(
     collapse: bool,
 ) -> TangentialResult:
     """Integrate each distinct dimensionless problem once."""
-    model, form = pair.model, pair.form(n)
+    form = pair.form(n)
+    model = _smooth_model(pair.model, form)
     law_values = with_coefficients(model, with_units(values, n), count)
     status = check_coefficients(model, law_values, values, count)
     zero = np.zeros(count)
@@ -162,6 +164,15 @@ def _simulate_distinct(
     return result
 
 
+def _smooth_model(model: ForceModel, form: TangentialForm) -> ForceModel:
+    """Choose a coordinate in which the powers of x of the friction are smooth, too."""
+    for coordinate_power in (model.coordinate_power, 4, 8):
+        powers = (coordinate_power * form.stiffness_power, coordinate_power * form.damping_power)
+        if all(float(power).is_integer() for power in powers):
+            return replace(model, coordinate_power=coordinate_power)
+    return model
+
+
 def _coefficient_arguments(form: TangentialForm) -> tuple[str, ...]:
     """Name the arguments of the coefficient of friction besides y."""
     return tuple(name for name in argument_names(form.coefficient) if name != "y")
@@ -173,8 +184,10 @@ def _integrate(form: TangentialForm, problems: DistinctProblems, rtol: float, ma
     slip, stiffness, damping, is_positive, *coefficient = (np.array(column, float) for column in problems.columns)
     n, names = slip.size, _coefficient_arguments(form)
     track = Track.of(n)
-    unset = np.zeros(n)
-    base = Columns(*(unset,) * 7, np.arange(n, dtype=float), np.sqrt(stiffness), damping, slip, is_positive)
+    unset, compliance = np.zeros(n), np.where(stiffness > 0.0, 1.0 / stiffness, 0.0)
+    base = Columns(
+        *(unset,) * 7, np.arange(n, dtype=float), np.sqrt(stiffness), compliance, damping, slip, is_positive
+    )
     states: list[Array] = []
 
     def solve(
@@ -187,7 +200,9 @@ def _integrate(form: TangentialForm, problems: DistinctProblems, rtol: float, ma
             rows = np.vstack([start, states[0][2:, recovery.rows]])
         residual = None if recovery is None else recovery.residual
         params, breakpoints = motion.breakpoints(law, params, rows, residual)
-        phase = SlipPhase(form, law, problem, len(params), form.memory[recovery is not None], track, names)
+        phase = SlipPhase(
+            form, law, problem, len(params), form.memory[recovery is not None], track, names, bool(damping.any())
+        )
 
         def run(problem: Problem, start: Array, params: Params) -> Solution:
             y, params = phase.begin(start, params)
@@ -206,7 +221,7 @@ def _integrate(form: TangentialForm, problems: DistinctProblems, rtol: float, ma
         steps[phases.rows] += phases.restitution.steps
     if law.model.release == "gap":
         track.touches[:] |= np.abs(track.mode) == 1.0
-    result = _result(form, base, track, state)
+    result = _result(form, law.n, base, track, state)
     status = phases.status.copy()
     # at a limit the balls stop, sooner or later
     stopped = status == LIMIT
@@ -218,15 +233,14 @@ def _integrate(form: TangentialForm, problems: DistinctProblems, rtol: float, ma
     return replace(result, steps=steps, status=status)
 
 
-def _result(form: TangentialForm, base: Columns, track: Track, state: Array) -> TangentialResult:
+def _result(form: TangentialForm, n: float, base: Columns, track: Track, state: Array) -> TangentialResult:
     """Compute what trajectories come to from their last rows, NaN where they have not ended."""
     scale, G0 = base.G0 * base.G0, base.G0
     mode, kinetic = np.abs(track.mode), 0.5 * state[SLIP_ROW] ** 2
-    left = track.energy + state[MEMORY_ROW]
+    slip_memory = state[SLIP_MEMORY_ROW]
+    left = track.energy + slip_memory
     slip_work = state[SLIP_WORK_ROW] + track.slip_work - np.where(mode == 1.0, left, 0.0)
-    memory_work = state[MEMORY_ROW]
     # where N vanishes so slowly with x that both works of a slip at x = 0 are infinite, their sum is the slip work
-    slip_memory = track.slip_memory + np.where(mode == 1.0, memory_work, 0.0)
     moved = np.where(
         track.touches & (2.0 * track.order < form.stiffness_power + ORDER_TOLERANCE), slip_memory, 0.0
     )
@@ -248,10 +262,10 @@ def _result(form: TangentialForm, base: Columns, track: Track, state: Array) -> 
         slip=G0 * state[SLIP_ROW],
         slip_work=scale * (slip_work + moved),
         damping_work=scale * damping_work,
-        memory_work=scale * (memory_work - moved),
+        memory_work=scale * (state[STICK_MEMORY_ROW] + slip_memory - moved),
         elastic_left=scale * np.where(ended, track.energy, np.nan),
         regime=np.where(ended, regime, 0).astype(np.int8),
         slip_changes=np.where(ended, track.changes, 0).astype(np.int32),
         exact=np.where(ended, exact, np.nan),
-        stiffness=base.root**2 if form.kind == "spring" else nan,
+        stiffness=base.root**2 / n if form.kind == "spring" else nan,
     )

@@ -169,7 +169,7 @@ OUTPUTS = by_name(
              "omega2+ = omega2 - R2 P/I2", symbol=r"\omega_2^+", measured="any", may_be_nan=True),
     Variable("slip_post", "slip speed of the contact points after the impact", _PAIRS, "m/s", "the slip",
              "g1 = g0 - P/m_t", symbol="g_1", measured="any"),
-    Variable("beta", "tangential restitution of the contact points: -1 without friction, 0 sticks, 1 reverses",
+    Variable("beta", "tangential restitution of the contact points; -1 without friction, 0 sticks, 1 reverses",
              _PAIRS, "1", "1", "-g1/g0", symbol=r"\beta", measured="any", may_be_nan=True),
     Variable("e_t", "tangential restitution of the centres", _PAIRS, "1", "1",
              "(u1+ - u2+)/(u1 - u2)", symbol="e_t", measured="any", may_be_nan=True),

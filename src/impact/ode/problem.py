@@ -64,11 +64,11 @@ class Problem:
     event : (y, k, params) -> (g, dg): a function that is positive until the trajectory ends, and its rate along
         the trajectory, at components y where the rates are k
     unreachable : (y, k, params) -> mask of the trajectories that can no longer reach the event
-    floor : the local error of each component is judged against rtol max(|y|, floor)
+    floor : the local error of each component is judged against rtol max(|y|, floor), and so are those of the
+        quadratures that have a floor, too
     watch : locate the maximum of the watched quantity
     step_at_unit_error : length of a step whose error is of the order of 1, from which the first step is chosen
-    n_quadratures : number of quadratures; the number of components is that of `floor`
-    strictness : factors on the errors of the components after the first two
+    n_components, n_quadratures : numbers of components and quadratures
     switch : changes of the formulas within the integration
     """
 
@@ -78,19 +78,14 @@ class Problem:
     floor: tuple[float, ...]
     watch: bool = False
     step_at_unit_error: float = 1.0
+    n_components: int = 2
     n_quadratures: int = 2
-    strictness: tuple[float, ...] = ()
     switch: Switch | None = None
-
-    @property
-    def n_components(self) -> int:
-        """Number of components."""
-        return len(self.floor)
 
     @property
     def n_integrated(self) -> int:
         """Number of rows of a state: components and quadratures; it is also the row of the watched quantity."""
-        return len(self.floor) + self.n_quadratures
+        return self.n_components + self.n_quadratures
 
 
 @dataclass(frozen=True)

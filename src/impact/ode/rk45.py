@@ -79,7 +79,7 @@ def integrate(
     workspace : memory of an earlier call for as many trajectories or more
     """
     n = start.shape[1]
-    rows = problem.n_components, problem.n_integrated
+    rows = problem.n_components, problem.n_integrated, len(problem.floor)
     solution = Solution.blank(n, problem.n_integrated)
     recorded: list[Step] = []
     workspace = Workspace.of(n, *rows) if workspace is None else workspace.narrow(n)
@@ -147,7 +147,7 @@ def rk_step(
     """Take a step of length h from rows y with rates k: rows at its end and the seven stages, in the workspace."""
     components, integrated = problem.n_components, problem.n_integrated
     stages, slopes = [k], [k[:components]]
-    part, y_end, start = workspace.part, workspace.y_end, y[:components]
+    part, y_end, start = workspace.part[:components], workspace.y_end, y[:components]
     for weights, rows in zip(STAGE_WEIGHTS[:-1], workspace.stages[:-1], strict=True):
         _weighted_sum(weights, slopes, part)
         np.multiply(part, h, part)
@@ -174,13 +174,15 @@ def local_error(
     problem: Problem, stages: list[Array], y: Array, y_end: Array, h: Array, workspace: Workspace
 ) -> Array:
     """Compute the norm of the local error of a step, shape (n,)."""
-    error = workspace.part
-    _weighted_sum(ERROR_WEIGHTS, [stage[: problem.n_components] for stage in stages], error)
+    judged = len(problem.floor)
+    error = workspace.part[:judged]
+    # the stage that may lack quadratures has no weight in the error
+    _weighted_sum(ERROR_WEIGHTS, [stage[:judged] for stage in stages], error)
     np.multiply(error, h, error)
     norm = error_norm(error[0], error[1], y[0], y[1], y_end[0], y_end[1], problem.floor)
-    for row, factor in enumerate(problem.strictness, 2):
+    for row in range(2, judged):
         scale = larger(larger(np.abs(y[row]), np.abs(y_end[row])), problem.floor[row])
-        norm = larger(norm, factor * np.abs(error[row]) / scale)
+        norm = larger(norm, np.abs(error[row]) / scale)
     return norm
 
 

@@ -46,10 +46,10 @@ class Workspace:
     part: Array
 
     @classmethod
-    def of(cls, n: int, components: int = 2, integrated: int = 4) -> Workspace:
-        """Allocate for n trajectories, in one block of memory."""
+    def of(cls, n: int, components: int = 2, integrated: int = 4, judged: int = 2) -> Workspace:
+        """Allocate for n trajectories, in one block of memory; the errors of the `judged` rows are computed."""
         stage_rows = (components, *(integrated,) * N_WEIGHTED_STAGES, integrated + 1)
-        rows = (integrated, integrated + 1, *stage_rows, integrated, components)
+        rows = (integrated, integrated + 1, *stage_rows, integrated, max(components, judged))
         block = np.empty((sum(rows), n))
         y, k, *stages, y_end, part = np.split(block, np.cumsum(rows)[:-1])
         return cls(y, k, stages, y_end, part)

@@ -24,7 +24,7 @@ from .data import MEASURED, SIGMA, Points
 from .kinds import Choice
 from .labels import label_axis, pretty_conditions, symbol, words_of
 from .slices import unit_of
-from .style import is_geometric, model_styles
+from .style import is_geometric, law_key, model_styles
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -41,7 +41,7 @@ MANY_LAWS = 16
 
 @dataclass(frozen=True)
 class Curve:
-    """One curve in SI; the model of a reference is None."""
+    """One curve in SI, of a model or a pair; the model of a reference is None."""
 
     label: str
     model: str | None
@@ -52,7 +52,13 @@ class Curve:
     case: str = ""  # value of an input that distinguishes curves of one model, such as "e = 0.5"
     least: tuple[float, ...] = ()  # a band around the curve
     largest: tuple[float, ...] = ()
-    is_guide: bool = False  # a thin line with its case at its end
+    is_guide: bool = False  # a thin line with its case at its end; in the legend if it has a label
+    friction: str = ""  # key of the friction law of a pair
+
+    @property
+    def law(self) -> str:
+        """The key of its model or pair; empty for a reference."""
+        return law_key(self.model, self.friction) if self.model else ""
 
     def rows_of_values(self) -> Iterator[tuple[str, tuple[float, ...]]]:
         """Iterate over its values and the ends of its band, with a name for each end."""
@@ -115,12 +121,13 @@ class CurveData:
         return {
             *(name for panel in self.panels for name in (panel.x_name, panel.y_name)),
             *(curve.variable for curve in all_curves if curve.end),
-            *(curve.model or "reference" for curve in all_curves),
+            *(curve.law or "reference" for curve in all_curves),
         }
 
     def long_table(self) -> pd.DataFrame:
         """Make a row for each point of a curve, and for each measured point."""
         parts: list[dict[str, Any]] = []
+        of_pairs = any(curve.friction for panel in self.panels for curve in panel.curves)
         for panel, points in zip_longest(self.panels, self.measured):
             axes = {
                 "x_axis": heading(f"{panel.x_label},", panel.x_name, panel.x_unit),
@@ -130,12 +137,14 @@ class CurveData:
                 label = " ".join(filter(None, (curve.label, curve.end)))
                 for end, values in curve.rows_of_values():
                     name = ", ".join(filter(None, (label, curve.case, end)))
-                    parts.append({**axes, "curve": name, "model": curve.model or "", "x": curve.x, "y": values})
+                    laws = {"model": curve.model or "", **({"friction": curve.friction} if of_pairs else {})}
+                    parts.append({**axes, "curve": name, **laws, "x": curve.x, "y": values})
             for column, values in (points.columns if points else {}).items():
                 if column != panel.x_name:
                     name = MEASURED if column == panel.y_name else f"{MEASURED}, {column}"
                     x = points.columns[panel.x_name]
-                    parts.append({**axes, "curve": name, "model": "", "x": x, "y": values})
+                    laws = dict.fromkeys(("model", "friction") if of_pairs else ("model",), "")
+                    parts.append({**axes, "curve": name, **laws, "x": x, "y": values})
         return pd.concat(map(pd.DataFrame, parts), ignore_index=True)
 
     def wide_table(self) -> pd.DataFrame:
@@ -144,7 +153,7 @@ class CurveData:
         all_curves = [(panel, curve) for panel in self.panels for curve in panel.curves]
         is_shared = all(curve.x == all_curves[0][1].x for _, curve in all_curves)
         for panel, curve in all_curves:
-            owner = curve.model or "reference"
+            owner = curve.law or "reference"
             name = " ".join(filter(None, (owner, curve.case.replace(" ", ""))))
             x_column = heading(panel.x_name, "" if is_shared else owner, panel.x_unit)
             # a law may have other points in another panel, such as its residuals
@@ -172,8 +181,7 @@ class CurveData:
         self, all_axes: Sequence[Axes], labels: Mapping[str, str], points: Points | None
     ) -> list[tuple[Artist, str]]:
         """Draw curves, and measured points over them."""
-        models = dict.fromkeys(curve.model for panel in self.panels for curve in panel.curves if curve.model)
-        styles = model_styles([model for model in models if model])
+        styles = model_styles([curve.law for panel in self.panels for curve in panel.curves if curve.law])
         entries: dict[str, Artist] = {}
         band: dict[str, Artist] = {}
         stored = {panel: own for panel, own in zip(self.panels, self.measured, strict=False) if own.columns}
@@ -181,11 +189,12 @@ class CurveData:
             _draw_bands(axes, panel)
             axes.set(xscale="log" if panel.x_log else "linear", yscale="log" if panel.y_log else "linear")
             for curve in panel.curves:
-                chosen_name = labels.get(curve.model or "reference")
-                default_name = curve.model if curve.model and len(styles) >= MANY_LAWS else curve.label
+                chosen_name = labels.get(curve.law or "reference")
+                default_name = curve.law if curve.law and len(styles) >= MANY_LAWS else curve.label
                 name = chosen_name or pretty_conditions(default_name)
                 (line,) = axes.plot(curve.x, curve.y, label=f"_{name}", **_line_style(curve, panel, styles))
-                entries.setdefault(name, line)
+                if name:
+                    entries.setdefault(name, line)
                 if curve.least:
                     band[panel.band_name] = _draw_band(axes, curve, line)
             entries |= _draw_points(axes, panel, points) if points else {}
@@ -210,6 +219,7 @@ def curve_of(
     variable: str,
     end: str = "",
     band: Sequence[ArrayLike] = (),
+    friction: str = "",
 ) -> Curve:
     """Make a curve of arrays of the shape of x, or of one y everywhere; a band is two arrays."""
     shape = np.shape(x)
@@ -217,7 +227,7 @@ def curve_of(
         tuple(np.broadcast_to(np.asarray(array, float), shape).tolist()) if array is not None else ()
         for array in (x, y, *(band or (None, None)))
     )
-    return Curve(label, model, points, values, end, variable, least=least, largest=largest)
+    return Curve(label, model, points, values, end, variable, least=least, largest=largest, friction=friction)
 
 
 def x_axis_fields(coordinate: xr.DataArray, choice: Choice) -> dict[str, Any]:
@@ -270,10 +280,10 @@ def _line_style(curve: Curve, panel: Panel, styles: Mapping[str, Mapping[str, An
         # without a line it is a disc, larger than the markers of the models
         disc = {"marker": "o", "markersize": 9.0, "alpha": None} if points == 1 or scattered else {}
         return {"color": "black" if not disc else "#c0c0c0", "linewidth": 2.0, "zorder": 1.5, **disc, **scattered}
-    style = {key: value for key, value in styles[curve.model].items() if key != "hatch"}
+    style = {key: value for key, value in styles[curve.law].items() if key != "hatch"}
     # the markers of different models are at different points, so that equal curves show both
     every = 1 if scattered else max(1, points // 12)
-    start = list(styles).index(curve.model) * every // max(1, len(styles)) % every
+    start = list(styles).index(curve.law) * every // max(1, len(styles)) % every
     return {**style, "markevery": (start, every), "markerfacecolor": "white", **scattered}
 
 
@@ -372,7 +382,7 @@ def _label_curve_ends(axes: Axes, curves: Sequence[Curve], labels: Mapping[str, 
     low, high = axes.get_ylim()
     ordered = sorted((point[1], name) for name, point in ends.items())
     for rank, (y, name) in enumerate(ordered):
-        near = [other for other, _ in ordered if abs(other - y) < 0.06 * (high - low)]
+        near = [other for other, _ in ordered if abs(other - y) < 0.1 * (high - low)]
         aside = (-8 if rank == 0 else 8) if len(near) > 1 else 0
         axes.annotate(
             labels.get(name, symbol(name)),

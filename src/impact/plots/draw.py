@@ -44,6 +44,7 @@ def plot(
     title: bool = True,
     labels: Mapping[str, str] | None = None,
     equations: bool = False,
+    frictions: Sequence[str] | None = None,
     ax: Axes | Sequence[Axes] | None = None,
     plugins: Sequence[ForceModel | str | Path] = (),
 ) -> Figure:
@@ -71,6 +72,7 @@ def plot(
     labels : texts by the name of an axis, of a variable whose name is at the end of its curve, the key of a law,
         "reference" or "title"
     equations : name the laws with the numbers of their equations in the paper
+    frictions : keys of the friction laws to show; by default all
     ax : axes of an existing figure to draw into, one for each panel, in the style of that figure
     plugins : plug-in models that the result was computed with, needed to draw a loop, a history or an impulse
 
@@ -91,7 +93,7 @@ def plot(
         if dataset.history is None:
             raise UsageError(f"no motion to draw: {dataset.why_no_history}")
         dataset = dataset.history
-    choice = Choice(x, y, variable, sel, models, log, equations)
+    choice = Choice(x, y, variable, sel, models, log, equations, frictions)
     look = Look(width, height, style, title, labels)
     return draw(get_plot_data(dataset, kind or default_kind(dataset).name, choice, plugins), look, points, ax)
 

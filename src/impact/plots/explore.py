@@ -1,4 +1,4 @@
-"""Controls in a notebook that draw a result: the kind of picture, the models, and a slider for each axis."""
+"""Controls in a notebook that draw a result: the kind of picture, the laws, and a slider for each axis."""
 
 from __future__ import annotations
 
@@ -55,6 +55,11 @@ def explore(dataset: xr.Dataset, *, plugins: Sequence[ForceModel | str | Path] =
         options=kinds_to_offer(dataset), value=default_kind(dataset).name, description="kind"
     )
     models = ipywidgets.SelectMultiple(options=keys, value=keys, description="models", rows=min(len(keys), 8))
+    # none to choose from where there is no friction
+    laws = [str(key) for key in dataset["friction"].values] if "friction" in dataset.dims else []
+    frictions = ipywidgets.SelectMultiple(
+        options=laws, value=laws, description="frictions", rows=min(len(laws), 8)
+    )
     first = x_axis(dataset, None) if axes else None
     first = first if first in axes else next(iter(axes), None)
     others = [name for name in axes if name != first]
@@ -85,6 +90,7 @@ def explore(dataset: xr.Dataset, *, plugins: Sequence[ForceModel | str | Path] =
                 y=None if y.disabled else y.value,
                 sel=sel,
                 models=list(models.value),
+                frictions=list(frictions.value),
                 plugins=plugins,
             )
         except UsageError as error:
@@ -94,7 +100,7 @@ def explore(dataset: xr.Dataset, *, plugins: Sequence[ForceModel | str | Path] =
         figure.savefig(png, dpi=DPI)
         picture.value, message.value = png.getvalue(), ""
 
-    controls = [kind, models, x, y, *sliders.values()]
+    controls = [kind, models, *([frictions] if laws else []), x, y, *sliders.values()]
     for control in controls:
         control.observe(update, names="value")
     update()
@@ -122,7 +128,7 @@ def axes_of(dataset: xr.Dataset) -> list[str]:
     """
     if source_of(dataset) in STUDIES:
         return []
-    return [str(dim) for dim in dataset.dims if dim not in ("model", SAMPLE) and dim in dataset.coords]
+    return [str(dim) for dim in dataset.dims if dim not in ("model", "friction", SAMPLE) and dim in dataset.coords]
 
 
 def _shown_values(coordinate: xr.DataArray) -> list[tuple[str, Any]]:

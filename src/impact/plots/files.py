@@ -50,6 +50,7 @@ def plot_to_files(
     title: bool = True,
     labels: Mapping[str, str] | None = None,
     equations: bool = False,
+    frictions: Sequence[str] | None = None,
     data: str | Path | None = None,
     data_form: str = "wide",
     overwrite: bool = False,
@@ -69,7 +70,8 @@ def plot_to_files(
     data : file for the numbers behind the picture: .csv, .tex or .parquet
     data_form : "wide", a column for each curve, or "long", a row for each point
     overwrite : replace existing files
-    x, y, variable, sel, models, log, points, width, height, style, title, labels, equations, plugins : see `plot`
+    x, y, variable, sel, models, log, points, width, height, style, title, labels, equations, frictions, plugins :
+        see `plot`
 
     Returns
     -------
@@ -87,7 +89,7 @@ def plot_to_files(
     ...     [path.name for path in impact.plot_to_files(f"{folder}/r.h5").pictures.values()]
     ['r.png']
     """
-    choice = Choice(x, y, variable, sel, models, log, equations)
+    choice = Choice(x, y, variable, sel, models, log, equations, frictions)
     look = Look(width, height, style, title, labels)
     kinds = list(dict.fromkeys(kinds))
     for kind in kinds:

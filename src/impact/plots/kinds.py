@@ -31,6 +31,11 @@ KINDS = {
     "loop": "motions",
     "history": "motions",
     "impulse": "motions",
+    "beta": "oblique",
+    "e-t": "oblique",
+    "impulse-ratio": "oblique",
+    "spin": "oblique",
+    "psi": "oblique",
     "calibration": "calibrations",
     "uncertainty": "uncertainty",
     "sensitivity": "sensitivity",
@@ -57,6 +62,7 @@ class Choice:
     models: Sequence[str] | None = None
     log: str = ""
     equations: bool = False
+    frictions: Sequence[str] | None = None
 
     def __post_init__(self) -> None:
         if self.log not in ("", *LOG_AXES):
@@ -95,6 +101,7 @@ class Kind:
     along: tuple[str, ...] = ("x",)  # inputs that it draws along; "x" and "y" are those of the choice
     source: str = "sweep"  # what it shows, see `source_of`; the first kind in KINDS of a source is its default
     in_report: bool = True
+    of_friction: bool = False  # it shows pairs of a model and a friction law
 
     def inputs_along(self, x: str | None, y: str | None) -> tuple[str, ...]:
         """List the inputs that it draws along; others have a value.

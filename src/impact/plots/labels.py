@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from functools import cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
 from matplotlib.axis import Axis
 from matplotlib.mathtext import MathTextParser
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from ..config.input_names import InputName
+from ..contact.frictions import frictions
 from ..contact.variables import HISTORY, OUTPUTS
 from ..errors import UsageError
 from ..formatting import NO_BREAK, safe_text, scaled_unit, typographic, with_year
 from .slices import parameter_text, scalars_of
+from .style import law_key
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -31,9 +35,14 @@ MATH_SYMBOLS = {
     "E2": "E_2",
     "dt": r"h",
     "phase": "s",
+    "angle": r"\theta",
+    "inertia_factor1": "q_1",
+    "inertia_factor2": "q_2",
 }
 # name of the impulse-momentum solution in the paper
 REFERENCE = "Impulse-momentum"
+# distances of ticks of angles [deg], of which the first with a suitable number of ticks is used
+ANGLE_STEPS, MIN_ANGLES, MAX_ANGLES = (5, 15, 30, 45, 90), 1, 8
 
 
 @cache
@@ -122,6 +131,58 @@ def model_label(model_data: xr.Dataset, *, numbered: bool = False) -> str:
     return law_text(str(title), int(year), str(equation), parameters, numbered=numbered)
 
 
+class LawPart(NamedTuple):
+    """What a result has for one model, or for one pair: its label, the keys of both laws, and the data."""
+
+    label: str
+    model: str
+    friction: str
+    data: xr.Dataset
+
+    @property
+    def key(self) -> str:
+        """Its name in a picture, see `impact.plots.style.law_key`."""
+        return law_key(self.model, self.friction)
+
+
+def split_by_law(data: xr.Dataset, *, numbered: bool) -> Iterator[LawPart]:
+    """Split a part of a result at its models, and at its friction laws where it has that dimension."""
+    for index in range(data.sizes["model"]):
+        of_model = data.isel(model=index)
+        key, label = str(of_model["model"].item()), model_label(of_model, numbered=numbered)
+        if "friction" not in data.dims:
+            yield LawPart(label, key, "", of_model)
+            continue
+        for pair in (of_model.isel(friction=friction) for friction in range(data.sizes["friction"])):
+            friction_key = str(pair["friction"].item())
+            of_friction = friction_text(friction_key, scalars_of(pair))
+            # a single model is not named beside every friction law
+            shown = of_friction if data.sizes["model"] == 1 else f"{label} with {of_friction}"
+            yield LawPart(shown, key, friction_key, pair)
+
+
+def friction_text(key: str, inputs: Mapping[str, object]) -> str:
+    """Write the title of a friction law, with those of its parameters that differ from their defaults.
+
+    >>> inputs = {"friction.lammps-mindlin.xt": 0.5, "friction.lammps-mindlin.limit": 1.0}
+    >>> friction_text("lammps-mindlin", inputs).replace(NO_BREAK, " ")
+    'LAMMPS mindlin, xt = 0.5, limit = positive'
+    """
+    law = frictions().get(key)
+    if law is None:
+        return safe_text(key, 80)
+    chosen: dict[str, object] = {}
+    for parameter in law.parameters:
+        name = f"friction.{key}.{parameter.name}"
+        value = inputs.get(name, parameter.default)
+        if value != parameter.default:
+            # a word is stored as its position
+            chosen[name] = (
+                parameter.choices[int(value)] if parameter.choices and isinstance(value, float) else value
+            )
+    return ", ".join(filter(None, (law.title, parameter_text(f"friction.{key}", chosen))))
+
+
 def label_axis(
     axis: Axis, meaning: str, name: str, unit: str, largest: float, labels: Mapping[str, str], *, log: bool
 ) -> None:
@@ -139,5 +200,20 @@ def number_axis(axis: Axis, size: float = 1.0, *, log: bool = False) -> None:
         narrow = (1.0, 2.0, 5.0) if high < 1e2 * low else (1.0, 3.0)
         axis.set_major_locator(LogLocator(subs=narrow if high < 1e3 * low else (1.0,)))
         axis.set_minor_formatter(NullFormatter())
+    elif size == math.radians(1.0):
+        axis.set_major_locator(DegreeLocator("auto", steps=[1, 2, 2.5, 5, 10], min_n_ticks=3))
     else:
         axis.set_major_locator(MaxNLocator("auto", steps=[1, 2, 2.5, 5, 10], min_n_ticks=3))
+
+
+class DegreeLocator(MaxNLocator):
+    """Places the ticks of an axis in rad at round numbers of degrees, such as multiples of 15."""
+
+    def tick_values(self, vmin: float, vmax: float) -> Any:
+        low, high = math.degrees(vmin), math.degrees(vmax)
+        # as many as fit beside each other: the numbers have two digits
+        most = min(max(MIN_ANGLES, 1.5 * self.axis.get_tick_space()), MAX_ANGLES) if self.axis else MAX_ANGLES
+        step = next((step for step in ANGLE_STEPS if MIN_ANGLES <= (high - low) / step <= most), None)
+        if step is None:
+            return np.radians(super().tick_values(low, high))
+        return np.radians(np.arange(math.ceil(low / step), math.floor(high / step) + 1) * step)

@@ -24,10 +24,10 @@ from ..errors import UsageError, did_you_mean
 from ..formatting import heading, percentage, safe_text
 from .data import Points
 from .kinds import Choice, Kind
-from .labels import REFERENCE, label_axis, model_label, number_axis, pretty_conditions, symbol, words_of
+from .labels import REFERENCE, label_axis, number_axis, pretty_conditions, split_by_law, symbol, words_of
 from .layout import Picture
 from .slices import NO_SWEEP, choose_plane, conditions_of, read, take_plane, unit_of
-from .style import is_geometric, model_styles
+from .style import is_geometric, law_key, model_styles
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -56,11 +56,20 @@ MIN_ROW_HEIGHT, MAX_ROW_HEIGHT = 1.7, 3.2
 
 @dataclass(frozen=True)
 class Field:
-    """One panel: its title, the key of its model (None for the reference), and a value at each y and x."""
+    """One panel: its title, the key of its model (None for the reference), and a value at each y and x.
+
+    `friction` is the key of the friction law of a pair.
+    """
 
     label: str
     model: str | None
     values: Plane
+    friction: str = ""
+
+    @property
+    def key(self) -> str:
+        """The key of its model or pair, or "reference"."""
+        return law_key(self.model, self.friction) if self.model else "reference"
 
 
 @dataclass(frozen=True)
@@ -102,7 +111,7 @@ class MapData:
     def names(self) -> set[str]:
         """The axes, variable and models whose text a user can replace."""
         variable = () if self.closest else (self.variable,)
-        return {self.x, self.y, *variable, *(panel.model or "reference" for panel in self.panels)}
+        return {self.x, self.y, *variable, *(panel.key for panel in self.panels)}
 
     def long_table(self) -> pd.DataFrame:
         """Make a row for each point of each model; x varies more slowly than y."""
@@ -114,22 +123,37 @@ class MapData:
         if self.closest:
             closest["closest"] = [key or "" for key in np.transpose(np.array(self.closest, object)).ravel()]
             closest["abs_e_error"] = np.transpose(self.distance).ravel()
+        of_pairs = any(panel.friction for panel in self.panels)
         parts = [
-            {"model": panel.model or "", **points, self.variable: np.transpose(panel.values).ravel(), **closest}
+            {
+                "model": panel.model or "",
+                **({"friction": panel.friction} if of_pairs else {}),
+                **points,
+                self.variable: np.transpose(panel.values).ravel(),
+                **closest,
+            }
             for panel in self.panels
         ]
         return pd.concat(map(pd.DataFrame, parts), ignore_index=True)
 
     def wide_table(self) -> pd.DataFrame:
-        """Make a row for each point, with a column for each model."""
+        """Make a row for each point, with a column for each model or pair."""
         x_unit, y_unit, unit = self.units
         table = self.long_table()
-        keys = table["model"].unique()
-        wide = table.pivot(index=[self.x, self.y], columns="model", values=self.variable)[keys]
-        wide.columns = pd.Index([heading(self.variable, key, unit) for key in keys])
-        wide.index.names = [heading(self.x, unit=x_unit), heading(self.y, unit=y_unit)]
-        closest = table.loc[table["model"] == keys[0], table.columns[4:]]
-        return pd.concat([wide.reset_index(), closest.reset_index(drop=True)], axis=1)
+        points = table.iloc[: len(self.x_values) * len(self.y_values)]
+        owners = [law_key(panel.model or "", panel.friction) for panel in self.panels]
+        columns = table[self.variable].to_numpy().reshape(len(owners), -1)
+        return pd.DataFrame(
+            {
+                heading(self.x, unit=x_unit): points[self.x],
+                heading(self.y, unit=y_unit): points[self.y],
+                **{
+                    heading(self.variable, owner, unit): column
+                    for owner, column in zip(owners, columns, strict=True)
+                },
+                **{name: points[name] for name in ("closest", "abs_e_error") if self.closest},
+            }
+        )
 
     def place_panels(self, figure: Figure, width: float) -> tuple[list[Axes], float]:
         """Place panels in rows; only the left and lower axes have tick labels."""
@@ -150,7 +174,7 @@ class MapData:
         x, y = edges_of(self.x_values, self.x_log), edges_of(self.y_values, self.y_log)
         draw_panels = _draw_closest if self.closest else _draw_fields
         mesh, entries = draw_panels(self, all_axes, x, y, labels)
-        names = [labels.get(panel.model or "reference", pretty_conditions(panel.label)) for panel in self.panels]
+        names = [labels.get(panel.key, pretty_conditions(panel.label)) for panel in self.panels]
         titles = ["Closest model", "Its absolute error"] if self.closest else names
         for axes, title in zip(all_axes, titles, strict=True):
             axes.set_title(title)
@@ -181,11 +205,12 @@ class MapData:
 
 
 def field_map(dataset: xr.Dataset, choice: Choice) -> MapData:
-    """Read a variable over two axes, for at most MAX_PANELS models."""
+    """Read a variable over two axes, for at most MAX_PANELS models or pairs."""
     plot_data = _map_data("map", dataset, choice.variable or "e_error", choice, MAX_PANELS)
     if not plot_data.left_out:
         return plot_data
-    count = f"the first {MAX_PANELS} of {MAX_PANELS + len(plot_data.left_out)} models"
+    laws = "pairs" if plot_data.panels[0].friction else "models"
+    count = f"the first {MAX_PANELS} of {MAX_PANELS + len(plot_data.left_out)} {laws}"
     return replace(plot_data, conditions="; ".join(filter(None, (plot_data.conditions, count))))
 
 
@@ -210,36 +235,33 @@ def _nested_tuples(values: NDArray[Any]) -> tuple[Any, ...]:
 def _map_data(
     kind: str, dataset: xr.Dataset, variable: str, choice: Choice, max_panels: int | None = None
 ) -> MapData:
-    """Read the panels of a kind of map; of more than `max_panels` models the rest is not read."""
+    """Read the panels of a kind of map, of at most `max_panels` models or pairs."""
     if "model" not in dataset.dims:
         raise UsageError(NO_SWEEP)
     if variable not in dataset.data_vars:
         hint = did_you_mean(variable, [str(name) for name in dataset.data_vars])
         raise UsageError(f'no variable "{variable}" in this result; {hint}')
-    data, x, y, not_drawn = take_plane(dataset, kind, choice)
+    outer = [dim for dim in ("model", "friction") if dim in dataset[variable].dims]
+    data, x, y, not_drawn = take_plane(dataset, kind, choice, outer)
     field, plane = data[variable], (*data[y].dims, *data[x].dims)
-    left_out: tuple[str, ...] = ()
-    if "model" in field.dims:
-        left_out = tuple(map(str, field["model"].values[max_panels:].tolist())) if max_panels is not None else ()
+    laws = list(split_by_law(data, numbered=choice.equations)) if "model" in field.dims else []
+    if laws:
         field = field.isel(model=slice(max_panels))
     what = safe_text(f"{variable} over {x} and {y}")
     if field.dtype.kind not in "iuf" or not set(plane) <= set(field.dims):
         raise UsageError(f"cannot draw {what}: it does not have a number at each point")
-    # of shape (models, y, x); the reference has no models
+    # of shape (models or pairs, y, x); the reference has no models
     in_memory = read(field.to_dataset(name=variable), [variable])[variable]
-    values = np.asarray(in_memory.transpose(..., *plane).values, float)
-    values = values.reshape(-1, *values.shape[-2:])
+    values = np.asarray(in_memory.transpose(*outer, *plane).values, float)
+    values = values.reshape(-1, *values.shape[-2:])[:max_panels]
     finite = values[np.isfinite(values)]
     if not finite.size:
         raise UsageError(f"cannot draw {what}: it has no value there")
     for letter, name in (("x", x), ("y", y)):
         if letter in choice.log and data[name].values[0] <= 0.0:
             raise UsageError(f"--log {letter}: {name} got values <= 0, expected values > 0")
-    names: list[tuple[str, str | None]] = [(f"{REFERENCE} (6), (7)" if choice.equations else REFERENCE, None)]
-    if "model" in field.dims:
-        by_model = (data.isel(model=index) for index in range(field.sizes["model"]))
-        names = [(model_label(part, numbered=choice.equations), str(part["model"].item())) for part in by_model]
-
+    names: list[tuple[str, str | None, str]] = [(law.label, law.model, law.friction) for law in laws[:max_panels]]
+    names = names or [(f"{REFERENCE} (6), (7)" if choice.equations else REFERENCE, None, "")]
     heading_text = safe_text(str(dataset.attrs.get("title", "")), 140)
     x_label, y_label, label = (words_of(data[name].attrs, name) for name in (x, y, variable))
     x_unit, y_unit, unit = (unit_of(data[name]) for name in (x, y, variable))
@@ -259,9 +281,12 @@ def _map_data(
         y_log="y" in choice.log or is_geometric(data[y].values),
         # errors, and what has values of both signs, not by rounding alone
         signed=variable.endswith(("_error", "energy_residual")) or bool(-finite.min() > 1e-3 * finite.max() > 0.0),
-        panels=tuple(Field(*name, _nested_tuples(part)) for name, part in zip(names, values, strict=True)),
+        panels=tuple(
+            Field(label, model, _nested_tuples(part), friction)
+            for (label, model, friction), part in zip(names, values, strict=True)
+        ),
         not_drawn=not_drawn,
-        left_out=left_out,
+        left_out=tuple(law.key for law in laws[len(names) :]),
     )
 
 

@@ -19,7 +19,7 @@ from ..results.kinds import has_fixed_steps
 from ..results.schema import exponent_text
 from .curves import Curve, CurveData, Mark, Panel, curve_of
 from .kinds import Choice, Kind
-from .labels import REFERENCE, law_text, words_of
+from .labels import REFERENCE, friction_text, law_text, words_of
 from .slices import choose_line, described_inputs, parameter_text, unit_of
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ FORCE_RTOL = 1e-6
 
 def loop_curves(histories: Sequence[xr.Dataset], choice: Choice) -> CurveData:
     """Draw force over indentation, Figures 3 and 5 of the paper: the area of a loop is the energy loss."""
-    lines = _curves_over("Force over indentation", histories, [("delta", "F", "")], choice)
+    lines = curves_over("Force over indentation", histories, [("delta", "F", "")], choice)
     if len(histories) > 1:
         return lines
     (panel,) = lines.panels
@@ -54,13 +54,13 @@ def _loop_marks(curve: Curve) -> tuple[Mark, ...]:
 
 def history_curves(histories: Sequence[xr.Dataset], choice: Choice) -> CurveData:
     """Draw indentation, its rate and the force over time; see `loop_curves`."""
-    return _curves_over("Time history", histories, [("t", name, "") for name in ("delta", "v", "F")], choice)
+    return curves_over("Time history", histories, [("t", name, "") for name in ("delta", "v", "F")], choice)
 
 
 def impulse_curves(histories: Sequence[xr.Dataset], choice: Choice) -> CurveData:
     """Draw velocities over the impulse, Figure 2: laws differ in where they end on the lines (8) and (9)."""
     pairs = [("tau", "v1", "v₁"), ("tau", "v2", "v₂")]
-    lines = _curves_over("Velocities over the impulse", histories, pairs, choice)
+    lines = curves_over("Velocities over the impulse", histories, pairs, choice)
     reference = f"{REFERENCE} (8), (9)" if choice.equations else REFERENCE
     curves = tuple(
         curve
@@ -99,7 +99,7 @@ def _reference_curve(history: xr.Dataset, name: str, label: str) -> list[Curve]:
     return [curve_of(label, None, (0.0, total), (start, end), name, {"v1": "v₁", "v2": "v₂"}[name])]
 
 
-def _curves_over(
+def curves_over(
     title: str, histories: Sequence[xr.Dataset], pairs: Sequence[tuple[str, str, str]], choice: Choice
 ) -> CurveData:
     """Draw a panel for each pair of names, whose third text is written at the end of its curves."""
@@ -110,12 +110,13 @@ def _curves_over(
     for x, y, end in pairs:
         curves = [
             curve_of(
-                _model_label(history, numbered=choice.equations),
+                _label(history, histories, numbered=choice.equations),
                 str(history["model"].item()),
                 _series(history, x),
                 _series(history, y),
                 y,
                 end,
+                friction=str(history["friction"].item()) if "friction" in history.coords else "",
             )
             for history in histories
         ]
@@ -136,6 +137,15 @@ def _axis_label_and_unit(history: xr.Dataset, name: str) -> tuple[str, str]:
     if name == "tau":
         return "Impulse", "N s"
     return words_of(history[name].attrs, name), unit_of(history[name])
+
+
+def _label(history: xr.Dataset, histories: Sequence[xr.Dataset], *, numbered: bool) -> str:
+    """Write the names of the laws of a history; a single model is not named beside every friction law."""
+    if "friction" not in history.coords:
+        return _model_label(history, numbered=numbered)
+    friction = friction_text(str(history["friction"].item()), _impact_inputs(history))
+    is_single = len({str(each["model"].item()) for each in histories}) == 1
+    return friction if is_single else f"{_model_label(history, numbered=numbered)} with {friction}"
 
 
 def _model_label(history: xr.Dataset, *, numbered: bool) -> str:

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..contact.variables import OUTPUTS
 from ..errors import UsageError
 from ..formatting import label as number_label, safe_text
 from .curves import Curve, CurveData, Panel, curve_of, x_axis_fields
 from .kinds import Choice, Kind
-from .labels import REFERENCE, model_label
+from .labels import REFERENCE, LawPart, split_by_law
 from .slices import Line, choose_line, conditions_of, is_ordered, numeric_axes, read, take_line
 
 if TYPE_CHECKING:
@@ -32,7 +33,7 @@ MAX_RESTITUTIONS = 8
 
 def velocity_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     """Read the post-impact velocities of every model and of the impulse-momentum solution, Figure 6."""
-    line = _read_line(dataset, choice, "v1_post", "v2_post", "v1_reference", "v2_reference")
+    line = read_line(dataset, choice, "v1_post", "v2_post", "v1_reference", "v2_reference")
     reference = f"{REFERENCE} (6), (7)" if choice.equations else REFERENCE
     balls = ((1, "v₁⁺"), (2, "v₂⁺"))
     references = [
@@ -40,35 +41,35 @@ def velocity_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
         for ball, end in balls
     ]
     curves = [
-        curve_of(label, key, line.coordinate, model_data[f"v{ball}_post"], f"v{ball}_post", end)
-        for label, key, model_data in _split_by_model(line, choice)
+        curve_of(law.label, law.model, line.coordinate, law.data[f"v{ball}_post"], f"v{ball}_post", end)
+        for law in split_by_law(line.data, numbered=choice.equations)
         for ball, end in balls
     ]
     all_curves = (*_without_empty(references), *curves)
     panel = Panel("", "Velocity after the impact", all_curves, y_unit="m/s", y_name="v_post")
-    return _curve_data(dataset, line, FIGURE_6, [panel], choice)
+    return complete(dataset, line, FIGURE_6, [panel], choice)
 
 
 def restitution_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     """Read the delivered restitution of every model and the requested one; see `velocity_curves`."""
-    line = _read_line(dataset, choice, "e_out")
+    line = read_line(dataset, choice, "e_out")
     requested = (
         [curve_of("Requested", None, line.coordinate, line.data["e"], "e")] if "e" in line.data.coords else []
     )
     curves = [
-        curve_of(label, key, line.coordinate, model_data["e_out"], "e_out")
-        for label, key, model_data in _split_by_model(line, choice)
+        curve_of(law.label, law.model, line.coordinate, law.data["e_out"], "e_out")
+        for law in split_by_law(line.data, numbered=choice.equations)
     ]
     panel = Panel("", "Delivered restitution", (*_without_empty(requested), *curves), y_name="e_out")
-    return _curve_data(dataset, line, "Delivered restitution", [panel], choice)
+    return complete(dataset, line, "Delivered restitution", [panel], choice)
 
 
 def error_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     """Read the error of every model's restitution, signed and absolute; see `velocity_curves`."""
-    line = _read_line(dataset, choice, "e_error")
+    line = read_line(dataset, choice, "e_error")
     signed = [
-        curve_of(label, key, line.coordinate, model_data["e_error"], "e_error")
-        for label, key, model_data in _split_by_model(line, choice)
+        curve_of(law.label, law.model, line.coordinate, law.data["e_error"], "e_error")
+        for law in split_by_law(line.data, numbered=choice.equations)
     ]
     if not _without_empty(signed):
         raise UsageError("this result has no error of the restitution, which needs a requested e; sweep e")
@@ -80,7 +81,7 @@ def error_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
         Panel("", "Error", tuple(signed), bands=BANDS, y_name="e_error"),
         Panel("", "Absolute error", tuple(absolute), y_log=True, bands=BANDS, y_name="abs_e_error"),
     ]
-    return _curve_data(dataset, line, "Error of the restitution", panels, choice)
+    return complete(dataset, line, "Error of the restitution", panels, choice)
 
 
 def timestep_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
@@ -90,7 +91,7 @@ def timestep_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     along = [name for name in STEP_AXES if name in dataset.coords and dataset[name].ndim == 1]
     if choice.x is None and not along:
         raise UsageError(f"this result has a single step; {NEEDS_STEPS}")
-    line = _read_line(dataset, replace(choice, x=choice.x or along[0]), "e_out", keep=("phase", "e"))
+    line = read_line(dataset, replace(choice, x=choice.x or along[0]), "e_out", keep=("phase", "e"))
     cases = _split_by_restitution(line)
     guides = [
         replace(curve_of("Requested", None, line.coordinate, case["e"], "e"), case=name, is_guide=True)
@@ -98,10 +99,8 @@ def timestep_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
         if "e" in case.coords
     ]
     curves: list[Curve] = []
-    for index, (label, key, _) in enumerate(_split_by_model(line, choice)):
-        by_case = [
-            (name, _curve_over_phase(label, key, line, case["e_out"].isel(model=index))) for name, case in cases
-        ]
+    for index, law in enumerate(split_by_law(line.data, numbered=choice.equations)):
+        by_case = [(name, _curve_over_phase(law, line, case["e_out"].isel(model=index))) for name, case in cases]
         first = by_case[0][1]
         # a law that does not depend on e has one curve
         if all(_have_equal_values(curve, first) for _, curve in by_case):
@@ -111,7 +110,7 @@ def timestep_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     shown = (*_without_empty(guides), *curves)
     panel = Panel("", "Delivered restitution", shown, y_name="e_out", band_name=band_name)
     title = f"Restitution at fixed steps, {safe_text(str(dataset.attrs.get('integrator', '')), 40)}"
-    return _curve_data(dataset, line, title, [panel], choice, x_log=line.x in STEP_AXES)
+    return complete(dataset, line, title, [panel], choice, x_log=line.x in STEP_AXES)
 
 
 def _split_by_restitution(line: Line) -> list[tuple[str, xr.Dataset]]:
@@ -130,12 +129,12 @@ def _split_by_restitution(line: Line) -> list[tuple[str, xr.Dataset]]:
     ]
 
 
-def _curve_over_phase(label: str, key: str, line: Line, values: xr.DataArray) -> Curve:
+def _curve_over_phase(law: LawPart, line: Line, values: xr.DataArray) -> Curve:
     """Compute the mean over the phase, and a band from the least to the largest value of several phases."""
     (x_dim,) = line.data[line.x].dims
     by_phase = np.asarray(values.transpose(x_dim, ...).values, float).reshape(values.sizes[x_dim], -1)
     band = (by_phase.min(axis=1), by_phase.max(axis=1)) if by_phase.shape[1] > 1 else ()
-    return curve_of(label, key, line.coordinate, by_phase.mean(axis=1), "e_out", band=band)
+    return curve_of(law.label, law.model, line.coordinate, by_phase.mean(axis=1), "e_out", band=band)
 
 
 def _have_equal_values(curve: Curve, other: Curve) -> bool:
@@ -145,20 +144,17 @@ def _have_equal_values(curve: Curve, other: Curve) -> bool:
     )
 
 
-def _read_line(dataset: xr.Dataset, choice: Choice, *names: str, keep: Sequence[str] = ()) -> Line:
+def read_line(dataset: xr.Dataset, choice: Choice, *names: str, keep: Sequence[str] = ()) -> Line:
     """Cut a line through a result and read some variables; `keep` as in `take_line`."""
     line = take_line(dataset, choice, keep)
     missing = [name for name in names if name not in dataset]
     if missing:
-        raise UsageError(f"this result has no {', '.join(missing)}; sweep without [output] variables, or add them")
+        is_requested = any(OUTPUTS[name].on_request for name in missing)
+        advice = (
+            "list them in [output] variables" if is_requested else "sweep without [output] variables, or add them"
+        )
+        raise UsageError(f"this result has no {', '.join(missing)}; {advice}")
     return line._replace(data=read(line.data, names))
-
-
-def _split_by_model(line: Line, choice: Choice) -> Iterator[tuple[str, str, xr.Dataset]]:
-    """Iterate over label, key and data of each model."""
-    for index in range(line.data.sizes["model"]):
-        model_data = line.data.isel(model=index)
-        yield model_label(model_data, numbered=choice.equations), str(model_data["model"].item()), model_data
 
 
 def _without_empty(curves: list[Curve]) -> list[Curve]:
@@ -166,7 +162,7 @@ def _without_empty(curves: list[Curve]) -> list[Curve]:
     return [curve for curve in curves if np.isfinite(curve.y).any()]
 
 
-def _curve_data(
+def complete(
     dataset: xr.Dataset,
     line: Line,
     title: str,
@@ -183,7 +179,7 @@ def _curve_data(
     x_axis = x_axis_fields(line.coordinate, choice)
     x_axis |= {"x_log": x_axis["x_log"] or x_log, "joined": is_ordered(dataset, line.x)}
     panels = [replace(panel, y_log=panel.y_log or "y" in choice.log, **x_axis) for panel in panels]
-    empty = {c.model: None for panel in panels for c in panel.curves if c.model and not np.isfinite(c.y).any()}
+    empty = {c.law: None for panel in panels for c in panel.curves if c.law and not np.isfinite(c.y).any()}
     without_value = tuple(f"{key}, which has no point here" for key in empty)
     return CurveData(heading or title, conditions, tuple(panels), (*line.not_drawn, *without_value))
 

@@ -11,9 +11,9 @@ from ..config.grid import SAMPLE
 from ..config.input_names import InputName, is_input
 from ..contact.units import with_numbers
 from ..errors import UsageError, did_you_mean
-from ..formatting import NO_BREAK, quantity, safe_text
+from ..formatting import NO_BREAK, degrees, quantity, safe_text
 from ..results.schema import exponents_of, plain_unit
-from ..results.selection import model_positions, select
+from ..results.selection import law_positions, select
 from .kinds import Choice
 
 if TYPE_CHECKING:
@@ -106,7 +106,7 @@ def take_line(dataset: xr.Dataset, choice: Choice, keep: Sequence[str] = ()) -> 
     return Line(line, x, not_drawn)
 
 
-def take_plane(dataset: xr.Dataset, kind: str, choice: Choice) -> Plane:
+def take_plane(dataset: xr.Dataset, kind: str, choice: Choice, keep: Sequence[str] = ()) -> Plane:
     """Cut a plane through a result for a kind of picture; see `take_line`."""
     dataset = _select(dataset, choice)
     along = [x_axis(dataset, name) for name in (choice.x, choice.y) if name is not None]
@@ -123,7 +123,7 @@ def take_plane(dataset: xr.Dataset, kind: str, choice: Choice) -> Plane:
         dims.append(dataset[along[-1]].dims[0])
     if dims[0] == dims[1]:
         raise UsageError(f"{kind} needs two axes; {along[0]} and {along[1]} vary together")
-    plane = _drop_other_axes(dataset, dims)
+    plane = _drop_other_axes(dataset, [*dims, *keep])
     not_drawn: tuple[str, ...] = ()
     for name in along:
         values = plane[name].values
@@ -139,11 +139,13 @@ def take_plane(dataset: xr.Dataset, kind: str, choice: Choice) -> Plane:
 
 
 def _select(dataset: xr.Dataset, choice: Choice) -> xr.Dataset:
-    """Select the chosen models and values of a result."""
+    """Select the chosen models, friction laws and values of a result."""
     if "model" not in dataset.dims:
         raise UsageError(NO_SWEEP)
     if choice.models:
-        dataset = dataset.isel(model=model_positions(choice.models, dataset))
+        dataset = dataset.isel(model=law_positions(choice.models, dataset))
+    if choice.frictions:
+        dataset = dataset.isel(friction=law_positions(choice.frictions, dataset, "friction"))
     return select(dataset, choice.sel or {})
 
 
@@ -241,10 +243,12 @@ def described_inputs(inputs: Mapping[str, object], units: Mapping[str, str], exp
     """Write inputs with their units; `exponent` is the text for n if the laws shown fix their exponent."""
     parts = []
     for name, value in inputs.items():
-        if not InputName.parse(name).model:
+        if InputName.parse(name).table in ("sweep", "materials"):
             n = inputs.get("n")
             unit = with_numbers(units[name], {"n": n}) if isinstance(n, float) else units[name]
             text = exponent if name == "n" and exponent else quantity(value, unit)
+            if unit == "rad" and isinstance(value, float):
+                text = degrees(value)
             parts.append(safe_text(f"{name} = {text}", 60).replace(" ", NO_BREAK))
     return ", ".join(parts)
 

@@ -16,7 +16,7 @@ from ..results.selection import select
 from ..results.sensitivity import distribution_texts
 from .curves import Curve, CurveData, Panel, curve_of, x_axis_fields
 from .kinds import Choice, Kind
-from .labels import model_label
+from .labels import split_by_law
 from .slices import choose_line, conditions_of, numeric_axes, read, take_line
 
 if TYPE_CHECKING:
@@ -38,25 +38,26 @@ def uncertainty_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     x = choice.x or _free_axis(dataset, choice)
     if x in dataset.coords and dataset[x].dims == (SAMPLE,):
         raise UsageError(f"--x {x}: is an uncertain input, expected another axis")
-    line, x_name, not_drawn = take_line(dataset, replace(choice, x=x or SAMPLE), keep=(SAMPLE,))
+    keep = (SAMPLE, "friction") if "friction" in dataset[name].dims else (SAMPLE,)
+    line, x_name, not_drawn = take_line(dataset, replace(choice, x=x or SAMPLE), keep)
     line = read(line, [name])
     meaning = "Delivered restitution" if name == "e_out" else OUTPUTS[name].meaning.capitalize()
     curves: list[Curve] = []
-    for index in range(line.sizes["model"]):
-        law = line.isel(model=index)
-        key, label = str(law["model"].item()), model_label(law, numbered=choice.equations)
-        samples = np.asarray(law[name].transpose(..., SAMPLE).values, float)
+    for law in split_by_law(line, numbered=choice.equations):
+        samples = np.asarray(law.data[name].transpose(..., SAMPLE).values, float)
         if x is None:
             # the distribution function
             count = min(samples.size, MAX_DRAWN_PROBABILITIES)
             share = (np.arange(count) + 0.5) / count
-            curves.append(curve_of(label, key, np.quantile(samples, share, method="hazen"), share, name))
+            quantiles = np.quantile(samples, share, method="hazen")
+            curve = curve_of(law.label, law.model, quantiles, share, name)
         else:
             # NaN where a sample has no result
             least, median, largest = np.quantile(samples, (BAND[0], 0.5, BAND[1]), axis=-1)
-            curves.append(curve_of(label, key, law[x], median, name, band=(least, largest)))
+            curve = curve_of(law.label, law.model, law.data[x], median, name, band=(least, largest))
+        curves.append(replace(curve, friction=law.friction))
         failed = int(np.isnan(samples).sum())
-        not_drawn += (f"{key}, where {failed:,} samples have no result",) if failed else ()
+        not_drawn += (f"{law.key}, where {failed:,} samples have no result",) if failed else ()
     if x is None:
         panel = Panel(
             meaning,

@@ -16,13 +16,13 @@ from ..config.input_names import InputName, is_input
 from ..contact.model import ForceModel
 from ..contact.status import FIRST_FAILURE, NO_IMPACT
 from ..errors import ImpactError
-from ..formatting import label
+from ..formatting import degrees, label
 from ..plots.draw import draw, get_plot_data
 from ..plots.kinds import STUDIES, Choice, Kind, Look, kinds_of
 from ..plots.slices import numeric_axes, unit_of, varying_inputs
 from ..plots.style import encoded
 from ..results.schema import columns_along
-from ..results.selection import model_positions
+from ..results.selection import law_positions
 from ..results.slabs import distinct_points, is_computed, slabs
 
 if TYPE_CHECKING:
@@ -39,6 +39,7 @@ class Figure:
     label: str
     caption: str
     source: str
+    of_friction: bool
 
 
 def figures_of(
@@ -60,7 +61,7 @@ def figures_of(
         source = f"data:image/svg+xml;base64,{base64.b64encode(encoded(figure, 'svg')).decode()}"
         sentences = [kind.caption, *_condition_sentences(dataset, position, keys)]
         sentences += [f"Not drawn: {'; '.join(plot_data.not_drawn)}."] if plot_data.not_drawn else []
-        drawn.append(Figure(kind.caption, " ".join(sentences), source))
+        drawn.append(Figure(kind.caption, " ".join(sentences), source, kind.of_friction))
     return drawn, reasons
 
 
@@ -123,9 +124,9 @@ def _first_answered_index(
 ) -> dict[Hashable, int]:
     """Find the first impact that a model has an answer for: its index along each axis that is not drawn."""
     dims = dataset["status"].dims if "status" in dataset else dataset.dims
-    axes = [dim for dim in dims if dim not in ("model", *drawn)]
+    axes = [dim for dim in dims if dim not in ("model", "friction", *drawn)]
     first: tuple[int, ...] | None = None
-    for index in model_positions(keys, dataset) if "status" in dataset else ():
+    for index in law_positions(keys, dataset) if "status" in dataset else ():
         answered = _first_answered_of_model(dataset.isel(model=index), axes)
         first = min(filter(None, (first, answered)), default=None)
         if first is not None and not any(first):
@@ -160,4 +161,6 @@ def _first_answered_of_model(model_data: xr.Dataset, axes: Sequence[Hashable]) -
 def coordinate_text(coordinate: xr.DataArray) -> str:
     """Write the value of a scalar coordinate with its unit."""
     unit = unit_of(coordinate)
+    if unit == "rad":
+        return degrees(coordinate.values.item())
     return label(coordinate.values.item()) + (f" {unit}" if unit not in ("", "1") else "")

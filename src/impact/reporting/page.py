@@ -21,6 +21,8 @@ from numpy.typing import NDArray
 from ..atomic import check_outputs, write_file
 from ..config.input_names import InputName, is_input
 from ..config.tables import MATERIAL_QUANTITIES
+from ..contact.evidence import Evidence
+from ..contact.frictions import frictions
 from ..contact.model import ForceModel
 from ..contact.models import catalogue
 from ..errors import UsageError
@@ -127,9 +129,10 @@ def page(dataset: xr.Dataset, plugins: Sequence[ForceModel | str | Path] = ()) -
         figures=drawn,
         left_out=left_out,
         failures=_failures_section(dataset, summary),
+        friction=_friction_section(dataset, summary) if "friction" in dataset.dims else None,
         facts=_facts(dataset),
         models=models,
-        evidence=[row for model in models for row in model["evidence"]],
+        evidence=[*(row for model in models for row in model["evidence"]), *_friction_evidence(dataset)],
         config=Markup("\n").join(safe_text(line, MAX_LINE_LETTERS) for line in lines),
         changes=read_attribute(dataset.attrs, "config_set"),
     )
@@ -182,12 +185,40 @@ def _template() -> Template:
 
 
 def _summary_sentence(dataset: xr.Dataset) -> str:
-    models, axes = dataset.sizes["model"], [str(dim) for dim in dataset.sizes if dim != "model"]
+    models, axes = dataset.sizes["model"], [str(dim) for dim in dataset.sizes if dim not in ("model", "friction")]
     points, over = count_points(dataset), f" over {', '.join(axes)}" if axes else ""
     return (
         f"{models:,} model{_plural_s(models)} of the impact of two balls{over}, judged by the "
         f"impulse-momentum solution: {points:,} point{_plural_s(points)}."
     )
+
+
+def _friction_section(dataset: xr.Dataset, summary: Summary) -> dict[str, Any]:
+    """Describe the friction laws, and the number of points of pairs by friction status."""
+    laws = [(key, frictions().get(key)) for key in dataset["friction"].values.tolist()]
+    return {
+        "laws": [
+            (key, with_year(law.title, law.year), law.equation, law.reference) if law else (key, "–", "–", "–")
+            for key, law in laws
+        ],
+        "statuses": [
+            (status.name.lower(), f"{count:,}", status.meaning)
+            for status, count in sorted(summary.friction_counts.items())
+        ],
+    }
+
+
+def _friction_evidence(dataset: xr.Dataset) -> Iterator[tuple[str, str, str]]:
+    """List where the formulas of friction laws were read."""
+    for key in dataset["friction"].values.tolist() if "friction" in dataset.dims else ():
+        if key in frictions():
+            yield _evidence_row(key, frictions()[key].evidence)
+
+
+def _evidence_row(key: str, seen: Evidence) -> tuple[str, str, str]:
+    """Describe where the formulas of a law were read."""
+    source = [seen.source, f"DOI seen in {seen.doi}" if seen.doi else "", seen.note]
+    return key, seen.state, "; ".join(filter(None, source)) or "–"
 
 
 def _outcomes(summary: Summary) -> Iterator[str]:
@@ -218,6 +249,8 @@ def _axis_row(coordinate: xr.DataArray) -> tuple[str, ...]:
     """Describe a coordinate: name, meaning, unit, ends, number of values, and how they are spaced."""
     meaning = str(coordinate.attrs.get("long_name", ""))
     unit = unit_of(coordinate)
+    if unit == "rad":
+        unit, coordinate = "°", coordinate.copy(data=np.degrees(coordinate.values))
     return str(coordinate.name), meaning, unit if unit not in ("", "1") else "–", *_range(coordinate)
 
 
@@ -309,11 +342,7 @@ def _model_section(model_data: xr.Dataset) -> dict[str, Any]:
     declaration = catalogue().get(key)
     # a plug-in, or another version of the program, may use this key for another law
     declaration = declaration if declaration is not None and declaration.equation == equation else None
-    evidence = []
-    if declaration:
-        seen = declaration.evidence
-        source = [seen.source, f"DOI seen in {seen.doi}" if seen.doi else "", seen.note]
-        evidence.append((key, seen.state, "; ".join(filter(None, source)) or "–"))
+    evidence = [_evidence_row(key, declaration.evidence)] if declaration else []
     is_doi = re.fullmatch(r"10\.[0-9]{4,}/\S+", doi)
     return {
         "key": key,

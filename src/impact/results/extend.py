@@ -27,7 +27,7 @@ from ..engine.inputs import Inputs
 from ..engine.plan import Plan
 from ..engine.plugins import Plugins, read_plugins
 from ..engine.run import ProgressCallback, Run, ignore, never
-from ..engine.trajectories import TrajectoryMap, TrajectoryRange, keys_of
+from ..engine.trajectories import TrajectoryMap, TrajectoryRange, keys_of, model_of
 from ..errors import ResultError, UsageError
 from ..formatting import safe_text
 from .attributes import read_attribute
@@ -350,7 +350,7 @@ class _OldPositions:
         trajectory_map = self.new.maps[trajectory_range.model]
         others = [axis for axis in range(len(self.axes)) if axis not in trajectory_map.axes]
         is_new_along = [(self.axes[axis].positions < 0).any() for axis in others]
-        if self.law(trajectory_range.model) is None or any(is_new_along):
+        if self._has_new_law(trajectory_range.model) or any(is_new_along):
             return None
         if trajectory_map.of_cell is None:
             is_old = self._is_old(trajectory_map, trajectory_range.rows)
@@ -359,6 +359,15 @@ class _OldPositions:
             needed[trajectory_map.of_cell[~self._is_old(trajectory_map, np.arange(trajectory_map.cells))]] = True
             is_old = ~needed[trajectory_range.rows]
         return is_old, trajectory_range.record.blank(trajectory_range.size)
+
+    def _has_new_law(self, number: int) -> bool:
+        """Whether a model or a pair, or a pair of the model, is not in the old sweep."""
+        law = self.new.laws[number]
+        return any(
+            self.law(other) is None
+            for other, with_law in enumerate(self.new.laws)
+            if other == number or model_of(with_law) == law
+        )
 
     def _is_old(self, trajectory_map: TrajectoryMap, cells: IndexArray) -> NDArray[np.bool_]:
         along = np.unravel_index(cells, trajectory_map.shape) if trajectory_map.shape else ()

@@ -114,7 +114,7 @@ class FactoredLayout:
         if plan.stored_points > NO_SUMMARY_POINTS:
             summary, extremes = summarize_table(result, table)
             record = summary_record(summary, extremes, result)
-            template = template.assign_attrs(summary=record.model_dump_json())
+            template = template.assign_attrs(summary=record.model_dump_json(exclude_defaults=True))
         else:
             for slab in expanded_slabs(table, variables):
                 add_slab(summary, table, slab)

@@ -21,7 +21,7 @@ from ..formatting import label, number, percentage, safe_text
 from .kinds import require_sweep
 from .replay_command import describe_point
 from .schema import columns_along, foreign_dims
-from .selection import model_positions, select
+from .selection import law_positions, select
 from .slabs import Slab, distinct_points, is_computed, over_varying_dims, slabs, varying_dims
 
 # lazy results with more points are not ranked; this many take some minutes
@@ -226,7 +226,7 @@ def rankable_parts(
 ) -> list[xr.Dataset]:
     """Select the part of each model to rank; refuse a result that lacks a target e or has too many points."""
     _check_rankable(dataset)
-    chosen = model_positions(models, dataset) if models else range(dataset.sizes["model"])
+    chosen = law_positions(models, dataset) if models else range(dataset.sizes["model"])
     selected = select(dataset[list(RANKED_VARIABLES)], sel)
     parts = [_select_model(selected, position) for position in chosen]
     evaluated = [_reduce_dims(part)[0] for part in parts if is_computed(part.variables["e_error"])]

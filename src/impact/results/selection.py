@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..array_types import Mask
+from ..config.quantities import number_in
 from ..errors import UsageError, did_you_mean
 from ..formatting import label, safe_text
+from .schema import plain_unit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -28,13 +30,18 @@ Labels = NDArray[Any]
 IndexArray = NDArray[np.intp]
 
 
-def model_positions(models: Sequence[str], dataset: xr.Dataset) -> list[int]:
-    """Find the positions of models along `model`, in the order of the keys; repeated keys count once."""
-    keys = [str(key) for key in dataset["model"].values]
-    for key in models:
+def law_positions(
+    laws: Sequence[str], dataset: xr.Dataset, dim: Literal["model", "friction"] = "model"
+) -> list[int]:
+    """Find the positions of models or friction laws, in the order of the keys; repeated keys count once."""
+    noun = "friction law" if dim == "friction" else dim
+    if dim not in dataset.dims:
+        raise UsageError(f'no {noun} "{laws[0]}" in this result, which has none; sweep a config with {dim}s')
+    keys = [str(key) for key in dataset[dim].values]
+    for key in laws:
         if key not in keys:
-            raise UsageError(f'no model "{key}" in this result; {did_you_mean(key, keys)}')
-    return [keys.index(key) for key in dict.fromkeys(models)]
+            raise UsageError(f'no {noun} "{key}" in this result; {did_you_mean(key, keys)}')
+    return [keys.index(key) for key in dict.fromkeys(laws)]
 
 
 def select(dataset: xr.Dataset, sel: Mapping[str, float | str]) -> xr.Dataset:
@@ -46,14 +53,24 @@ def select(dataset: xr.Dataset, sel: Mapping[str, float | str]) -> xr.Dataset:
             raise UsageError(f'no axis "{name}" in this result; {did_you_mean(name, axes)}')
         (dim,) = dataset[name].dims
         values = dataset[name].values
-        same = _matches_value(values, value)
+        in_si = _in_si(dataset[name], value)
+        same = _matches_value(values, in_si)
         if dim in masks and same.any():
             same &= masks[dim]
         if not same.any():
-            shown = safe_text(_nearest_values(name, values, value))
+            shown = safe_text(_nearest_values(name, values, in_si))
             raise UsageError(f"no {name} = {value} in this result; {shown}")
         masks[dim] = same
     return dataset.isel({dim: _matching_positions(dataset[dim], same) for dim, same in masks.items()})
+
+
+def _in_si(coordinate: xr.DataArray, value: float | str) -> float | str:
+    """Convert a text with a unit, such as "30 deg", to a number in the unit of a coordinate, if it is one."""
+    unit = coordinate.attrs.get("units")
+    if not isinstance(value, str) or unit is None:
+        return value
+    number = number_in(plain_unit(str(unit)), value)
+    return value if number is None else number
 
 
 def _matching_positions(labels: xr.DataArray, same: Mask) -> int | IndexArray:

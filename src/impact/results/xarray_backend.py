@@ -24,7 +24,7 @@ from .kinds import require_sweep
 from .layouts import LAYOUTS
 from .netcdf import RegionValues, encode_attribute, read_variables, write_dataset
 from .seal import check_seal, write_seal
-from .selection import model_positions, select
+from .selection import law_positions, select
 from .slabs import slabs
 from .trajectory_table import in_memory, table_of_result
 from .validation import schema_violation
@@ -228,7 +228,7 @@ def expand(
     if "model" not in dataset.dims:
         raise UsageError(f"{shown}: is a time history, expected a result of a sweep")
     if models:
-        dataset = dataset.isel(model=model_positions(models, dataset))
+        dataset = dataset.isel(model=law_positions(models, dataset))
     points = math.prod(dataset.sizes.values())
     if points > max_points:
         raise UsageError(

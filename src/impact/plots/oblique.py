@@ -1,0 +1,236 @@
+"""Pictures of friction: restitution, spin and impulse over the angle, rebound over slip, friction over slip."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..array_types import Array
+from ..contact.status import FIRST_FAILURE, FrictionStatus
+from ..contact.variables import OUTPUTS
+from ..errors import UsageError
+from ..formatting import number
+from ..results.selection import select
+from .curves import Curve, CurveData, Panel, curve_of
+from .kinds import Choice, Kind
+from .labels import LawPart, split_by_law
+from .motions import choose_point, curves_over
+from .restitution import complete, read_line
+from .slices import Line, numeric_axes
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+NEEDS_FRICTION = "this result has no friction; sweep a config with frictions = [...]"
+# pairs that are drawn where no friction law is chosen: more curves cannot be told apart
+MAX_PAIRS = 8
+# a picture of slips ends at this multiple of the largest one that is stopped or reversed
+SHOWN_PSI = 1.5
+# what beta means at some values
+BETA_GUIDES = ((-1.0, "smooth"), (0.0, "sticks"), (1.0, "reverses"))
+ROTATION = ("omega1", "omega2", "inertia_factor1", "inertia_factor2")
+SPINS = ("omega1_post", "omega2_post")
+
+
+def beta_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
+    """Read the tangential restitution of the contact points of every pair, over the angle or the first axis."""
+    line, pairs = _pairs_along(dataset, choice, "beta")
+    guides = [_guide(line.coordinate, value, text) for value, text in BETA_GUIDES]
+    panel = _panel(line, pairs, "beta", "Tangential restitution of the contact", guides)
+    return complete(dataset, line, "Tangential restitution of the contact", [panel], choice)
+
+
+def e_t_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
+    """Read the tangential restitution of the centres, with that of rigid balls that stick; see `beta_curves`."""
+    line, pairs = _pairs_along(dataset, choice, "e_t")
+    sticking = _sticking_e_t(line.data)
+    guides = [_guide(line.coordinate, sticking, "sticks")] if np.isfinite(sticking) else []
+    panel = _panel(line, pairs, "e_t", "Tangential restitution of the centres", guides)
+    return complete(dataset, line, "Tangential restitution of the centres", [panel], choice)
+
+
+def impulse_ratio_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
+    """Read the ratio of the tangential and the normal impulse, and mu, its limit; see `beta_curves`."""
+    line, pairs = _pairs_along(dataset, choice, "impulse_ratio")
+    panel = _panel(line, pairs, "impulse_ratio", "Tangential over normal impulse")
+    values = np.array([curve.y for curve in panel.curves])
+    mu = line.data["mu"].values
+    signs = [(sign, text) for sign, text in ((1.0, "μ"), (-1.0, "−μ")) if np.nanmax(sign * values) > 0.0]
+    guides = [_guide(line.coordinate, sign * mu, text) for sign, text in signs]
+    return complete(dataset, line, "Impulse ratio", [replace(panel, curves=(*guides, *panel.curves))], choice)
+
+
+def spin_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
+    """Read the spins after the impact of the balls that turn; see `beta_curves`."""
+    line, pairs = _pairs_along(dataset, choice, *SPINS)
+    turning = [name for name in SPINS if any(_varies(pair.data[name].values) for pair in pairs)] or [*SPINS[:1]]
+    ends = dict(zip(SPINS, ("ω₁⁺", "ω₂⁺"), strict=True)) if len(turning) > 1 else {}
+    curves = [curve for name in turning for curve in _panel(line, pairs, name, "", end=ends.get(name, "")).curves]
+    y_name = "omega_post" if ends else turning[0]
+    panel = Panel("", "Spin after the impact", tuple(curves), y_unit=OUTPUTS[turning[0]].unit, y_name=y_name)
+    return complete(dataset, line, "Spin after the impact", [panel], choice)
+
+
+def psi_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
+    """Read the slip after over the slip before the impact, in the units of Maw, Barber and Fawcett (1976)."""
+    line, pairs = _pairs_along(dataset, choice, "psi1", "psi2")
+    slips = [tuple(np.asarray(pair.data[name].values, float) for name in ("psi1", "psi2")) for pair in pairs]
+    # far beyond the slips that are stopped or reversed, all curves are lines beside that of no friction
+    stopped = [np.abs(before[before * after <= 0.0]).max(initial=0.0) for before, after in slips]
+    most = SHOWN_PSI * max(stopped) or np.inf
+    curves = []
+    for pair, (before, after) in zip(pairs, slips, strict=True):
+        order = np.argsort(before, kind="stable")
+        order = order[np.abs(before[order]) <= most]
+        curves.append(_curve(pair, before[order], after[order], "psi2"))
+    if any((np.abs(before) > most).any() for before, _ in slips):
+        beyond = f"slips beyond psi1 = {number(float(most), 3)}, where the contact slides throughout"
+        line = line._replace(not_drawn=(*line.not_drawn, beyond))
+    shown = [end for curve in curves for end in curve.x]
+    along = np.array([min(shown), max(shown)])
+    guides = [_guide(along, along, "smooth"), _guide(along, 0.0, "sticks")]
+    panel = Panel("", "Slip after the impact", (*guides, *curves), y_name="psi2")
+    plot_data = complete(dataset, line, "Slip after over slip before the impact", [panel], choice)
+    (panel,) = plot_data.panels
+    panel = replace(panel, x_name="psi1", x_label="Slip before the impact", x_unit="1", x_log="x" in choice.log)
+    return replace(plot_data, panels=(panel,))
+
+
+def friction_loop_curves(histories: Sequence[xr.Dataset], choice: Choice) -> CurveData:
+    """Draw friction over the slip displacement of one impact: the area under a curve is the work of friction."""
+    if any("f" not in history for history in histories):
+        raise UsageError("this time history has no friction; run a config with frictions = [...]")
+    moved = [_with_displacement(history) for history in histories]
+    return curves_over("Friction over slip", moved, [("xi", "f", "")], choice)
+
+
+def _with_displacement(history: xr.Dataset) -> xr.Dataset:
+    """Add the displacement of the contact points against each other, the integral of the slip."""
+    t, slip = history["t"].values, history["slip"].values
+    displacement = np.concatenate(([0.0], np.cumsum(0.5 * (slip[1:] + slip[:-1]) * np.diff(t))))
+    return history.assign(xi=("t", displacement, {"units": "m", "long_name": "slip displacement"}))
+
+
+def _pairs_along(dataset: xr.Dataset, choice: Choice, *names: str) -> tuple[Line, list[LawPart]]:
+    """Cut a line through a result; returns it with the pairs that have values of a variable there.
+
+    The line is over the angle by default, else over the first axis of numbers. What is left out is in the line.
+    """
+    if "friction" not in dataset.dims:
+        raise UsageError(NEEDS_FRICTION)
+    line = read_line(
+        dataset, replace(choice, x=choice.x or _first_axis(dataset, choice)), *names, keep=("friction",)
+    )
+    pairs, not_drawn = [], []
+    for pair in split_by_law(line.data, numbered=choice.equations):
+        if any(np.isfinite(pair.data[name]).any() for name in names):
+            pairs.append(pair)
+        else:
+            not_drawn.append(f"{pair.key}: {_reason(pair.data)}")
+    if not pairs:
+        raise UsageError(f"no pair has a value of {' or '.join(names)} here: {not_drawn[0]}")
+    if choice.frictions is None and len(pairs) > MAX_PAIRS:
+        not_drawn.append(f"{len(pairs) - MAX_PAIRS} more pairs; choose some with --model and --friction")
+        pairs = pairs[:MAX_PAIRS]
+    return line._replace(not_drawn=(*line.not_drawn, *not_drawn)), pairs
+
+
+def _first_axis(dataset: xr.Dataset, choice: Choice) -> str | None:
+    """Find the angle, else the first input of several numbers that is not selected."""
+    axes = numeric_axes(select(dataset, choice.sel or {}))
+    return "angle" if "angle" in axes else next(iter(axes), None)
+
+
+def _reason(data: xr.Dataset) -> str:
+    """Say why a pair has no value."""
+    statuses = np.unique(data["friction_status"]) if "friction_status" in data else ()
+    failures = [FrictionStatus(int(status)).meaning for status in statuses if status >= FIRST_FAILURE]
+    return "; ".join(failures) or "not defined"
+
+
+def _panel(
+    line: Line, pairs: Sequence[LawPart], name: str, y_label: str, guides: Sequence[Curve] = (), end: str = ""
+) -> Panel:
+    """Make a panel with a curve for each pair."""
+    curves = [_curve(pair, line.coordinate, pair.data[name], name, end) for pair in pairs]
+    return Panel("", y_label, (*guides, *curves), y_unit=OUTPUTS[name].unit, y_name=name)
+
+
+def _curve(pair: LawPart, x: ArrayLike, y: ArrayLike, name: str, end: str = "") -> Curve:
+    """Make the curve of a pair."""
+    return curve_of(pair.label, pair.model, x, y, name, end, friction=pair.friction)
+
+
+def _guide(x: ArrayLike, y: ArrayLike, text: str) -> Curve:
+    """Make a thin line with a text at its end; y is a number, or one at each x."""
+    return replace(curve_of("", None, x, y, ""), case=text, is_guide=True)
+
+
+def _varies(values: Array) -> bool:
+    """Whether an array has two different finite values."""
+    finite = values[np.isfinite(values)]
+    return bool((finite != finite[:1]).any())
+
+
+def _sticking_e_t(data: xr.Dataset) -> float:
+    """Compute e_t = 1/(1 + q) of rigid balls whose contact points stick, 5/7 for solid spheres; else NaN.
+
+    It holds without spins before the impact, for an inertia factor q that the balls, or a ball and a wall, have.
+    """
+    given = {name: data[name].values.ravel() for name in ROTATION if name in data.coords}
+    spins, factors = (
+        np.concatenate([np.zeros(0), *(values for name, values in given.items() if name.startswith(kind))])
+        for kind in ("omega", "inertia")
+    )
+    has_one = not spins.any() and np.unique(factors).size == 1
+    return 1.0 / (1.0 + float(factors[0])) if has_one else np.nan
+
+
+def choose_pairs(dataset: xr.Dataset, keys: Sequence[str], needed: str = "beta") -> Choice | None:
+    """Choose to draw the pairs of a result over the angle; None without friction, an axis or a needed variable."""
+    x = _first_axis(dataset, Choice()) if "friction" in dataset.dims and needed in dataset else None
+    return None if x is None else Choice(x, models=keys)
+
+
+def choose_loop(dataset: xr.Dataset, keys: Sequence[str]) -> Choice | None:
+    """Choose the point of a motion with friction; None for a result without friction."""
+    choice = choose_point(dataset, keys) if "friction" in dataset.dims else None
+    return choice and replace(choice, x=_first_axis(dataset, Choice()))
+
+
+_pairs = partial(Kind, of_friction=True)
+BETA = _pairs("beta", "Tangential restitution of the contact points of each pair.", beta_curves, choose_pairs)
+E_T = _pairs(
+    "e-t",
+    "Tangential restitution of the centres, as it is measured.",
+    e_t_curves,
+    partial(choose_pairs, needed="e_t"),
+)
+IMPULSE_RATIO = _pairs(
+    "impulse-ratio",
+    "Tangential over normal impulse, and the coefficient of friction.",
+    impulse_ratio_curves,
+    partial(choose_pairs, needed="impulse_ratio"),
+)
+SPIN = _pairs(
+    "spin", "Spins of the balls after the impact.", spin_curves, partial(choose_pairs, needed="omega1_post")
+)
+PSI = _pairs(
+    "psi",
+    "Slip after over slip before the impact, as Maw, Barber and Fawcett draw it.",
+    psi_curves,
+    partial(choose_pairs, needed="psi1"),
+)
+FRICTION_LOOP = _pairs(
+    "friction-loop",
+    "Friction over the slip displacement of one impact: the area is the energy lost.",
+    friction_loop_curves,
+    choose_loop,
+    along=(),
+    source="history",
+)

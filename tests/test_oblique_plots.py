@@ -1,0 +1,347 @@
+"""Pictures of friction show the values of the result, a curve or a panel for each pair, and angles in degrees."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+
+import impact
+from impact.contact.frictions import find_friction
+from impact.errors import UsageError
+from impact.plots.curves import Curve, CurveData
+from impact.plots.data import encode_table
+from impact.plots.draw import draw, get_plot_data
+from impact.plots.kinds import KINDS, Choice, Look, find_kind
+from impact.plots.labels import model_label
+from impact.plots.maps import MapData
+from impact.plots.oblique import MAX_PAIRS
+
+from .conftest import Run
+from .test_plots import check_layout, conditions_of, names_of
+
+COULOMB, MINDLIN, FORCE, CONSTANT = FRICTIONS = (
+    "coulomb-1785",
+    "lammps-mindlin-rescale",
+    "lammps-mindlin-force",
+    "cundall-strack-1979",
+)
+TSUJI, HOOKE = MODELS = ("tsuji-1992", "lammps-coeff-restitution-hooke")
+BALLS: dict[str, Any] = {
+    "speed": 3.9,
+    "angle": {"linspace": ["1 deg", "85 deg", 13]},
+    "e": 0.9,
+    "mu": [0.1, 0.3],
+    "R1": 2.5e-3,
+    "R2": 5e-3,
+    "m1": 1e-3,
+    "m2": 2e-3,
+    "material1": "glass",
+    "material2": "glass",
+}
+CONFIG: dict[str, Any] = {
+    "title": "Beads",
+    "models": list(MODELS),
+    "frictions": list(FRICTIONS),
+    "sweep": BALLS,
+    "materials": {"glass": {"E": 7e10, "nu": 0.25}},
+    "friction": {MINDLIN: {"xt": 0.0}, FORCE: {"xt": 0.0, "limit": "positive"}, CONSTANT: {"k_t": 1e6}},
+    "solver": {"rtol": 1e-8},
+}
+# the kinds over the angle, and the variable that each shows
+SHOWN = {"beta": "beta", "e-t": "e_t", "impulse-ratio": "impulse_ratio", "spin": "omega1_post"}
+
+
+def sweep(**changes: Any) -> xr.Dataset:
+    """The result of CONFIG with other tables."""
+    return impact.sweep({**CONFIG, **changes})
+
+
+@pytest.fixture(scope="module")
+def beads() -> xr.Dataset:
+    """Two models and four friction laws over angle and mu; one model has no stiffness that grows."""
+    return sweep()
+
+
+@pytest.fixture(scope="module")
+def central() -> xr.Dataset:
+    """A result without friction."""
+    return impact.sweep({"models": ["hertz"], "sweep": {"v1": [1.0, 2.0], "m1": 1.0, "m2": 1.0, "K": 1e9}})
+
+
+def curves_of(dataset: xr.Dataset, kind: str, **choice: Any) -> CurveData:
+    data = get_plot_data(dataset, kind, Choice(**choice))
+    assert isinstance(data, CurveData)
+    return data
+
+
+def of_pairs(data: CurveData, variable: str = "") -> list[Curve]:
+    """The curves of pairs, not the guides."""
+    (panel,) = data.panels
+    return [curve for curve in panel.curves if curve.friction and variable in ("", curve.variable)]
+
+
+@pytest.mark.parametrize("kind", SHOWN)
+def test_a_curve_of_a_pair_has_the_values_of_the_result(beads: xr.Dataset, kind: str) -> None:
+    curves = of_pairs(curves_of(beads, kind, sel={"mu": 0.3}), SHOWN[kind])
+    # 8 G* a grows with the indentation, and the stiffness of the linear model does not
+    assert [curve.law for curve in curves] == [
+        *(f"{TSUJI} with {friction}" for friction in FRICTIONS),
+        f"{HOOKE} with {COULOMB}",
+        f"{HOOKE} with {CONSTANT}",
+    ]
+    for curve in curves:
+        stored = beads[SHOWN[kind]].sel(model=curve.model, friction=curve.friction, mu=0.3)
+        assert curve.y == tuple(stored.values.tolist())
+        assert curve.x == tuple(beads["angle"].values.tolist())
+
+
+def test_a_pair_that_cannot_be_combined_is_named_with_the_reason(beads: xr.Dataset) -> None:
+    data = curves_of(beads, "beta")
+    reason = "the contact force lacks what the friction law needs"
+    assert data.not_drawn == tuple(
+        f"{model} with {friction}: {reason}" for model, friction in ((HOOKE, MINDLIN), (HOOKE, FORCE))
+    )
+    with pytest.raises(UsageError, match=f"^no pair has a value of e_t here: {HOOKE} with {FORCE}: {reason}$"):
+        curves_of(beads, "e-t", models=[HOOKE], frictions=[FORCE])
+
+
+def test_the_guides_are_where_physics_has_them(beads: xr.Dataset) -> None:
+    def guides(kind: str, dataset: xr.Dataset = beads, **choice: Any) -> dict[str, float]:
+        (panel,) = curves_of(dataset, kind, **choice).panels
+        found = {curve.case: set(curve.y) for curve in panel.curves if curve.is_guide}
+        return {case: values.pop() for case, values in found.items() if len(values) == 1}
+
+    assert guides("beta") == {"smooth": -1.0, "sticks": 0.0, "reverses": 1.0}
+    assert guides("impulse-ratio", sel={"mu": 0.3}) == {"μ": 0.3}
+    # rigid solid spheres that stick have the friction of Coulomb's law at small angles
+    (sticks,) = guides("e-t").values()
+    assert sticks == pytest.approx(5.0 / 7.0)
+    rigid = beads["e_t"].sel(model=TSUJI, friction=COULOMB, mu=0.3)[0]
+    assert float(rigid) == pytest.approx(sticks)
+    # a spin before the impact, or balls of two inertia factors, have no such number
+    one_law = {"models": [TSUJI], "frictions": [COULOMB], "friction": {}}
+    for more in ({"omega1": 10.0}, {"inertia_factor2": 2.0 / 3.0}):
+        assert guides("e-t", sweep(**one_law, sweep=BALLS | more)) == {}
+    hollow = sweep(**one_law, sweep=BALLS | {"inertia_factor1": 2.0 / 3.0, "inertia_factor2": 2.0 / 3.0})
+    assert guides("e-t", hollow) == {"sticks": pytest.approx(0.6)}
+    assert float(hollow["e_t"].sel(model=TSUJI, friction=COULOMB, mu=0.3)[0]) == pytest.approx(0.6)
+    # over mu the limit is a line
+    (panel,) = curves_of(beads, "impulse-ratio", x="mu").panels
+    assert panel.curves[0].y == panel.curves[0].x == (0.1, 0.3)
+    turned = sweep(**one_law, sweep=BALLS | {"omega1": -5000.0})
+    assert guides("impulse-ratio", turned, sel={"mu": 0.3})["−μ"] == -0.3
+
+
+def test_labels_name_what_differs(beads: xr.Dataset) -> None:
+    labels = {
+        curve.law: curve.label.replace("\N{NO-BREAK SPACE}", " ") for curve in of_pairs(curves_of(beads, "beta"))
+    }
+    title = model_label(beads.isel(model=0, mu=0, angle=0))
+    assert labels[f"{TSUJI} with {COULOMB}"] == f"{title} with Coulomb"
+    assert labels[f"{TSUJI} with {FORCE}"] == f"{title} with LAMMPS mindlin/force, xt = 0, limit = positive"
+    # a single model is not named, and nor are parameters at their defaults
+    alone = curves_of(beads, "beta", models=[HOOKE], frictions=[CONSTANT, COULOMB])
+    shown = [curve.label.replace("\N{NO-BREAK SPACE}", " ") for curve in of_pairs(alone)]
+    assert shown == ["Cundall and Strack, k_t = 1e+06", "Coulomb"]
+    assert "angle" not in conditions_of(alone)
+    assert "mu = 0.1" in conditions_of(alone)
+    assert "angle = 1°" in conditions_of(curves_of(beads, "beta", x="mu"))
+
+
+def test_the_spins_of_both_balls_are_drawn_where_both_turn(beads: xr.Dataset) -> None:
+    both = curves_of(beads, "spin", models=[TSUJI], frictions=[COULOMB])
+    assert [(curve.variable, curve.end) for curve in of_pairs(both)] == [
+        ("omega1_post", "ω₁⁺"),
+        ("omega2_post", "ω₂⁺"),
+    ]
+    wall = BALLS | {"m2": math.inf, "R2": math.inf}
+    one = curves_of(sweep(models=[TSUJI], frictions=[COULOMB], friction={}, sweep=wall), "spin")
+    assert [(curve.variable, curve.end) for curve in of_pairs(one)] == [("omega1_post", "")]
+    unknown = {name: value for name, value in BALLS.items() if name not in ("R1", "R2", "material1", "material2")}
+    without_radius = sweep(
+        models=[TSUJI], frictions=[COULOMB], friction={}, materials={}, sweep=unknown | {"K": 1e9}
+    )
+    with pytest.raises(UsageError, match="no pair has a value of omega1_post or omega2_post here"):
+        curves_of(without_radius, "spin")
+
+
+@pytest.mark.parametrize("width", ["84mm", "double"])
+@pytest.mark.parametrize("kind", SHOWN)
+def test_angles_are_in_degrees_and_texts_do_not_overlap(beads: xr.Dataset, kind: str, width: str) -> None:
+    figure = draw(curves_of(beads, kind), Look(width=width))
+    check_layout(figure)
+    (axes,) = figure.axes
+    assert axes.get_xlabel().replace("\n", " ").endswith("(°)")
+    low, high = axes.get_xlim()
+    ticks = [float(tick) for tick in axes.get_xticks() if low <= tick <= high]
+    assert np.degrees(ticks) == pytest.approx([0, 15, 30, 45, 60, 75], abs=1e-9)
+    assert [axes.xaxis.get_major_formatter()(tick) for tick in ticks] == ["0", "15", "30", "45", "60", "75"]
+    # guides are not in the legend
+    assert len(names_of(figure)) == 6
+
+
+def test_friction_laws_are_selected_as_models_are(
+    beads: xr.Dataset, central: xr.Dataset, cli: Run, tmp_path: Path
+) -> None:
+    impact.save(beads, tmp_path / "beads.h5")
+    impact.save(central, tmp_path / "central.h5")
+    words = ["-k", "beta", "--friction", MINDLIN, "--friction", COULOMB, "--model", TSUJI]
+    table = ["--data", "a.csv", "--data-form", "long"]
+    done = cli("plot", "beads.h5", *words, "-o", "a.svg", *table, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    rows = pd.read_csv(tmp_path / "a.csv", keep_default_na=False)
+    assert rows.columns.tolist() == ["x_axis", "y_axis", "curve", "model", "friction", "x", "y"]
+    assert rows["friction"].unique().tolist() == ["", MINDLIN, COULOMB]
+    refused = {
+        (
+            "beads.h5",
+            "--friction",
+            "coulomb",
+        ): 'no friction law "coulomb" in this result; did you mean "coulomb-1785"?',
+        ("central.h5", "--friction", COULOMB): f'no friction law "{COULOMB}" in this result, which has none; '
+        "sweep a config with frictions",
+        ("central.h5", "-k", "beta"): "this result has no friction; sweep a config with frictions = [...]",
+        ("beads.h5", "-k", "psi"): "this result has no psi1, psi2; list them in [output] variables",
+        ("beads.h5", "-k", "beta", "--sel", "angle=9 deg"): "no angle = 9 deg in this result; the nearest are "
+        "0.13962634016 and 0.261799387799",
+    }
+    for options, message in refused.items():
+        failed = cli("plot", *options, "-o", "b.svg", cwd=tmp_path)
+        assert (failed.returncode, failed.stderr) == (2, f"{message}\n")
+
+
+def test_a_value_is_selected_with_its_unit(beads: xr.Dataset) -> None:
+    chosen = curves_of(beads, "beta", sel={"angle": "43 deg"})
+    assert "angle = 43°" in conditions_of(chosen)
+    (panel,) = chosen.panels
+    assert panel.x_name == "mu"
+
+
+def test_more_pairs_than_can_be_told_apart_are_drawn_on_request(beads: xr.Dataset) -> None:
+    models = ["hertz", "tsuji-1992", "gonthier-2004", "flores-2011", "hunt-crossley-1975"]
+    many = sweep(models=models, frictions=[COULOMB, MINDLIN], friction={MINDLIN: {"xt": 0.0}})
+    some = curves_of(many, "beta")
+    assert len(of_pairs(some)) == MAX_PAIRS
+    assert some.not_drawn == ("2 more pairs; choose some with --model and --friction",)
+    assert len(of_pairs(curves_of(many, "beta", frictions=[COULOMB, MINDLIN]))) == 10
+
+
+def test_slips_are_those_of_maw_barber_and_fawcett() -> None:
+    names = ["beta", "psi1", "psi2"]
+    slips = sweep(
+        models=["hertz"],
+        frictions=[COULOMB, MINDLIN],
+        friction={MINDLIN: {"xt": 0.0}},
+        output={"variables": names},
+    )
+    data = curves_of(slips, "psi", sel={"mu": 0.1})
+    (curve,) = of_pairs(data)
+    before, after = np.array(curve.x), np.array(curve.y)
+    stored = slips.sel(model="hertz", friction=MINDLIN, mu=0.1)
+    assert curve.x == tuple(stored["psi1"].values[: before.size].tolist())
+    assert -after / before == pytest.approx(stored["beta"].values[: before.size])
+    # the rest slides throughout, along a line
+    assert before[-1] <= 1.5 * before[after <= 0.0][-1] < stored["psi1"].values[before.size]
+    (reason, beyond) = data.not_drawn
+    assert reason == f"hertz with {COULOMB}: not defined"
+    assert beyond.startswith("slips beyond psi1 = ")
+    (panel,) = data.panels
+    assert (panel.x_name, panel.y_name) == ("psi1", "psi2")
+    check_layout(draw(data, Look(width="84mm")))
+
+
+def test_other_pictures_do_not_depend_on_friction(beads: xr.Dataset) -> None:
+    for kind, variable in (("final-velocities", "v1_post"), ("restitution", "e_out"), ("error", "e_error")):
+        curve = next(c for c in curves_of(beads, kind).panels[0].curves if c.model and c.variable == variable)
+        assert curve.y == tuple(beads[variable].isel(model=0, mu=0).values.tolist())
+        assert curve.friction == ""
+        assert "friction" not in curves_of(beads, kind).long_table()
+    loop = curves_of(beads, "loop", sel={"angle": "43 deg"}, models=[TSUJI])
+    assert max(loop.panels[0].curves[0].y) == pytest.approx(
+        float(beads["peak_force"].isel(model=0, mu=0, angle=6)), rel=1e-3
+    )
+    plane = get_plot_data(beads, "map", Choice(variable="e_out"))
+    assert isinstance(plane, MapData)
+    assert [panel.key for panel in plane.panels] == list(MODELS)
+
+
+def test_a_map_of_friction_has_a_panel_for_each_pair(beads: xr.Dataset) -> None:
+    plane = get_plot_data(beads, "map", Choice(variable="beta", models=[TSUJI], frictions=[COULOMB, MINDLIN]))
+    assert isinstance(plane, MapData)
+    assert (plane.x, plane.y) == ("angle", "mu")
+    for panel, key in zip(plane.panels, (COULOMB, MINDLIN), strict=True):
+        assert panel.key == f"{TSUJI} with {key}"
+        stored = beads["beta"].sel(model=TSUJI, friction=key).transpose("mu", "angle").values
+        assert np.array_equal(panel.values, stored)
+    assert plane.panels[0].label == "Coulomb"
+    assert plane.title == "Tangential restitution of the contact points over angle and mu: Beads"
+    wide = encode_table(plane, ".csv").decode().splitlines()[0]
+    assert wide == f"angle [rad],mu,beta {TSUJI} with {COULOMB},beta {TSUJI} with {MINDLIN}"
+    long = plane.long_table()
+    assert long["friction"].unique().tolist() == [COULOMB, MINDLIN]
+    row = long[(long["friction"] == MINDLIN) & (long["mu"] == 0.3)].iloc[4]
+    assert row["beta"] == beads["beta"].sel(model=TSUJI, friction=MINDLIN, mu=0.3)[4]
+    check_layout(draw(plane, Look(width="84mm")))
+
+
+def test_measured_points_are_drawn_over_pairs(beads: xr.Dataset, tmp_path: Path) -> None:
+    (tmp_path / "points.csv").write_text("angle [deg], e_t\n30, 0.7\n45, 0.8\n", encoding="utf-8")
+    figure = impact.plot(beads, kind="e-t", points=tmp_path / "points.csv", models=[TSUJI])
+    assert names_of(figure)[-1] == "Measured"
+
+
+def test_a_label_replaces_that_of_a_pair(beads: xr.Dataset) -> None:
+    key = f"{TSUJI} with {COULOMB}"
+    figure = impact.plot(beads, kind="beta", models=[TSUJI], frictions=[COULOMB], labels={key: "Rigid"})
+    assert names_of(figure) == ["Rigid"]
+
+
+def test_bands_of_uncertain_friction_are_of_pairs() -> None:
+    dataset = sweep(
+        models=[TSUJI],
+        frictions=[COULOMB, MINDLIN],
+        friction={MINDLIN: {"xt": 0.0}},
+        sweep=BALLS | {"mu": {"uniform": [0.1, 0.3]}},
+        design={"n": 16, "seed": 1},
+    )
+    curves = of_pairs(curves_of(dataset, "uncertainty", variable="beta"))
+    assert [curve.friction for curve in curves] == [COULOMB, MINDLIN]
+    for curve in curves:
+        median = dataset["beta"].sel(model=TSUJI, friction=curve.friction).median("sample")
+        assert curve.y == pytest.approx(median.values)
+
+
+def test_a_report_has_a_section_on_friction(beads: xr.Dataset, central: xr.Dataset) -> None:
+    text = impact.report(beads)
+    section = text.partition("<h2>Friction</h2>")[2].partition("</section>")[0]
+    captions = [find_kind(kind).caption for kind in SHOWN]
+    assert all(section.count(caption) == 2 for caption in captions)
+    assert text.count("<figure>") > section.count("<figure>") == len(SHOWN)
+    for key in FRICTIONS:
+        assert find_friction(key).title in section
+    combined = int((beads["friction_status"] < 10).sum())
+    assert f'class="number">{combined}</td>' in section
+    assert "the contact force lacks what the friction law needs" in section
+    assert "over angle, mu, judged" in text
+    assert "<h2>Friction</h2>" not in impact.report(central)
+
+
+def test_a_notebook_offers_the_kinds_of_friction_where_there_is_friction(
+    beads: xr.Dataset, central: xr.Dataset
+) -> None:
+    explore = pytest.importorskip("impact.plots.explore")
+    assert {*SHOWN} <= {*explore.kinds_to_offer(beads)}
+    assert not any(find_kind(kind).of_friction for kind in explore.kinds_to_offer(central))
+    assert explore.axes_of(beads) == ["angle", "mu"]
+
+
+def test_kinds_of_friction_are_those_of_their_module() -> None:
+    assert [kind for kind in KINDS if find_kind(kind).of_friction] == [
+        kind for kind, module in KINDS.items() if module == "oblique"
+    ]
