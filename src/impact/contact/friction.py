@@ -96,6 +96,11 @@ class FrictionLaw:
         return f"<FrictionLaw {self.key}>"
 
     @property
+    def may_use_e(self) -> bool:
+        """Whether its damping may depend on the restitution e."""
+        return self.damping in ("liggghts", "betas")
+
+    @property
     def default_limit(self) -> str:
         """The word that `limit` has where the user sets none."""
         limit = next(parameter for parameter in self.parameters if parameter.name == "limit")
