@@ -587,7 +587,9 @@ class Trajectory:
         for _ in range(1000):
             name = self.run()
             if abs(self.mode) == THIRD:
-                self.y[G] = self.phase.steady_slip(self.mode // 2, self.y[S], self.y[V])
+                # at s = 0 itself it is 0/0
+                s = self.y[S] if self.phase.residual else max(self.y[S], 1e-5)
+                self.y[G] = self.phase.steady_slip(self.mode // 2, s, self.y[V])
             if name in ("gap", "release"):
                 return self.finish(name)
             self.switch(name)
