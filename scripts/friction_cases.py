@@ -1,10 +1,11 @@
-"""Compare random oblique impacts of every friction law with the reference solver, and store the largest differences.
+"""Compare random oblique impacts of every friction law with the reference solver.
 
 Usage: python scripts/friction_cases.py [--cases 200] [--seed 2] [LAW ...]
 
-It writes tests/data/friction_cases.csv: by law the number of cases, the median, the 99th percentile and the largest
-difference of the slip after the impact, relative to the larger of the slip before and what friction can stop, and
-the number of cases in which a work, a count or the status differs. All 3,000 cases take about a quarter of an hour.
+It writes tests/data/friction_cases.csv: by law the number of cases, the median, the 99th percentile and the
+largest difference of the slip after the impact, relative to the larger of the slip before and what friction can
+stop, and the number of cases in which a work, a count or the status differs. All 3,000 cases take about a quarter
+of an hour.
 """
 
 from __future__ import annotations
