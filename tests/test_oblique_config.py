@@ -84,7 +84,8 @@ def config(**sweep: Any) -> Config:
         (HEAD + "v1 = 2\nmu = 0.3\nangle = 90",
          ["x.toml:11: sweep.angle: got 90 rad, expected an angle from 0 to below 90 deg"]),
         (HEAD + 'v1 = 2\nmu = 0.3\nangle = { arange = ["0 deg", "95 deg", "10 deg"] }',
-         ["x.toml:11: sweep.angle.arange: got a value 1.5707963267949 rad, expected an angle from 0 to below 90 deg"]),
+         ["x.toml:11: sweep.angle.arange: got a value 1.5707963267949 rad, expected an angle from 0 to below 90 "
+          "deg"]),
         (HEAD + "v1 = 2\nmu = 0.3\nangle = { arange = [0, 90, 10] }",
          ['x.toml:11: sweep.angle.arange: got a value 80 rad; did you mean "80 deg"?']),
         (HEAD + 'v1 = 2\nmu = 0.3\nangle = "30 %"',

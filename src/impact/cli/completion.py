@@ -58,8 +58,8 @@ def complete_input(context: typer.Context, incomplete: str) -> list[str]:
 
 
 def complete_unknown(context: typer.Context, incomplete: str) -> list[str]:
-    """What `impact solve` solves for: the parameters of the model, K and e."""
-    return _beginning_with(incomplete, [*_parameters(context), "K", "e"])
+    """What `impact solve` solves for: the parameters of the model and of the friction law, K, e and mu."""
+    return _beginning_with(incomplete, [*_parameters(context), "K", "e", "mu"])
 
 
 def complete_output(incomplete: str) -> list[str]:

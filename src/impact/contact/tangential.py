@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..array_types import Array
-from ..ode.problem import Params, Problem, Solution
+from ..ode.problem import Params, Problem, Solution, Step
 from ..ode.rk45 import integrate
 from . import motion
 from .dimensionless import with_coefficients, with_units
@@ -85,6 +85,14 @@ class TangentialResult(Record):
     status: NDArray[np.int8]
 
 
+@dataclass(frozen=True)
+class RecordedSlip:
+    """The joint motion of one impact in a phase, and its steps, with the modes of friction among their params."""
+
+    phase: SlipPhase
+    steps: tuple[Step, ...]
+
+
 class PairOfLaws(Protocol):
     """What a trajectory needs of a `impact.contact.friction.Pair`."""
 
@@ -125,6 +133,18 @@ def simulate_friction(
     return simulate_parts(TangentialResult, pair.key, n, values, status, simulate_part, collapse, errors)
 
 
+def record_friction(
+    pair: PairOfLaws, n: float, values: ValueArrays, *, rtol: float, max_steps: int
+) -> list[RecordedSlip]:
+    """Integrate the slip of one impact, a batch of length one, and record it; empty for Coulomb's friction."""
+    recorded: list[RecordedSlip] = []
+    if pair.form(n).kind == "coulomb":
+        return recorded
+    with np.errstate(all="ignore"):
+        _simulate_distinct(pair, n, values, 1, rtol=rtol, max_steps=max_steps, collapse=False, recorded=recorded)
+    return recorded
+
+
 def _simulate_distinct(
     pair: PairOfLaws,
     n: float,
@@ -134,8 +154,9 @@ def _simulate_distinct(
     rtol: float,
     max_steps: int,
     collapse: bool,
+    recorded: list[RecordedSlip] | None = None,
 ) -> TangentialResult:
-    """Integrate each distinct dimensionless problem once."""
+    """Integrate each distinct dimensionless problem once; `recorded` receives the steps of one impact."""
     form = pair.form(n)
     model = _smooth_model(pair.model, form)
     law_values = with_coefficients(model, with_units(values, n), count)
@@ -154,7 +175,7 @@ def _simulate_distinct(
     columns = (slip, stiffness, damping, is_positive, *coefficient)
     chosen = (status == STATUS_OK) & ~is_trivial
     parts = [
-        (problems.rows, _integrate(form, problems, rtol, max_steps).take(problems.row_of_impact))
+        (problems.rows, _integrate(form, problems, rtol, max_steps, recorded).take(problems.row_of_impact))
         for problems in distinct_problems(model, n, law_values, chosen, collapse, columns)
     ]
     result = TangentialResult.joined(count, status, parts)
@@ -178,7 +199,13 @@ def _coefficient_arguments(form: TangentialForm) -> tuple[str, ...]:
     return tuple(name for name in argument_names(form.coefficient) if name != "y")
 
 
-def _integrate(form: TangentialForm, problems: DistinctProblems, rtol: float, max_steps: int) -> TangentialResult:
+def _integrate(
+    form: TangentialForm,
+    problems: DistinctProblems,
+    rtol: float,
+    max_steps: int,
+    recorded: list[RecordedSlip] | None,
+) -> TangentialResult:
     """Integrate distinct problems through both phases."""
     law = problems.law
     slip, stiffness, damping, is_positive, *coefficient = (np.array(column, float) for column in problems.columns)
@@ -206,12 +233,14 @@ def _integrate(form: TangentialForm, problems: DistinctProblems, rtol: float, ma
 
         def run(problem: Problem, start: Array, params: Params) -> Solution:
             y, params = phase.begin(start, params)
-            solution = integrate(problem, y, params, rtol=rtol, max_steps=max_steps)
+            solution = integrate(problem, y, params, rtol=rtol, max_steps=max_steps, record=recorded is not None)
             phase.finish(solution.state, params)
             return solution
 
         solution = in_parts(run, phase.problem(), breakpoints, rows, (*params, *columns))
         states.append(solution.state)
+        if recorded is not None:
+            recorded.append(RecordedSlip(phase, solution.recorded))
         return solution
 
     phases = solve_phases(law, problems.params, n, solve)
