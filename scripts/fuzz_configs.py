@@ -55,6 +55,12 @@ EXTRA = (
     'models = ["hertz", "bilinear"]\nfrictions = ["coulomb-1785", "cundall-strack-1979"]\n[sweep]\ne = [0.5, 1]\n'
     'speed = 2\nangle = { linspace = ["0 deg", "80 deg", 3] }\nmu = [0, 0.3]\nomega1 = "90 rpm"\nR1 = "2 cm"\n'
     'm1 = 1\nm2 = inf\nK = 1e6\n[friction.cundall-strack-1979]\nk_t = [1e5, "1 MN/m"]\nlimit = "positive"\n',
+    'models = "tsuji-1992"\nfrictions = ["*-mindlin", "drake-*"]\n[design]\nn = 8\n[sweep]\ncases = "spins.csv"\n'
+    'e = 0.9\nv1 = 2\nR1 = "2 cm"\nR2 = inf\nm2 = inf\nmaterial = "steel"\ninertia_factor1 = "40 %"\n'
+    "mu = { uniform = [0.1, 0.3] }\n[friction.drake-regularized]\nv_s = [1e-4, 1e-3]\n",
+    'models = "hertz"\nfrictions = "cundall-strack-1979"\n[sweep]\nm1 = 1\nR1 = 1\nm2 = inf\nK = 1e6\nn = 1\n'
+    "v1 = 1\nmu = { fit = [0.01, 1] }\n[friction.cundall-strack-1979]\nkt_over_kn = { fit = [0.1, 2] }\n"
+    "[data.columns]\nbeta = [-0.2, 0.1, 0.3]\nu1 = [2, 1, 0.5]\nomega1 = [0, 0.1, 0]\n",
     'models = "hertz"\n[sweep]\ncases = { e = [0.1, 0.9], v1 = ["1 m/s", 2], m1 = [1, 2] }\nm2 = inf\nK = 1e6\n',
     'models = "hertz"\n[sweep]\ne = 0.5\nv1 = { file = "cases.csv", column = "v1" }\nm1 = 1\nm2 = 1\nK = 1e6\n',
     'models = "hertz"\n[design]\nmethod = "random"\nn = 8\n[sweep]\nv1 = { empirical = "speeds.csv" }\n'
@@ -71,6 +77,7 @@ EXTRA = (
 )
 TABLES = {
     "cases.csv": "e,v1 [m/s],m1 [kg],m2\n0.1,1,1,1\n0.5,2,1,inf\n0.9,0.5,2,2\n",
+    "spins.csv": "angle [deg],omega1 [rpm],friction.yade-mindlin.limit\n0,0,abs\n30,90,positive\n80,-3,abs\n",
     "speeds.csv": "v1 [mm/s]\n900\n1000\n1150\n",
 }
 VALUES = (
@@ -82,6 +89,7 @@ VALUES = (
     *("{ normal = [1, 0.1] }", "{ uniform = [0.1, 0.9] }", "{ lognormal = [1, 1.1] }", "{ empirical = [1, 2] }"),
     *('{ file = "cases.csv", column = "e" }', '{ empirical = "speeds.csv" }', '"cases.csv"', '"drops.csv"'),
     *('"\\u0000"', '"\\u001b[31m"', '"\u202e"', "9" * 20, "9" * 5000, "[" * 500, f'"{"x" * 300}"'),
+    *('"30 deg"', '"90 deg"', '"90 rpm"', '"10 Hz"', '"positive"', '["abs", "positive"]', '"coulomb-1785"'),
     *('"sobol"', '"random"', '"given"', '"scale"', '"excess"', '"full"', '"factored"', "4096", "1000000000"),
 )
 CELLS = (
@@ -92,6 +100,8 @@ HEADERS = (
     *("e_out", "e_out [%]", "sigma", "sigma_e_out", "v1", "v1 [m/s]", "v1 [cm/s]", "v1 (m/s)", "v1 [kg]"),
     *("e", "n", "m1 [g]", "m2 [kg]", "contact_time [us]", "peak_force [N]", "material", "hertz.K", ""),
     *("kelvin-voigt.C", "  ", "materials.steel.E [GPa]", "v2 [m/s]", "K [N/m^n]", "specimen", "v1 []", "models"),
+    *("angle [deg]", "angle", "omega1 [rpm]", "omega2 [Hz]", "mu", "beta", "rebound_angle [deg]", "u1 [m/s]"),
+    *("friction.coulomb-1785.limit", "friction.cundall-strack-1979.k_t [N/m]"),
     *("\x1b[31m", "x" * 300),
 )
 LETTERS = "\x00\x1b\t\r\n \"'#=,.;[]{}\\_-+eE0199xé\u202e\ufeff"

@@ -69,9 +69,58 @@ def config(**sweep: Any) -> Config:
         (HEAD.replace("R1 = 0.033\n", "") + "v1 = 2\nu1 = 2\nmu = 0.3\nomega1 = 10",
          ["x.toml:3: sweep.R1: missing, expected a number > 0 m, or inf: radius of ball 1, which its spin needs; "
           "or a material with rho"]),
+        (HEAD.replace("m2 = inf", "m2 = [1, inf]\nR2 = 1") + "v1 = 2\nu1 = 2\nmu = 0.3\nomega2 = 10",
+         ["x.toml:13: sweep.omega2: got the spin of a wall, which does not turn, expected none"]),
+        (HEAD.replace("m2 = inf", "m2 = [1, inf]\nR2 = 1")
+         + 'v1 = 2\nu1 = 2\nmu = 0.3\nomega2 = [0, 10]\nzip = [["m2", "omega2"]]',
+         ["x.toml:13: sweep.omega2: got the spin of a wall, which does not turn, expected none"]),
+        (HEAD.replace("m2 = inf\n", "") + "v1 = 2\nu1 = 2\nmu = 0.3\ncases = { m2 = [1, inf], omega2 = [0, 10] }",
+         ["x.toml:11: sweep.cases.omega2: got the spin of a wall, which does not turn, expected none"]),
+        (HEAD + "v1 = 2\nu1 = 2\nmu = 0.3\n[friction.lammps-mindlin]\nxt = 0",
+         ["x.toml:12: friction.lammps-mindlin: set for a friction law that is not among frictions, expected it "
+          "there as well"]),
+        (HEAD + 'v1 = 2\nmu = 0.3\nangle = "30 rad"',
+         ['x.toml:11: sweep.angle: got 30 rad; did you mean "30 deg"?']),
+        (HEAD + "v1 = 2\nmu = 0.3\nangle = 90",
+         ["x.toml:11: sweep.angle: got 90 rad, expected an angle from 0 to below 90 deg"]),
+        (HEAD + 'v1 = 2\nmu = 0.3\nangle = { arange = ["0 deg", "95 deg", "10 deg"] }',
+         ["x.toml:11: sweep.angle.arange: got a value 1.5707963267949 rad, expected an angle from 0 to below 90 "
+          "deg"]),
+        (HEAD + "v1 = 2\nmu = 0.3\nangle = { arange = [0, 90, 10] }",
+         ['x.toml:11: sweep.angle.arange: got a value 80 rad; did you mean "80 deg"?']),
+        (HEAD + 'v1 = 2\nmu = 0.3\nangle = "30 %"',
+         ['x.toml:11: sweep.angle: got "30 %", expected a unit of rad, such as "1 rad"']),
+        (HEAD + 'v1 = 2\nu1 = 2\nmu = "17 deg"', ['x.toml:11: sweep.mu: got "17 deg", expected a bare number']),
+        (HEAD + 'v1 = 2\nu1 = 2\nmu = 0.3\nomega1 = "10 1/s"',
+         ['x.toml:12: sweep.omega1: got "10 1/s", expected a unit of rad/s, such as "1 rad/s"; 1/s may be turns '
+          "or radians per second"]),
+        (HEAD + "v1 = 2\nu1 = 2\nfriction = 0.3",
+         ["x.toml:3: sweep.mu: missing, expected a number >= 0: coefficient of friction",
+          'x.toml:11: sweep.friction: unknown key; did you mean "mu"?']),
+        (HEAD + 'v1 = 2\nmu = 0.3\n[design]\nn = 8\n[sweep.angle]\nnormal = ["80 deg", "10 deg"]',
+         ["x.toml:13: sweep.angle: got 1 of 8 samples such as 1.5980409300203702, expected a distribution whose "
+          "values are each an angle from 0 to below 90 deg"]),
+        (HEAD + 'v1 = 2\nu1 = 2\nmu = 0.3\n[friction.coulomb-1785]\nlimit = ["abs", "abs"]',
+         ['x.toml:13: friction.coulomb-1785.limit[1]: got "abs" twice, expected each value once']),
+        (HEAD + 'v1 = 2\nu1 = 2\nmu = 0.3\n[friction.coulomb-1785]\nlimit = ["abs", 1]',
+         ['x.toml:13: friction.coulomb-1785.limit[1]: got 1, expected "abs" or "positive"']),
+        (HEAD + 'v1 = 2\nu1 = 2\nmu = 0.3\n[solver]\nintegrator = "kickdrift"',
+         ['x.toml:13: solver.integrator: got "kickdrift", expected an integrator; did you mean "kick-drift"?']),
+        (HEAD.replace("e = 0.8\n", "").replace("tsuji-1992", "hertz").replace("coulomb-1785", "yade-mindlin")
+         + "v1 = 2\nu1 = 2\nmu = 0.3\n[friction.yade-mindlin]\nkt_over_kn = 0.8",
+         ["x.toml:3: sweep.e: missing, expected e or alpha (used by yade-mindlin), or other frictions"]),
+        (HEAD.replace("coulomb-1785", "cundall-strack-1979") + "v1 = 2\nu1 = 2\nmu = 0.3",
+         ["x.toml:2: friction.cundall-strack-1979.k_t: missing, expected a stiffness [N/m], such as 1e6; or "
+          "kt_over_kn"]),
+        (HEAD.replace('frictions = "coulomb-1785"\n', "") + "v1 = 2\n[friction.coulomb-1785]\nlimit = \"abs\"",
+         ["x.toml:9: friction.coulomb-1785: set without a friction law, expected frictions as well, such as "
+          'frictions = ["coulomb-1785"]']),
+        (HEAD.replace('"coulomb-1785"', "[]") + "v1 = 2\nu1 = 2\nmu = 0.3",
+         ['x.toml:2: frictions: got an empty list, expected a friction law, or a list of friction laws; "all" are '
+          "all"]),
         (HEAD + 'v1 = 2\nu1 = 2\nmu = 0.3\nomega1 = "10 Hz"',
-         ['x.toml:12: sweep.omega1: got "10 Hz", expected a unit of rad/s, such as "1 rpm" or "1 rad/s": turns '
-          "and radians per second are both Hz"]),
+         ['x.toml:12: sweep.omega1: got "10 Hz", expected a unit of rad/s, such as "1 rad/s"; 1/s may be turns or '
+          "radians per second"]),
         (HEAD + 'v1 = 2\nu1 = 2\nmu = 0.3\n[friction.coulomb-1785]\nlimit = "pos"',
          ['x.toml:13: friction.coulomb-1785.limit: got "pos", expected "abs" or "positive"']),
         (HEAD + "v1 = 2\nu1 = 2\nmu = 0.3\n[friction.coulomb-1785]\nxt = 1",
@@ -115,12 +164,110 @@ def test_a_config_without_a_pair_that_can_be_combined_is_refused() -> None:
 
 
 @pytest.mark.parametrize(
+    ("columns", "line", "problem"),
+    [
+        ("omega1 = [0, 3]\nu1 = [1, 2]", 3,
+         "sweep.R1: missing, expected a number > 0 m, or inf: radius of ball 1, which its spin needs; or a "
+         "material with rho"),
+        ("u1 = [1, 2]\nomega2 = [0, 3]", 12,
+         "data.columns.omega2: got the spin of a wall, which does not turn, expected none"),
+        ("angle = [0.1, 30]", 11, 'data.columns.angle[1]: got 30 rad; did you mean "30 deg"?'),
+        ('u1 = [1, 2]\n"friction.coulomb-1785.limit" = [0, 1]', 12,
+         'data.columns."friction.coulomb-1785.limit": got words, expected numbers; all points have one limit'),
+        ("angle = [0.1, 0.2]\nu1 = [1, 2]", 12,
+         "data.columns.u1: set together with angle, expected one of the two"),
+    ],
+)  # fmt: skip
+def test_measured_inputs_follow_the_rules_at_all_points(
+    tmp_path: Path, columns: str, line: int, problem: str
+) -> None:
+    path = tmp_path / "x.toml"
+    head = HEAD.replace("R1 = 0.033\n", "")
+    path.write_text(f"{head}v1 = 2\n[data.columns]\nbeta = [0.1, 0.2]\n{columns}\n[sweep.mu]\nfit = [0.01, 1]\n")
+    with pytest.raises(ConfigError) as error:
+        read_config(path, purpose="calibrate")
+    assert error.value.problems == (f"{path}:{line}: {problem}",)
+
+
+def test_measured_columns_have_units_of_angles(tmp_path: Path) -> None:
+    (tmp_path / "x.csv").write_text(
+        "angle [deg],omega1 [rpm],rebound_angle [deg],omega1_post [rev/s],sigma_rebound_angle,sigma_omega1_post\n"
+        "10,30,12,40,1,2\n60,-60,50,80,1,3\n"
+    )
+    path = tmp_path / "x.toml"
+    path.write_text(HEAD + 'v1 = 2\nmu = { fit = [0.01, 1] }\n[data]\nfile = "x.csv"\n')
+    data = read_config(path, purpose="calibrate").data
+    assert data is not None
+    degree, turn = math.pi / 180.0, 2.0 * math.pi
+    assert data.inputs["angle"] == pytest.approx((10.0 * degree, 60.0 * degree), rel=4e-16)
+    assert data.inputs["omega1"] == pytest.approx((0.5 * turn, -turn), rel=4e-16)
+    assert data.outputs["rebound_angle"] == pytest.approx((12.0 * degree, 50.0 * degree), rel=4e-16)
+    assert data.sigma["omega1_post"] == pytest.approx((2.0 * turn, 3.0 * turn), rel=4e-16)
+
+
+def test_cases_have_angles_with_units_and_words(tmp_path: Path) -> None:
+    (tmp_path / "x.csv").write_text("angle [deg],friction.coulomb-1785.limit\n10,abs\n80,positive\n")
+    path = tmp_path / "x.toml"
+    path.write_text(HEAD + 'v1 = 2\nmu = 0.3\ncases = "x.csv"\n')
+    result = impact.sweep(path)
+    limit = result["friction.coulomb-1785.limit"]
+    assert limit.values.tolist() == [0.0, 1.0]
+    assert limit.attrs["long_name"].endswith("; 0 is abs, 1 is positive")
+    table = {"angle": result["angle"].values.tolist(), "friction.coulomb-1785.limit": ["abs", "positive"]}
+    sweep = {"e": 0.8, "m1": 0.057, "R1": 0.033, "m2": math.inf, "K": 1e6, "v1": 2.0, "mu": 0.3, "cases": table}
+    again = impact.sweep({"models": "tsuji-1992", "frictions": "coulomb-1785", "sweep": sweep})
+    assert np.array_equal(again["beta"].values, result["beta"].values)
+    (tmp_path / "x.csv").write_text("angle [deg],friction.coulomb-1785.limit\n10,abs\n80,pos\n")
+    with pytest.raises(ConfigError, match=r'x.csv:3: friction.coulomb-1785.limit: got "pos", expected "abs" or'):
+        impact.sweep(path)
+
+
+def test_a_wall_may_be_zipped_with_no_spin() -> None:
+    sweep = {"m2": [1.0, math.inf], "omega2": [10.0, 0.0], "R2": 1.0, "zip": [["m2", "omega2"]]}
+    assert config(**sweep).axes[0].columns == {"m2": (1.0, math.inf), "omega2": (10.0, 0.0)}
+    assert config(omega2="0 rad/s").scalars["omega2"] == 0.0
+
+
+def test_a_stiffness_of_one_model_does_not_forbid_that_of_materials_of_another() -> None:
+    source = {
+        "models": ["hertz", "bilinear"],
+        "frictions": ["lammps-mindlin"],
+        "sweep": {"e": 0.8, "R1": 0.01, "R2": 0.01, "material": "steel", "v1": 1.0, "u1": 1.0, "mu": 0.3},
+        "model": {"bilinear": {"K": 1e6}},
+    }
+    result = impact.sweep(source)
+    assert result["friction_status"].values.tolist() == [[1], [18]]
+
+
+def test_a_setting_of_frictions_leaves_the_tables_of_other_laws() -> None:
+    source = {
+        "models": "hertz",
+        "frictions": ["coulomb-1785", "cundall-strack-1979"],
+        "sweep": {"e": 0.8, "m1": 1.0, "m2": 1.0, "K": 1e6, "v1": 2.0, "u1": 1.0, "mu": 0.3},
+        "friction": {"cundall-strack-1979": {"k_t": [1e5, 1e6]}},
+    }
+    read = read_config(source, ["frictions=coulomb-1785"])
+    assert [law.key for law in read.frictions] == ["coulomb-1785"]
+    assert not read.axes
+
+
+def test_a_restitution_of_the_speed_varies_with_speed_and_angle() -> None:
+    sweep = {"e": None, "alpha": 0.05, "v1": None, "u1": None, "speed": [2.0, 3.0], "angle": ["0 deg", "60 deg"]}
+    read = {name: value for name, value in {"m1": 1.0, "m2": 1.0, "K": 1e6, "mu": 0.3, **sweep}.items() if value}
+    result = impact.sweep({"models": "hertz", "frictions": "coulomb-1785", "sweep": read})
+    assert result["e"].dims == ("speed", "angle")
+    assert result["e"].values == pytest.approx(np.array([[0.9, 0.95], [0.85, 0.925]]), rel=1e-12)
+
+
+@pytest.mark.parametrize(
     ("name", "text", "value"),
     [
         ("angle", "30 deg", math.pi / 6.0),
         ("angle", "0.5 rad", 0.5),
         ("omega1", "600 rpm", 20.0 * math.pi),
         ("omega1", "-90 deg/s", -0.5 * math.pi),
+        ("omega1", "10 rev/s", 20.0 * math.pi),
+        ("omega1", "-3 rev/min", -0.1 * math.pi),
         ("u1", "36 km/h", 10.0),
         ("mu", "30 %", 0.3),
     ],

@@ -58,8 +58,8 @@ def complete_input(context: typer.Context, incomplete: str) -> list[str]:
 
 
 def complete_unknown(context: typer.Context, incomplete: str) -> list[str]:
-    """What `impact solve` solves for: the parameters of the model, K and e."""
-    return _beginning_with(incomplete, [*_parameters(context), "K", "e"])
+    """What `impact solve` solves for: the parameters of the model and of the friction law, K, e and mu."""
+    return _beginning_with(incomplete, [*_parameters(context), "K", "e", "mu"])
 
 
 def complete_output(incomplete: str) -> list[str]:
@@ -89,13 +89,13 @@ def complete_setting(incomplete: str) -> list[str]:
     from ..config.quantities import Table
     from ..config.tables import Data, Design, Document, Output, Solver, Sweep
 
-    keys = ["title", "models"]
+    keys = ["title", "models", "frictions"]
     described: dict[str, type[Table]] = {"sweep": Sweep, "design": Design, "data": Data}
     for name, table in described.items():
         keys += [f"{name}.{key}" for key in table.model_fields]
     for name, settings in {"solver": Solver, "output": Output}.items():
         keys += [f"{name}.{field.name}" for field in fields(settings)]
-    tables = [f"{name}." for name in ("materials", "model") if name in Document.model_fields]
+    tables = [f"{name}." for name in ("materials", "model", "friction") if name in Document.model_fields]
     return _beginning_with(incomplete, [*(f"{key}=" for key in keys), *tables])
 
 

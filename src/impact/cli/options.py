@@ -35,6 +35,15 @@ AtOption = Annotated[
 ModelKeyOption = Annotated[
     str, typer.Option("--model", metavar="KEY", autocompletion=complete_model, help="The model.")
 ]
+FrictionKeyOption = Annotated[
+    str | None,
+    typer.Option(
+        "--friction",
+        metavar="KEY",
+        autocompletion=complete_friction,
+        help="The friction law. \\[default: the first of the source, if it has any]",
+    ),
+]
 OutputOption = Annotated[Path, typer.Option("-o", "--output", help="The result file.")]
 OverwriteOption = Annotated[bool, typer.Option("--overwrite", help="Replace the output if it exists.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON on stdout.")]

@@ -9,8 +9,9 @@ import typer
 import impact
 
 from ..display import show
-from .options import JsonOption, ModelOption, ResultArgument, SelectOption
-from .parsing import parse_number
+from .completion import complete_target
+from .options import FrictionOption, JsonOption, ModelOption, ResultArgument, SelectOption
+from .parsing import Target, parse_number, parse_target
 
 
 def recommend(
@@ -18,14 +19,38 @@ def recommend(
     tol: Annotated[
         float,
         typer.Option(
-            "--tol", metavar="VALUE", parser=parse_number, help="Largest accepted |e_out − e|, such as 0.02 or 2%."
+            "--tol",
+            metavar="VALUE",
+            parser=parse_number,
+            help="Largest accepted |e_out − e|, or distance from the target, such as 0.02 or 2%.",
         ),
     ] = 0.01,
+    target: Annotated[
+        Target | None,
+        typer.Option(
+            "--target",
+            metavar="NAME=VALUE",
+            parser=parse_target,
+            autocompletion=complete_target,
+            help="The wanted output, such as beta=0.4. \\[default: e_out, compared with e]",
+        ),
+    ] = None,
     sel: SelectOption = None,
     model: ModelOption = None,
+    friction: FrictionOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Rank the models of a result by the error of their restitution over the swept range."""
+    """Rank the models of a result by the error of their restitution over the swept range.
 
-    ranking = impact.recommend(impact.load(result), tol=tol, sel=dict(sel or ()), models=model)
+    With --target, rank them, or their pairs with friction laws, by the distance of an output from it.
+    """
+
+    ranking = impact.recommend(
+        impact.load(result),
+        tol=tol,
+        sel=dict(sel or ()),
+        models=model,
+        target=dict([target]) if target else None,
+        frictions=friction,
+    )
     show(ranking, as_json=as_json)

@@ -14,7 +14,15 @@ from ..display import show
 from ..errors import UsageError
 from . import exits
 from .completion import complete_model
-from .options import AtOption, JsonOption, OverwriteOption, PluginOption, SetOption, SourceArgument
+from .options import (
+    AtOption,
+    FrictionKeyOption,
+    JsonOption,
+    OverwriteOption,
+    PluginOption,
+    SetOption,
+    SourceArgument,
+)
 from .parsing import parse_whole_number
 
 # files of a time history: netCDF-4, which is HDF5, and a table
@@ -32,6 +40,7 @@ def run(
             help="The model. \\[default: the first of the source]",
         ),
     ] = None,
+    friction: FrictionKeyOption = None,
     at: AtOption = None,
     sets: SetOption = None,
     plugins: PluginOption = None,
@@ -64,7 +73,13 @@ def run(
             expected = f"expected a name that ends in {', '.join(most)} or {last}"
             raise UsageError(f"--history {history}: {expected}")
     result = impact.run(
-        source, model=model, at=dict(at or ()), overrides=sets or (), plugins=plugins or (), times=times
+        source,
+        model=model,
+        friction=friction,
+        at=dict(at or ()),
+        overrides=sets or (),
+        plugins=plugins or (),
+        times=times,
     )
     show(result, as_json=as_json)
     if result.failed:

@@ -10,7 +10,15 @@ import impact
 
 from ..display import show
 from .completion import complete_input, complete_target, complete_unknown
-from .options import AtOption, JsonOption, ModelKeyOption, PluginOption, SetOption, SourceArgument
+from .options import (
+    AtOption,
+    FrictionKeyOption,
+    JsonOption,
+    ModelKeyOption,
+    PluginOption,
+    SetOption,
+    SourceArgument,
+)
 from .parsing import InputRange, Target, parse_range, parse_target
 
 
@@ -22,7 +30,7 @@ def solve(
             "--for",
             metavar="PARAMETER",
             autocompletion=complete_unknown,
-            help="What to solve for: a parameter of the model, e to ask for, or K.",
+            help="What to solve for: a parameter of the model or of the friction law, e to ask for, K, or mu.",
         ),
     ],
     target: Annotated[
@@ -32,10 +40,11 @@ def solve(
             metavar="NAME=VALUE",
             parser=parse_target,
             autocompletion=complete_target,
-            help="The wanted output, such as e_out=0.6.",
+            help="The wanted output, such as e_out=0.6 or beta=0.4.",
         ),
     ],
     source: SourceArgument = None,
+    friction: FrictionKeyOption = None,
     at: AtOption = None,
     over: Annotated[
         InputRange | None,
@@ -51,7 +60,7 @@ def solve(
     plugins: PluginOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Find the value of a parameter, of K, or of the e to ask for, that gives a wanted output.
+    """Find the value of a parameter, of K, of mu, or of the e to ask for, that gives a wanted output.
 
     All values that give the target are printed, or the range that can be attained.
 
@@ -61,6 +70,7 @@ def solve(
         model,
         name,
         dict([target]),
+        friction=friction,
         source=source,
         at=dict(at or ()),
         over=dict([over]) if over else None,

@@ -81,17 +81,19 @@ def bless(
 
 def _check_no_failures(result: xr.Dataset, path: Path) -> None:
     """Refuse a result with failed points, since later failures would equal their NaNs."""
-    summary = summarize(result[["status"]] if "status" in result else result)
+    names = [name for name in ("status", "friction_status") if name in result]
+    summary = summarize(result[names] if names else result)
     if summary.not_counted:
         count = f"{summary.not_counted:,} points are too many to look for failures"
         raise UsageError(f"{path}: {count}; expected fewer, or --allow-failed")
     if summary.failed:
-        status, model, indices = summary.failed_at[0]
-        point = result["status"].isel(dict(zip(result["status"].dims, (model, *indices), strict=True)))
-        place = describe_point(inputs_of_model({str(dim): point[dim].item() for dim in result["status"].dims}))
         count = f"{summary.failed:,} of {summary.points:,} points failed"
-        first = f"the first at {place} ({status.name.lower()})"
-        raise UsageError(f"{path}: {count}, {first}; expected none, or --allow-failed")
+        first = ""
+        for name, status, laws, indices in summary.first_failed[:1]:
+            point = result[name].isel(dict(zip(result[name].dims, (*laws, *indices), strict=True)))
+            at = inputs_of_model({str(dim): point[dim].item() for dim in result[name].dims})
+            first = f", the first at {describe_point(at)} ({status.name.lower()})"
+        raise UsageError(f"{path}: {count}{first}; expected none, or --allow-failed")
 
 
 def _load_baseline(baseline: Path) -> xr.Dataset | None:

@@ -102,6 +102,10 @@ def _read_cell(
         raise mismatch_error(None, "the name of a material" if quantity is None else quantity.expected)
     if quantity is None:
         return str(cell)
+    if quantity.words:
+        # the config holds the word
+        quantity.read(cell)
+        return str(cell)
     number = cell
     if is_text and isinstance(cell, str):
         try:

@@ -110,7 +110,8 @@ def draw_columns(
         quantity = InputName.parse(name).quantity(models)
         assert quantity is not None
         above = drawn > quantity.least if quantity.above else drawn >= quantity.least
-        refused = drawn[~(above & (drawn <= quantity.most) & np.isfinite(drawn))]
+        below = drawn < quantity.most if quantity.below else drawn <= quantity.most
+        refused = drawn[~(above & below & np.isfinite(drawn))]
         if refused.size:
             got = f"{refused.size:,} of {drawn.size:,} samples such as {as_text(float(refused[0]))}"
             problems[name] = f"got {got}, expected a distribution whose values are each {quantity.expected}"

@@ -190,10 +190,12 @@ class Draft:
         return ConfigError(*lines, *self.lines)
 
     def _written_path(self, path: KeyPath) -> KeyPath:
-        """Find the path in the source of a path that may be a column of cases."""
+        """Find the path in the source of a path that may be a column of cases or of measurements."""
+        measured = self.measurements.inputs if self.measurements is not None else ()
+        columns = {InputName.parse(name).path: ("data", "columns", name) for name in measured} | dict(self.cases)
         for end in range(len(path), 0, -1):
-            if path[:end] in self.cases:
-                return (*self.cases[path[:end]], *path[end:])
+            if path[:end] in columns:
+                return (*columns[path[:end]], *path[end:])
         return path
 
     def _locate(self, path: KeyPath, key_line: Mapping[KeyPath, int]) -> tuple[tuple[int, int], str]:

@@ -107,13 +107,12 @@ def build_grid(
         problems.append((("sweep",), f"got {size}, expected at most {limit:,} points{hint}"))
     columns: dict[str, AxisValues] = {}
     for name in axis_names:
-        value = values[name]
+        value, quantity = values[name], InputName.parse(name).quantity(draft.known_models)
         if isinstance(value, tuple):
             columns[name] = value
             if name not in member_of:
-                problems += _repetition_problems(name, value)
+                problems += _repetition_problems(name, value, quantity.words if quantity else ())
         elif isinstance(value, Range) and points <= limit:
-            quantity = InputName.parse(name).quantity(draft.known_models)
             assert quantity is not None
             try:
                 columns[name] = value.values(quantity)
@@ -214,12 +213,13 @@ def _zip_groups(
     return member_of, problems
 
 
-def _repetition_problems(name: str, values: AxisValues) -> list[ConfigProblem]:
+def _repetition_problems(name: str, values: AxisValues, words: Sequence[str]) -> list[ConfigProblem]:
     """Report the first value of a list that occurs twice."""
     seen: set[object] = set()
     for index, value in enumerate(values):
         if value in seen:
             path: KeyPath = (*InputName.parse(name).path, index)
-            return [(path, f"got {as_text(value)} twice, expected each value once")]
+            word = words[int(value)] if words and isinstance(value, float) else value
+            return [(path, f"got {as_text(word)} twice, expected each value once")]
         seen.add(value)
     return []

@@ -88,6 +88,16 @@ class InputName:
             return MATERIAL_QUANTITIES[self.key]
         return None if self.key in MATERIAL_KEYS else SWEEP_QUANTITIES[self.key]
 
+    def word(self, value: float | str) -> float | str:
+        """Find the word that a number stands for, of a parameter that is a word; otherwise return the value.
+
+        >>> InputName.parse("friction.coulomb-1785.limit").word(1.0), InputName.parse("v1").word(1.0)
+        ('positive', 1.0)
+        """
+        law = frictions().get(self.friction)
+        words = next((p.choices for p in law.parameters if p.name == self.key), ()) if law else ()
+        return words[int(value)] if value in range(len(words)) else value
+
     def unknown_message(self, models: Mapping[str, ForceModel]) -> str:
         """Describe an input that does not exist, with the nearest name."""
         name, names = str(self), [*SWEEP_INPUTS]

@@ -55,6 +55,13 @@ KEY_SYNONYMS = {
     "poisson": "nu",
     "poissons_ratio": "nu",
     "density": "rho",
+    "friction": "mu",
+    "friction_coefficient": "mu",
+    "impact_angle": "angle",
+    "spin1": "omega1",
+    "spin2": "omega2",
+    "tangential_velocity1": "u1",
+    "tangential_velocity2": "u2",
 }
 
 BARE_KEY = r"[A-Za-z0-9_-]++"

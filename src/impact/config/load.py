@@ -136,7 +136,9 @@ def build(draft: Draft, max_points: int = MAX_POINTS, purpose: Purpose = "sweep"
     if not draft.problems:
         draft = draft.with_problems(_settings_problems(document, grid.axes, draft))
     if not draft.problems and draft.measurements is not None:
-        draft = draft.with_problems(measurements.count_problems(draft.measurements, fits, draft.models))
+        draft = draft.with_problems(
+            measurements.count_problems(draft.measurements, fits, draft.models, draft.frictions)
+        )
     if draft.problems or draft.lines:
         raise draft.error()
     measured = draft.measurements.inputs if draft.measurements is not None else {}

@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 from pydantic_core import PydanticCustomError
 
+from ..contact.friction import FrictionLaw
 from ..contact.model import ForceModel, with_base_quantities
 from ..contact.variables import OUTPUTS
 from ..errors import ConfigError, did_you_mean
@@ -146,6 +147,8 @@ def _column_of(header: str, outputs: Sequence[str], models: Mapping[str, ForceMo
         raise value_error(f"no such input or output; {did_you_mean(header, choices)}") from None
     if quantity is None:
         raise value_error("got names of materials, expected numbers; all points have the materials of [sweep]")
+    if quantity.words:
+        raise value_error(f"got words, expected numbers; all points have one {name.key}")
     return _Column("input", str(name), replace(quantity, infinite=False))
 
 
@@ -232,6 +235,12 @@ def read_measurements(draft: Draft) -> Draft:
         else:
             sigma[first], sigma_problems = _read_sigma(table["sigma"], first, n_points)
             problems += sigma_problems
+    if "frictions" not in draft.data:
+        expected = 'expected frictions as well, such as frictions = ["coulomb-1785"]'
+        of_friction = [name for name in outputs if OUTPUTS[name].of_friction]
+        problems += [
+            (("data",), f"got a measured {name} without a friction law, {expected}") for name in of_friction
+        ]
     noise = table.get("noise", "excess" if specimens else "given" if sigma else "scale")
     loss = table.get("loss", "linear")
     problems += _noise_problems(noise, list(outputs), list(sigma), specimens)
@@ -292,29 +301,38 @@ def _noise_problems(
     return []
 
 
-def fitted_parameters(fits: Mapping[str, tuple[float, float]], model: ForceModel) -> tuple[str, ...]:
-    """List the names of the fitted parameters that a law has."""
+def fitted_parameters(
+    fits: Mapping[str, tuple[float, float]], model: ForceModel, friction: FrictionLaw | None = None
+) -> tuple[str, ...]:
+    """List the names of the fitted parameters that a law has, or its pair with a friction law."""
     used = with_base_quantities(model.quantities)
 
     def is_used(name: str) -> bool:
         if name in ("e", "alpha"):
-            return "e" in used
+            return "e" in used or (friction is not None and friction.may_use_e)
         if name == "n":
             return model.exponent is None
         input_name = InputName.parse(name)
         if input_name.key == "yield_strength":
             return bool(used & {"yield_strength1", "yield_strength2"})
-        return input_name.applies_to(model.key)
+        return input_name.applies_to(model.key, friction.key if friction else "")
 
     return tuple(filter(is_used, fits))
 
 
 def count_problems(
-    measurements: Measurements, fits: Mapping[str, tuple[float, float]], models: Sequence[ForceModel]
+    measurements: Measurements,
+    fits: Mapping[str, tuple[float, float]],
+    models: Sequence[ForceModel],
+    frictions: Sequence[FrictionLaw] = (),
 ) -> list[ConfigProblem]:
     """Check that there are as many measured values as parameters of a law."""
     n_values = len(measurements.lines) * len(measurements.outputs)
-    counts = {model.key: len(fitted_parameters(fits, model)) for model in models}
+    counts = {
+        " with ".join(law.key for law in (model, friction) if law): len(fitted_parameters(fits, model, friction))
+        for model in models
+        for friction in frictions or (None,)
+    }
     key = max(counts, key=lambda name: counts[name])
     if counts[key] <= n_values:
         return []

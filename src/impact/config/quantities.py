@@ -434,10 +434,13 @@ class Quantity:
     above: bool = False  # the interval excludes `least`
     infinite: bool = False  # inf is allowed
     below: bool = False  # the interval excludes `most`
+    words: tuple[str, ...] = ()  # it is one of these, and its number the position
 
     @property
     def expected(self) -> str:
         """The allowed values in words, such as "a number > 0 kg, or inf"."""
+        if self.words:
+            return " or ".join(f'"{word}"' for word in self.words)
         unit = "" if self.unit == "1" else f" {self.unit}"
         low, high = f"{'>' if self.above else '>='} {self.least:g}", f"<= {self.most:g}"
         match math.isfinite(self.least), math.isfinite(self.most):
@@ -465,9 +468,17 @@ class Quantity:
         return above and (value < self.most if self.below else value <= self.most)
 
     def refusal(self, value: object, number: float) -> str:
-        """Say what is wrong with a number that is not allowed; a bare one that may be an angle in degrees."""
-        if self.unit == "rad" and not isinstance(value, str) and 0.0 < number < math.degrees(self.most):
-            return f'got {number:g} rad; did you mean "{number:g} deg"?'
+        """Say what is wrong with a number that is not allowed; one of radians may be an angle in degrees."""
+        is_bare = not isinstance(value, str)
+        if (
+            self.unit == "rad"
+            and math.isfinite(number)
+            and (is_bare or re.fullmatch(r"[^a-zA-Z]+rad\s*", str(value)))
+        ):
+            # between pi/2 and pi only whole numbers seem to be degrees
+            if 0.0 < number < math.degrees(self.most) and (number > math.pi or number.is_integer()):
+                return f'got {number:.15g} rad; did you mean "{number:.15g} deg"?'
+            return f"got {number:.15g} rad, expected {self.expected}"
         return f"got {as_text(value)}, expected {self.expected}"
 
     @property
@@ -495,6 +506,10 @@ class Quantity:
         >>> Quantity("Pa", "Young's modulus", least=0, above=True).read("56 GPa")
         56000000000.0
         """
+        if self.words:
+            if value not in self.words:
+                raise mismatch_error(value, self.expected)
+            return float(self.words.index(str(value)))
         if type(value) is float and self.least < value < self.most:
             return value + 0.0
         if isinstance(value, str):
@@ -537,18 +552,17 @@ class Quantity:
         of_n = f" with n = {n:g}" if self.exponents and n is not None else ""
         expected_unit = "a bare number" if self.unit == "1" else f"a unit of {self.unit}{of_n}{self._example}"
         scale = _si_scale(unit)
-        if self.unit == "rad/s" and "Hz" in unit:
-            raise UnitError(
-                'a unit of rad/s, such as "1 rpm" or "1 rad/s": turns and radians per second are both Hz'
-            )
         if scale is None:
             raise UnitError(f'{expected_unit}; "{unit}" is not a known unit')
-        factor, powers = scale
+        factor, powers, angle = scale
         if self.exponents and n is not None and math.isnan(n):
             return factor
         own_powers = map(float, dimension(self.unit, {} if n is None else {"n": n}))
         if powers is None or any(abs(a - b) > 1e-9 for a, b in zip(powers, own_powers, strict=True)):
             raise UnitError(expected_unit)
+        if angle != self.unit.startswith("rad"):
+            is_spin = self.unit == "rad/s"
+            raise UnitError(expected_unit + "; 1/s may be turns or radians per second" * is_spin)
         return factor
 
 
@@ -688,12 +702,17 @@ def _float_or_inf(convert: Callable[[], float]) -> float:
 def _unit_registry() -> Any:
     import pint
 
-    return pint.UnitRegistry(non_int_type=Fraction)
+    registry: Any = pint.UnitRegistry(non_int_type=Fraction)
+    registry.define("@alias turn = rev")
+    return registry
 
 
 @lru_cache(maxsize=256)
-def _si_scale(unit: str) -> tuple[Fraction | float, tuple[float, float, float] | None] | None:
-    """Find the factor to SI and the powers of mass, length and time, or None for another dimension or unit."""
+def _si_scale(unit: str) -> tuple[Fraction | float, tuple[float, float, float] | None, float] | None:
+    """Find the factor to SI, the powers of mass, length and time (None for another dimension), and of angle.
+
+    It is None for an unknown unit.
+    """
     if len(unit) > MAX_UNIT_LENGTH or UNIT_SYNTAX.fullmatch(unit) is None:
         return None
     # kg/m3 and kg m-3 are common spellings that pint does not accept
@@ -703,11 +722,13 @@ def _si_scale(unit: str) -> tuple[Fraction | float, tuple[float, float, float] |
     try:
         parsed = registry.parse_units(("1" if unit.startswith("/") else "") + unit)
         # units with an offset and logarithmic units have no factor
-        if registry.Quantity(Fraction(0), parsed).to_base_units().magnitude != 0:
+        zero = registry.Quantity(Fraction(0), parsed).to_base_units()
+        if zero.magnitude != 0:
             return None
+        angle = float(dict(zero.unit_items()).get("radian", 0.0))
         factor, _ = registry.get_base_units(parsed)
         powers = {str(dimension_name): float(power) for dimension_name, power in parsed.dimensionality.items()}
     except Exception:
         return None
     mass, length, time = (powers.pop(name, 0.0) for name in ("[mass]", "[length]", "[time]"))
-    return factor, None if powers else (mass, length, time)
+    return factor, None if powers else (mass, length, time), angle

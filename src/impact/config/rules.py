@@ -3,19 +3,30 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+
+from pydantic_core import PydanticCustomError
 
 from ..contact.dimensionless import required_quantities
 from ..contact.fixed_step import EXACT, SCHEMES, has_scheme, law_problem
 from ..contact.formula_calls import argument_names
-from ..contact.friction import parameter_problem, required_inputs
+from ..contact.friction import HERTZ, FrictionLaw, parameter_problem, required_inputs
+from ..contact.frictions import frictions
 from ..contact.materials import hertz_stiffness
 from ..contact.model import ForceModel, with_base_quantities
 from .draft import Draft, listed_names
 from .files import as_table
+from .input_names import InputName
 from .quantities import ConfigProblem, Quantity, as_text
-from .tables import FIXED_STEP_INPUTS, MATERIAL_QUANTITIES, OBLIQUE_INPUTS, SWEEP_QUANTITIES, law_quantities
+from .tables import (
+    FIXED_STEP_INPUTS,
+    MATERIAL_QUANTITIES,
+    OBLIQUE_INPUTS,
+    SWEEP_DEFAULTS,
+    SWEEP_QUANTITIES,
+    law_quantities,
+)
 
 
 def _sets_stiffness(draft: Draft, model: ForceModel) -> bool:
@@ -55,6 +66,32 @@ def _exclusion_hint(draft: Draft, model: ForceModel) -> str:
     return "" if is_named or len(draft.models) == 1 else f'; or models = [..., "!{model.key}"]'
 
 
+def _vary_together(draft: Draft, *names: str) -> bool:
+    """Whether inputs of [sweep] are members of one zip group, of the cases or of the measurements."""
+    zipped = draft.table("sweep").get("zip")
+    groups: list[Iterable[object]] = (
+        [group for group in zipped if isinstance(group, list)] if isinstance(zipped, list) else []
+    )
+    groups.append([str(InputName.of_path(path)) for path in draft.cases])
+    groups.append(draft.table("sweep").get("cases") or [])
+    groups.append(draft.measurements.inputs if draft.measurements is not None else [])
+    return any(set(names) <= set(filter(lambda name: isinstance(name, str), group)) for group in groups)
+
+
+def _numbers(draft: Draft, name: str) -> Sequence[float]:
+    """List the numbers of an input of [sweep]: none if it is missing, NaN for those that are not listed."""
+    if draft.measurements is not None and name in draft.measurements.inputs:
+        return draft.measurements.inputs[name]
+    value = draft.table("sweep").get(name, [])
+    numbers = []
+    for element in value if isinstance(value, list) else [value]:
+        try:
+            numbers.append(SWEEP_QUANTITIES[name].read(element))
+        except PydanticCustomError:
+            numbers.append(math.nan)
+    return numbers
+
+
 def check_rules(draft: Draft) -> Draft:
     """Add the problems of all rules."""
     if not isinstance(draft.data.get("sweep"), dict):
@@ -90,12 +127,9 @@ def _stiffness_problems(draft: Draft) -> Iterable[ConfigProblem]:
     sweep, n = draft.table("sweep"), draft.exponent
     if "K" not in sweep or (n is not None and math.isnan(n)):
         return
-    groups = sweep.get("zip")
-    together = [group for group in groups if isinstance(group, list)] if isinstance(groups, list) else []
-    together.append(sweep.get("cases") or [])
     value = sweep.get("n")
     is_axis = isinstance(value, list) or (isinstance(value, dict) and "fit" not in value)
-    if is_axis and not any("K" in group and "n" in group for group in together):
+    if is_axis and not _vary_together(draft, "K", "n"):
         yield (
             ("sweep", "K"),
             "its unit N/m^n depends on n, which is an axis; expected one K for each n, zipped with it",
@@ -233,7 +267,7 @@ def _oblique_problems(draft: Draft) -> Iterable[ConfigProblem]:
             if other in sweep and not (other == "u1" and {"angle", "speed"} <= sweep.keys() and name == "speed"):
                 yield ("sweep", other), f"set together with {name}, expected one of the two"
     integrator = draft.table("solver").get("integrator", EXACT)
-    if integrator != EXACT:
+    if integrator in SCHEMES:
         message = f'got {as_text(integrator)}, expected "{EXACT}" with frictions, which have no fixed step'
         yield ("solver", "integrator"), message
 
@@ -242,30 +276,38 @@ def _spin_problems(draft: Draft) -> Iterable[ConfigProblem]:
     """Check that a ball with a spin has a radius, and is neither a wall nor a plane."""
     sweep = draft.table("sweep")
     for ball in ("1", "2"):
-        spin = sweep.get(f"omega{ball}")
-        if spin is None or spin in (0, 0.0):
+        spin, mass, radius = (f"{name}{ball}" for name in ("omega", "m", "R"))
+        spins = _numbers(draft, spin)
+        if not any(spins):
             continue
-        bodies = ((f"m{ball}", "wall"), (f"R{ball}", "plane"))
-        body = next((body for name, body in bodies if sweep.get(name) in (math.inf, "inf")), "")
-        if body:
-            yield ("sweep", f"omega{ball}"), f"got the spin of a {body}, which does not turn, expected none"
+        bodies = [body for name, body in ((mass, "wall"), (radius, "plane")) if _is_turning(draft, spin, name)]
+        if bodies:
+            message = f"got the spin of a {bodies[0]}, which does not turn, expected none"
+            yield ("sweep", spin), message
             continue
-        has_material = bool({"material", f"material{ball}"} & sweep.keys()) and f"m{ball}" in sweep
+        has_material = bool({"material", f"material{ball}"} & sweep.keys()) and mass in sweep
         without_density = list(_materials_without(draft, ball, "rho")) if has_material else []
-        if f"R{ball}" not in sweep and (not has_material or without_density):
-            message = f"{_missing(SWEEP_QUANTITIES[f'R{ball}'])}, which its spin needs; or a material with rho"
-            yield ("sweep", f"R{ball}"), message
+        if radius not in sweep and (not has_material or without_density):
+            message = f"{_missing(SWEEP_QUANTITIES[radius])}, which its spin needs; or a material with rho"
+            yield ("sweep", radius), message
+
+
+def _is_turning(draft: Draft, spin: str, size: str) -> bool:
+    """Whether a ball has a spin where its mass or its radius is infinite."""
+    spins, sizes = _numbers(draft, spin), _numbers(draft, size)
+    if len(spins) == len(sizes) and _vary_together(draft, spin, size):
+        return any(omega and math.isinf(value) for omega, value in zip(spins, sizes, strict=True))
+    return any(map(math.isinf, sizes))
 
 
 def _friction_problems(draft: Draft) -> Iterable[ConfigProblem]:
     """Check the parameters of friction laws, and the inputs that they need."""
     sweep = draft.table("sweep")
-    exponents = {model.exponent or draft.exponent or math.nan for model in draft.models}
-    has_stiffness = "K" in sweep or any(_sets_stiffness(draft, model) for model in draft.models)
+    exponents = {n for model in draft.models for n in _exponents(draft, model)}
     has_material = "material" in sweep or {"material1", "material2"} <= sweep.keys()
     for law in draft.frictions:
         given = as_table(draft.table("friction").get(law.key)).keys()
-        problem = parameter_problem(law, given, n=min(exponents, default=None), has_stiffness=has_stiffness)
+        problem = _tangential_stiffness_problem(draft, law)
         if problem:
             name, _, message = problem.partition(": ")
             yield ("friction", law.key, name), message
@@ -277,6 +319,32 @@ def _friction_problems(draft: Draft) -> Iterable[ConfigProblem]:
             yield ("sweep", "e"), f"missing, expected e or alpha (used by {law.key}), or other frictions"
         if "E1" in needed and not has_material and not problem:
             yield ("sweep", "material"), f"missing, expected a material of [materials] (used by {law.key})"
+    selected = {law.key for law in draft.frictions}
+    # a setting that selects other friction laws does not have to remove the tables of the config
+    others = [] if not selected or ("frictions",) in draft.origins else draft.table("friction").keys() - selected
+    for key in sorted(others & frictions().keys()):
+        yield ("friction", key), "set for a friction law that is not among frictions, expected it there as well"
+
+
+def _exponents(draft: Draft, model: ForceModel) -> Sequence[float]:
+    """List the exponents n of a model, NaN for those that are not listed."""
+    if model.exponent is not None:
+        return (model.exponent,)
+    return _numbers(draft, "n") or (SWEEP_DEFAULTS["n"],)
+
+
+def _tangential_stiffness_problem(draft: Draft, law: FrictionLaw) -> str:
+    """Name what is wrong with the tangential stiffness of a friction law with any of the models, or return ""."""
+    given = as_table(draft.table("friction").get(law.key)).keys()
+    for model in draft.models:
+        has_stiffness = "K" in draft.table("sweep") or _sets_stiffness(draft, model)
+        for n in _exponents(draft, model):
+            # 8 G* a is of n = 3/2: other pairs have no values, which the sweep notes
+            is_combinable = law.stiffness != "mindlin" or n == HERTZ
+            problem = parameter_problem(law, given, n=n, has_stiffness=has_stiffness and is_combinable)
+            if problem:
+                return problem
+    return ""
 
 
 def _stiffness_arguments(model: ForceModel) -> frozenset[str]:

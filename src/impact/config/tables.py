@@ -327,40 +327,41 @@ def law_quantities(law: ForceModel | FrictionLaw) -> dict[str, Quantity]:
     """List the quantities of [model.KEY] or [friction.KEY]: the parameters, and K of a model with its own n."""
     has_own_n = isinstance(law, ForceModel) and law.exponent is not None
     return ({"K": LAW_STIFFNESS} if has_own_n else {}) | {
-        parameter.name: Quantity(parameter.unit, parameter.meaning, parameter.least, parameter.most)
+        parameter.name: Quantity(
+            parameter.unit, parameter.meaning, parameter.least, parameter.most, words=parameter.choices
+        )
         for parameter in law.parameters
     }
 
 
 def parameter_table(law: ForceModel | FrictionLaw) -> type[Table]:
     """Create the type of [model.KEY] or [friction.KEY]; keys are aliases, as not every name can name a field."""
-    parameters = {parameter.name: parameter for parameter in law.parameters}
+    defaults = {parameter.name: parameter.default for parameter in law.parameters}
     fields: dict[str, Any] = {}
     for index, (name, quantity) in enumerate(law_quantities(law).items()):
-        parameter = parameters.get(name)
-        words = parameter.choices if parameter else ()
-        kind = Annotated[Any, _words(words, quantity.meaning)] if words else Annotated[Numbers | None, quantity]
-        default = parameter.default if parameter else None
-        fields[f"field_{index}"] = (Annotated[kind, Field(alias=name)], default)
+        kind = Annotated[Any, _words(quantity)] if quantity.words else Annotated[Numbers | None, quantity]
+        fields[f"field_{index}"] = (Annotated[kind, Field(alias=name)], defaults.get(name))
     # a contact force and a friction law may have one key
     name = law.key if isinstance(law, ForceModel) else f"friction_{law.key}"
     return create_model(name, __base__=Table, **fields)
 
 
-def _words(words: tuple[str, ...], meaning: str) -> Any:
+def _words(quantity: Quantity) -> Any:
     """Build the type of a word, or a list of words, whose value is the position of the word."""
-    either = " or ".join(f'"{word}"' for word in words)
-
-    def position(value: object) -> float:
-        if not isinstance(value, str) or value not in words:
-            raise mismatch_error(value, either)
-        return float(words.index(value))
 
     def read(value: object) -> float | tuple[float, ...]:
-        return tuple(map(position, value)) if isinstance(value, list) and value else position(value)
+        if not isinstance(value, list) or not value:
+            return quantity.read(value)
+        wrong = [(index, word) for index, word in enumerate(value) if word not in quantity.words]
+        if wrong:
+            raise located_errors(
+                ((index,), mismatch_error(word, quantity.expected).message())
+                for index, word in wrong[:MAX_PROBLEMS]
+            )
+        return tuple(map(quantity.read, value))
 
-    word: Any = Literal[words]
-    schema = Annotated[word | Annotated[list[word], Field(min_length=1)], Field(description=meaning)]
+    word: Any = Literal[quantity.words]
+    schema = Annotated[word | Annotated[list[word], Field(min_length=1)], Field(description=quantity.meaning)]
     return PlainValidator(read, json_schema_input_type=schema)
 
 

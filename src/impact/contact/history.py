@@ -7,18 +7,24 @@ points, independently of the quadratures of the integrator, and give the restitu
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..array_types import Array
 from ..ode.problem import Params, Problem, Step
 from . import motion
 from .dimensionless import dimensionless_values, with_coefficients, with_units
+from .friction import Pair, friction_values
 from .impacts import Impacts
 from .model import ForceModel
+from .rigid import ObliqueImpacts
 from .simulate import integrate_phases
+from .slip_motion import LEAST_S, SLIP_ROW, TIME_ROW, SlipPhase
 from .status import Status
+from .tangential import LIMIT_POSITIVE, record_friction, simulate_friction
 from .velocity_coordinates import is_strong
 
 # points at which a step is sampled, and Gauss points by which it is integrated
@@ -53,12 +59,26 @@ class History:
     e_energetic: float
 
 
+@dataclass(frozen=True)
+class SlipHistory:
+    """The slip [m/s] and the friction force on ball 2 [N] over the times of a `History`, arrays of shape (k,).
+
+    `mode` is 0 while the contact sticks, and the sign of the friction force while it slides; 2 or -2 where the
+    force of the spring follows its limit without sliding.
+    """
+
+    slip: Array
+    f: Array
+    mode: NDArray[np.int8]
+
+
 def integrate_history(
-    model: ForceModel, impacts: Impacts, *, rtol: float, max_steps: int, times: int | None = None
+    model: ForceModel, impacts: Impacts, *, rtol: float, max_steps: int, times: int | Array | None = None
 ) -> History | None:
     """Integrate one impact (a batch of length one); None if the balls miss, or the result is a limit.
 
-    `times` is the number of uniform points in time; by default there are SAMPLES_PER_STEP per step.
+    `times` is the number of uniform points in time, or increasing times in the contact's own unit; by default
+    there are SAMPLES_PER_STEP per step.
     """
     n = float(impacts.n[0])
     with np.errstate(all="ignore"):
@@ -71,7 +91,7 @@ def integrate_history(
     peak_time, duration = (float(phase.state[2, 0]) for phase in (collision.approach, collision.restitution))
     approach_times = restitution_times = None
     if times is not None:
-        uniform = np.linspace(0.0, peak_time + duration, times)
+        uniform = np.linspace(0.0, peak_time + duration, times) if isinstance(times, int) else times
         approach_times = uniform[uniform <= peak_time]
         restitution_times = np.minimum(uniform[uniform > peak_time] - peak_time, duration)
     approach = _phase(law, motion.approach_problem(law), collision.approach.recorded, params, approach_times)
@@ -117,6 +137,82 @@ def integrate_history(
     )
 
 
+def integrate_slip(
+    pair: Pair, oblique: ObliqueImpacts, *, rtol: float, max_steps: int, times: int | None = None
+) -> tuple[History | None, SlipHistory | None]:
+    """Integrate one oblique impact (a batch of length one): its history, and slip and friction over it.
+
+    Without `times` there are SAMPLES_PER_STEP per step of the joint motion.
+    """
+    impacts, model = oblique.impacts, pair.model
+    with np.errstate(all="ignore"):
+        values = {**dimensionless_values(model, impacts), **friction_values(pair, oblique)}
+    values = {name: np.broadcast_to(value, 1) for name, value in values.items()}
+    recorded = record_friction(pair, float(impacts.n[0]), values, rtol=rtol, max_steps=max_steps)
+    steps = [(part.phase, step) for part in recorded for step in part.steps]
+    grid = times if times is not None or not steps else _slip_times([step for _, step in steps])
+    history = integrate_history(model, impacts, rtol=rtol, max_steps=max_steps, times=grid)
+    if history is None:
+        return None, None
+    if steps:
+        return history, _slip_history(history, pair, oblique, steps)
+    status = np.full(1, Status.OK, np.int8)
+    result = simulate_friction(pair, impacts.n, values, status, rtol=rtol, max_steps=max_steps)
+    # without slip or friction nothing is integrated
+    impulse = np.nan_to_num(result.sliding_impulse).item()
+    return history, _coulomb_history(history, oblique, bool(values[LIMIT_POSITIVE][0]), impulse)
+
+
+def _slip_times(steps: Sequence[Step]) -> Array:
+    """Sample the times of joint steps in the contact's own unit."""
+    samples = zip(steps, _fractions(tuple(steps)), strict=True)
+    times: Array = np.array([step.at(theta)[TIME_ROW, 0] for step, within in samples for theta in within])
+    return np.maximum.accumulate(times)
+
+
+def _slip_history(
+    history: History, pair: Pair, oblique: ObliqueImpacts, steps: Sequence[tuple[SlipPhase, Step]]
+) -> SlipHistory:
+    """Find slip and friction of an impact over the times of its history, from the steps of the joint motion."""
+    impacts, g0 = oblique.impacts, oblique.slip.item()
+    unit_t = (impacts.length / impacts.v0).item()
+    times = history.t / unit_t
+    fractions = _fractions_at(tuple(step for _, step in steps), times, TIME_ROW)
+    rows: list[tuple[float, float, float]] = []
+    with np.errstate(all="ignore"):
+        for (phase, step), within in zip(steps, fractions, strict=True):
+            mode = phase.columns(step.params).mode.item()
+            for theta in within:
+                y = step.at(theta)
+                # at first contact smooth time stands still
+                y[0] = np.where(np.abs(y[0]) < LEAST_S, LEAST_S, y[0])
+                k = phase.rates(y[:TIME_ROW], step.params)
+                slip = y[SLIP_ROW].item()
+                rows.append((slip, -(k[SLIP_ROW] / k[TIME_ROW]).item(), mode if mode else 0.0))
+    slip, force, mode = np.array(rows).T
+    if pair.friction.kind == "regularized":
+        mode = np.sign(slip)
+    return SlipHistory(g0 * slip, oblique.m_t.item() * g0 / unit_t * force, (np.sign(g0) * mode).astype(np.int8))
+
+
+def _coulomb_history(
+    history: History, oblique: ObliqueImpacts, is_positive: bool, sliding_impulse: float
+) -> SlipHistory:
+    """Slip until the impulse of the limiting normal force has stopped it; the slip stays without friction."""
+    m_t, mu, g0 = oblique.m_t.item(), oblique.mu.item(), oblique.slip.item()
+    limit = mu * (np.maximum(history.F, 0.0) if is_positive else np.abs(history.F))
+    # by the momentum of ball 1, between the samples of which the force may change its sign
+    impulses = -np.diff(history.v)
+    impulses = np.concatenate([[0.0], np.cumsum(np.maximum(impulses, 0.0) if is_positive else np.abs(impulses))])
+    total = mu * sliding_impulse * (oblique.impacts.m * oblique.impacts.v0).item()
+    slip = np.maximum(np.abs(g0) - total / m_t * impulses / impulses[-1], 0.0)
+    slides = (slip > 0.0) | ((mu == 0.0) & (g0 != 0.0))
+    sign = np.sign(g0)
+    return SlipHistory(
+        sign * slip, np.where(slides, sign * limit, 0.0), np.where(slides, sign, 0.0).astype(np.int8)
+    )
+
+
 @dataclass(frozen=True)
 class _Phase:
     """The samples of a phase in the contact's own units, shape (k,), and its integrals; x above the residual."""
@@ -157,9 +253,9 @@ def _fractions(steps: tuple[Step, ...]) -> list[Array]:
     return [step.end * (inner if step is not steps[-1] else np.append(inner, 1.0)) for step in steps]
 
 
-def _fractions_at(steps: tuple[Step, ...], times: Array) -> list[Array]:
+def _fractions_at(steps: tuple[Step, ...], times: Array, time_row: int = 2) -> list[Array]:
     """Compute the fractions of each step at which the interpolated time equals one of the increasing times."""
-    ends = np.array([step.at(step.end)[2, 0] for step in steps])
+    ends = np.array([step.at(step.end)[time_row, 0] for step in steps])
     step_of_time = np.minimum(np.searchsorted(ends, times), len(steps) - 1)
     fractions = []
     for index, step in enumerate(steps):
@@ -172,7 +268,7 @@ def _fractions_at(steps: tuple[Step, ...], times: Array) -> list[Array]:
         # the time grows with the fraction: bisect to the last bit
         for _ in range(BISECTIONS if count else 0):
             middle = 0.5 * (low + high)
-            is_early = repeated_step.at(middle)[2] < step_times
+            is_early = repeated_step.at(middle)[time_row] < step_times
             low, high = np.where(is_early, middle, low), np.where(is_early, high, middle)
         fractions.append(high)
     return fractions

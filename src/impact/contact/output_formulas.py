@@ -12,6 +12,7 @@ from ..array_types import Array, Mask
 from .dimensionless import dimensionless_values
 from .fixed_step import EXACT
 from .formula_calls import argument_names
+from .friction import Pair, check_friction, friction_values
 from .impacts import Impacts, check_inputs
 from .impulse import velocities_after
 from .model import ForceModel, Law
@@ -19,7 +20,7 @@ from .powers import all_within
 from .rigid import ObliqueImpacts
 from .simulate import CollisionResult, simulate
 from .status import FIRST_FAILURE, LIMIT, NO_IMPACT, STATUS_OK
-from .tangential import TangentialResult
+from .tangential import TangentialResult, simulate_friction
 from .variables import CENTRAL_OUTPUTS
 
 Outputs = dict[str, NDArray[Any]]
@@ -79,6 +80,7 @@ def collide(
     fixed_step: Mapping[str, Array] | None = None,
     errors: dict[str, str] | None = None,
     names: Iterable[str] = CENTRAL_OUTPUTS,
+    oblique: tuple[Pair, ObliqueImpacts] | None = None,
 ) -> Outputs:
     """Simulate impacts by a law: their `outputs`; one that fails has NaN and a status, and affects no other.
 
@@ -91,10 +93,11 @@ def collide(
     integrator : "exact", the continuous law with error control, or one of `impact.contact.fixed_step.SCHEMES`
     fixed_step : the phase and the step of a scheme by name, see `impact.contact.simulate.simulate`, of shape (n,)
     errors : receives a line for each distinct error of the law, see `impact.contact.formula_calls.describe_error`
+    oblique : the model with a friction law, and the tangential inputs of the impacts, for outputs of friction
     """
     with np.errstate(all="ignore"):
-        values, checked = dimensionless_values(model, impacts), check_inputs(model, impacts)
-    values |= fixed_step or {}
+        of_law, checked = dimensionless_values(model, impacts), check_inputs(model, impacts)
+    values = {**of_law, **(fixed_step or {})}
     result = simulate(
         model,
         impacts.n,
@@ -107,7 +110,26 @@ def collide(
         integrator=integrator,
         errors=errors,
     )
-    return outputs(model, impacts, result, names, checked)
+    if oblique is None:
+        return outputs(model, impacts, result, names, checked)
+    pair, inputs = oblique
+    with np.errstate(all="ignore"):
+        own = np.where(checked == STATUS_OK, check_friction(pair, inputs), checked).astype(np.int8)
+        columns = {
+            name: np.broadcast_to(column, impacts.n.shape)
+            for name, column in friction_values(pair, inputs).items()
+        }
+    tangential = simulate_friction(
+        pair,
+        impacts.n,
+        of_law | columns,
+        np.broadcast_to(own, impacts.n.shape),
+        rtol=rtol,
+        max_steps=max_steps,
+        collapse=collapse,
+        errors=errors,
+    )
+    return outputs(model, impacts, result, names, checked, (inputs, tangential, pair.friction.kind))
 
 
 def _mask_if_any(mask: Mask) -> Mask | None:
@@ -353,7 +375,8 @@ FORMULAS: dict[str, Callable[..., Any]] = {
     "omega1_post": lambda oblique, impulse: oblique.spin_after("1", impulse),
     "omega2_post": lambda oblique, impulse: oblique.spin_after("2", impulse),
     "slip_post": lambda oblique, impulse: oblique.slip - impulse / oblique.m_t,
-    "beta": lambda slip_share, missed: _replace_where(-slip_share, missed, np.nan),
+    # 0 rather than -0 where the contact sticks
+    "beta": lambda slip_share, missed: _replace_where(0.0 - slip_share, missed, np.nan),
     "e_t": lambda oblique, u1_post, u2_post: np.where(
         oblique.u1 == oblique.u2, np.nan, (u1_post - u2_post) / (oblique.u1 - oblique.u2)
     ),

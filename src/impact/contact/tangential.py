@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..array_types import Array
-from ..ode.problem import Params, Problem, Solution
+from ..ode.problem import Params, Problem, Solution, Step
 from ..ode.rk45 import integrate
 from . import motion
-from .dimensionless import with_coefficients, with_units
+from .dimensionless import exact_restitution, with_coefficients, with_units
 from .formula_calls import argument_names
 from .model import ForceModel
 from .piecewise import in_parts
@@ -85,6 +85,14 @@ class TangentialResult(Record):
     status: NDArray[np.int8]
 
 
+@dataclass(frozen=True)
+class RecordedSlip:
+    """The joint motion of one impact in a phase, and its steps, with the modes of friction among their params."""
+
+    phase: SlipPhase
+    steps: tuple[Step, ...]
+
+
 class PairOfLaws(Protocol):
     """What a trajectory needs of a `impact.contact.friction.Pair`."""
 
@@ -125,6 +133,18 @@ def simulate_friction(
     return simulate_parts(TangentialResult, pair.key, n, values, status, simulate_part, collapse, errors)
 
 
+def record_friction(
+    pair: PairOfLaws, n: float, values: ValueArrays, *, rtol: float, max_steps: int
+) -> list[RecordedSlip]:
+    """Integrate the slip of one impact, a batch of length one, and record it; empty for Coulomb's friction."""
+    recorded: list[RecordedSlip] = []
+    if pair.form(n).kind == "coulomb":
+        return recorded
+    with np.errstate(all="ignore"):
+        _simulate_distinct(pair, n, values, 1, rtol=rtol, max_steps=max_steps, collapse=False, recorded=recorded)
+    return recorded
+
+
 def _simulate_distinct(
     pair: PairOfLaws,
     n: float,
@@ -134,8 +154,9 @@ def _simulate_distinct(
     rtol: float,
     max_steps: int,
     collapse: bool,
+    recorded: list[RecordedSlip] | None = None,
 ) -> TangentialResult:
-    """Integrate each distinct dimensionless problem once."""
+    """Integrate each distinct dimensionless problem once; `recorded` receives the steps of one impact."""
     form = pair.form(n)
     model = _smooth_model(pair.model, form)
     law_values = with_coefficients(model, with_units(values, n), count)
@@ -155,13 +176,14 @@ def _simulate_distinct(
     columns = (slip, stiffness, damping, is_positive, *coefficient)
     chosen = (status == STATUS_OK) & ~is_trivial
     parts = [
-        (problems.rows, _integrate(form, problems, rtol, max_steps).take(problems.row_of_impact))
+        (problems.rows, _integrate(form, problems, rtol, max_steps, recorded).take(problems.row_of_impact))
         for problems in distinct_problems(model, n, law_values, chosen, collapse, columns)
     ]
     result = TangentialResult.joined(count, status, parts)
     if form.kind == "coulomb":
         # with infinite damping the balls stop at first contact
         result.sliding_impulse[status == LIMIT] = 1.0
+        result.exact[:] *= 1.0 + exact_restitution(model, law_values, count)
     return result
 
 
@@ -179,7 +201,13 @@ def _coefficient_arguments(form: TangentialForm) -> tuple[str, ...]:
     return tuple(name for name in argument_names(form.coefficient) if name != "y")
 
 
-def _integrate(form: TangentialForm, problems: DistinctProblems, rtol: float, max_steps: int) -> TangentialResult:
+def _integrate(
+    form: TangentialForm,
+    problems: DistinctProblems,
+    rtol: float,
+    max_steps: int,
+    recorded: list[RecordedSlip] | None,
+) -> TangentialResult:
     """Integrate distinct problems through both phases."""
     law = problems.law
     slip, stiffness, damping, is_positive, *coefficient = (np.array(column, float) for column in problems.columns)
@@ -207,12 +235,14 @@ def _integrate(form: TangentialForm, problems: DistinctProblems, rtol: float, ma
 
         def run(problem: Problem, start: Array, params: Params) -> Solution:
             y, params = phase.begin(start, params)
-            solution = integrate(problem, y, params, rtol=rtol, max_steps=max_steps)
+            solution = integrate(problem, y, params, rtol=rtol, max_steps=max_steps, record=recorded is not None)
             phase.finish(solution.state, params)
             return solution
 
         solution = in_parts(run, phase.problem(), breakpoints, rows, (*params, *columns))
         states.append(solution.state)
+        if recorded is not None:
+            recorded.append(RecordedSlip(phase, solution.recorded))
         return solution
 
     phases = solve_phases(law, problems.params, n, solve)
@@ -231,6 +261,10 @@ def _integrate(form: TangentialForm, problems: DistinctProblems, rtol: float, ma
     if form.kind == "coulomb":
         status[stopped] = LIMIT
     status[(status == STATUS_OK) & track.is_slow] = FrictionStatus.SLOW_LIMIT
+    if form.kind != "coulomb":
+        # whatever the reason, an answer is a number
+        has_answer = (status == STATUS_OK) | (status == FrictionStatus.SLOW_LIMIT)
+        status[has_answer & ~np.isfinite(result.slip)] = FrictionStatus.NOT_FINITE
     return replace(result, steps=steps, status=status)
 
 
@@ -250,7 +284,8 @@ def _result(form: TangentialForm, n: float, base: Columns, track: Track, state: 
     nan = np.full(ended.size, np.nan)
     result = replace(TangentialResult.blank(ended.size), sliding_impulse=np.where(ended, track.impulse, np.nan))
     if form.kind == "coulomb":
-        return result
+        # without tension Lambda is 1 + e_out
+        return replace(result, exact=np.where(ended & (track.sign > 0.0), 1.0, np.nan))
     regime = np.where(track.modes == 1, STICKS, np.where(track.modes & 1, BOTH, SLIDES))
     if form.kind == "regularized":
         regime = np.zeros_like(regime)

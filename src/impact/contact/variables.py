@@ -225,4 +225,15 @@ HISTORY = by_name(
     Variable("x2", "displacement of ball 2 since first contact", _TIMES, "m"),
     Variable("v1", "velocity of ball 1", _TIMES, "m/s"),
     Variable("v2", "velocity of ball 2", _TIMES, "m/s"),
+    Variable("slip", "slip speed of the contact points", _TIMES, "m/s", symbol="g"),
+    Variable("f", "friction force on ball 2", _TIMES, "N"),
+    Variable(
+        "mode",
+        "0 sticks; 1 or -1 slides, in the direction of friction on ball 2; 2 or -2: the spring "
+        "follows its limit without sliding",
+        _TIMES,
+        dtype="i1",
+    ),
 )
+# those of oblique impacts only
+SLIP_HISTORY = ("slip", "f", "mode")

@@ -16,12 +16,13 @@ from ..config.input_names import InputName
 from ..config.load import Config
 from ..config.tables import Solver
 from ..contact.fixed_step import EXACT
-from ..contact.friction import FrictionLaw, Pair
+from ..contact.friction import FrictionLaw, Pair, check_friction, friction_problems
 from ..contact.materials import Material
 from ..contact.model import ForceModel
 from ..contact.numba.dispatch import is_installed, serves
-from ..errors import UsageError
-from .build_impacts import exponents
+from ..contact.status import FrictionStatus
+from ..errors import ConfigError, UsageError
+from .build_impacts import build_impacts, build_oblique, exponents
 from .inputs import Inputs
 from .plugins import Plugins
 from .trajectories import (
@@ -33,6 +34,7 @@ from .trajectories import (
     build_map,
     columns_at,
     law_axes,
+    probe_index,
     trajectory_ranges,
 )
 
@@ -131,6 +133,25 @@ class Plan:
             raise UsageError(
                 f"{name}: sweep: got {total:,} trajectories to integrate, expected at most {most:,} (--max-points)"
             )
+
+    def pair_notes(self, name: str) -> list[str]:
+        """Note each pair that has no meaning at some points; refuse a plan whose pairs have none at all.
+
+        `name` is that of the friction laws in a message.
+        """
+        problems, combinable = [], not self.frictions
+        for law in self.laws[len(self.models) :]:
+            assert isinstance(law, Pair)
+            parameters = (f"friction.{law.friction.key}.{parameter.name}" for parameter in law.friction.parameters)
+            index = probe_index(self.inputs, {"n", *parameters})
+            impacts = build_impacts(self.inputs, law.model, index)
+            oblique = build_oblique(self.inputs, impacts, index, law.friction)
+            with np.errstate(all="ignore"):
+                combinable |= bool((check_friction(law, oblique) != FrictionStatus.NOT_COMBINABLE).any())
+                problems += [f"{law.key}: {reason}" for reason in friction_problems(law, oblique)]
+        if not combinable:
+            raise ConfigError(*(f"{name}: {problem}" for problem in problems))
+        return [f"{problem}; these points are NaN" for problem in problems]
 
     @property
     def shape(self) -> tuple[int, ...]:

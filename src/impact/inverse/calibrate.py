@@ -20,15 +20,17 @@ from ..config.input_names import InputName
 from ..config.load import Config, parse_config, read_config
 from ..config.measurements import fitted_parameters
 from ..config.quantities import KeyPath, Quantity
+from ..contact.friction import Pair
 from ..contact.model import ForceModel
 from ..contact.output_formulas import collide
 from ..contact.units import dimension
-from ..engine.build_impacts import build_impacts
+from ..engine.build_impacts import build_impacts, build_oblique
 from ..engine.execute import WorkerContext, context_of, models_of_context
 from ..engine.executors import choose_executor
 from ..engine.inputs import Inputs
 from ..engine.plan import Plan
 from ..engine.plugins import Plugins, read_plugins
+from ..engine.trajectories import PlanLaw, keys_of, model_of
 from ..results.calibration import calibration_template
 from ..results.schema import FIT_STATUSES
 from ..results.xarray_backend import save
@@ -43,6 +45,12 @@ LOG_CURVE_RATIO = 30.0
 FIT_VARIABLES = ("chi2_reduced", "p_value", "excess", "aicc", "loo", "predicted", "residual", "loo_residual")
 # denominators of the exponents of a group of parameters
 MAX_DENOMINATOR = 12
+
+
+def laws_to_fit(config: Config) -> dict[str, PlanLaw]:
+    """List the candidates by key: the models, or with friction laws their pairs, MODEL with FRICTION."""
+    laws = Plan(config).laws
+    return {law.key: law for law in (laws[len(config.models) :] if config.frictions else laws)}
 
 
 @dataclass(frozen=True)
@@ -110,11 +118,11 @@ def calibrate(
 
 def calibrate_config(config: Config, plugins: Plugins, jobs: int = 1) -> xr.Dataset:
     """Fit the laws of a config to its measurements; see `calibrate`."""
-    if jobs > 1 and len(config.models) > 1:
+    keys = list(laws_to_fit(config))
+    if jobs > 1 and len(keys) > 1:
         context = context_of(Plan(config, plugins))
         with choose_executor(jobs).start() as executor:
             fit = partial(_fit_remotely, text=config.text, overrides=config.overrides, context=context)
-            keys = [model.key for model in config.models]
             laws = dict(zip(keys, executor.map(fit, keys), strict=True))
     else:
         laws = fit_laws(config)
@@ -122,14 +130,14 @@ def calibrate_config(config: Config, plugins: Plugins, jobs: int = 1) -> xr.Data
 
 
 def prediction(
-    config: Config, model: ForceModel, names: Sequence[str], inputs: Mapping[str, Sequence[float]], points: int
+    config: Config, law: PlanLaw, names: Sequence[str], inputs: Mapping[str, Sequence[float]], points: int
 ) -> VectorFunction:
     """Build the function from parameters, shape (k, len(names)), to outputs of a law, shape (k, outputs points).
 
     All points of the first output come first; NaN where the law has no result.
     """
     assert config.data is not None
-    outputs = tuple(config.data.outputs)
+    outputs, model = tuple(config.data.outputs), model_of(law)
     scalars = {name: value for name, value in config.scalars.items() if name not in (*names, *inputs)}
     solver = config.solver
     # fits are integrated by NumPy unless the config names numba
@@ -143,8 +151,17 @@ def prediction(
         axis = Axis(columns, numbered="trial")  # type: ignore[arg-type]
         swept = Inputs(scalars, (axis,), config.materials)
         impacts = build_impacts(swept, model, swept.index()).broadcast()
+        oblique = None
+        if isinstance(law, Pair):
+            oblique = law, build_oblique(swept, impacts, swept.index(), law.friction)
         collisions = collide(
-            model, impacts, rtol=solver.rtol, max_steps=solver.max_steps, core=core, names=outputs
+            model,
+            impacts,
+            rtol=solver.rtol,
+            max_steps=solver.max_steps,
+            core=core,
+            names=outputs,
+            oblique=oblique,
         )
         # a law on which no column has an effect has one trajectory
         shape = len(rows) * points
@@ -159,8 +176,9 @@ def _fit_remotely(key: str, text: str, overrides: Sequence[str], context: Worker
     """Fit the law of a key, in any process, with a config given by its text and overrides."""
     models = models_of_context(context)
     plugins = [models[name] for name, _ in context.hashes]
-    selection = override_text(("models",), [key])
-    return fit_laws(parse_config(text, [*overrides, selection], plugins, "", purpose="calibrate"))[key]
+    law = dict(zip(("models", "frictions"), key.split(" with "), strict=False))
+    selection = [override_text((name,), [law_key]) for name, law_key in law.items()]
+    return fit_laws(parse_config(text, [*overrides, *selection], plugins, "", purpose="calibrate"))[key]
 
 
 def fit_laws(config: Config) -> dict[str, FittedLaw]:
@@ -173,16 +191,20 @@ def fit_laws(config: Config) -> dict[str, FittedLaw]:
     )
     specimens = np.unique(data.specimens, return_inverse=True)[1] if data.specimens else None
     points = DataPoints(values, sigma, data.noise, specimens, data.loss)
-    names = {model.key: fitted_parameters(config.fits, model) for model in config.models}
+    laws = laws_to_fit(config)
+    names = {
+        key: fitted_parameters(config.fits, model_of(law), law.friction if isinstance(law, Pair) else None)
+        for key, law in laws.items()
+    }
     problems, functions = [], {}
-    for model in config.models:
-        problems.append(FitProblem(model.key, _bounds(config, names[model.key]), points))
-        functions[model.key] = prediction(config, model, names[model.key], data.inputs, len(data.lines))
+    for key, law in laws.items():
+        problems.append(FitProblem(key, _bounds(config, names[key]), points))
+        functions[key] = prediction(config, law, names[key], data.inputs, len(data.lines))
     fits = fit_all(problems, functions)
     varied = varied_input(data.inputs)
     return {
-        model.key: FittedLaw(names[model.key], fit, _curve(config, model, names[model.key], fit, problem, varied))
-        for model, problem, fit in zip(config.models, problems, fits, strict=True)
+        key: FittedLaw(names[key], fit, _curve(config, law, names[key], fit, problem, varied))
+        for (key, law), problem, fit in zip(laws.items(), problems, fits, strict=True)
     }
 
 
@@ -207,7 +229,7 @@ def varied_input(inputs: Mapping[str, Sequence[float]]) -> tuple[str, Array]:
 
 def _curve(
     config: Config,
-    model: ForceModel,
+    law: PlanLaw,
     names: Sequence[str],
     fit: Fit,
     problem: FitProblem,
@@ -222,7 +244,7 @@ def _curve(
     inputs = {other: [column[0]] * grid.size for other, column in config.data.inputs.items()} | {
         name: grid.tolist()
     }
-    predict = prediction(config, model, names, inputs, grid.size)
+    predict = prediction(config, law, names, inputs, grid.size)
     u = problem.bounds.units(fit.estimate)
     steps = np.where(u < 0.5, 1e-4, -1e-4)
     rows = problem.bounds.values(np.clip(np.vstack([u, u + np.diag(steps)]), 0.0, 1.0))
@@ -319,18 +341,24 @@ def best_config(config: Config, result: xr.Dataset) -> str:
     """Write a config of its own in SI units with the best law; inputs that vary in the data are axes."""
     assert config.data is not None
     best = result.isel(model=0)
-    key = str(best["model"].item())
+    keys = keys_of(laws_to_fit(config)[str(best["model"].item())])
     fitted = best.isel(parameter=best["identifiable"].values >= 0)
     estimates = dict(zip(map(str, fitted["parameter"].values), fitted["estimate"].values.tolist(), strict=True))
     columns = {name: sorted(set(column)) for name, column in config.data.inputs.items()}
-    tables: dict[KeyPath, dict[str, object]] = {(): {"models": [key], "title": config.title}, ("sweep",): {}}
+    laws = {name: [key] for name, key in zip(("models", "frictions"), keys, strict=False)}
+    tables: dict[KeyPath, dict[str, object]] = {(): {**laws, "title": config.title}, ("sweep",): {}}
     for name, material in config.materials.items():
         known = {field: value for field, value in asdict(material).items() if value is not None and value == value}
         tables["materials", name] = known
-    for name, value in {**config.scalars, **columns, **estimates}.items():
+    values = {**config.scalars, **columns, **estimates}
+    for name, value in values.items():
         parsed = InputName.parse(name)
-        if not parsed.applies_to(key) or (name in config.fits and name not in estimates):
+        if not parsed.applies_to(*keys) or (name in config.fits and name not in estimates):
             continue
+        if name == "u2" and "speed" in values:
+            # it follows from the speed
+            continue
+        value = parsed.word(value) if isinstance(value, float) else value
         if isinstance(value, list) and len(value) == 1:
             (value,) = value
         tables.setdefault(parsed.path[:-1], {})[parsed.key] = value
@@ -340,7 +368,7 @@ def best_config(config: Config, result: xr.Dataset) -> str:
 def _calibration_dataset(config: Config, plugins: Plugins, laws: Mapping[str, FittedLaw]) -> xr.Dataset:
     """Store the fits of laws, the best law first: by AICc, those without one last, by chi2."""
     assert config.data is not None
-    models = {model.key: model for model in config.models}
+    candidates = laws_to_fit(config)
 
     # a law at a bound is ranked by what it reaches there: a wider search can only improve it
     def rank(key: str) -> list[float]:
@@ -351,7 +379,7 @@ def _calibration_dataset(config: Config, plugins: Plugins, laws: Mapping[str, Fi
     fits = [laws[key].fit for key in keys]
     parameters = list(config.fits)
     varied = varied_input(config.data.inputs)
-    dataset = calibration_template(config, [models[key] for key in keys], plugins, varied)
+    dataset = calibration_template(config, [candidates[key] for key in keys], plugins, varied)
     shape = (len(keys), len(parameters))
     arrays = {name: np.full(shape, np.nan) for name in ("estimate", "lower", "upper")}
     covariance = np.full((*shape, len(parameters)), np.nan)
@@ -374,7 +402,10 @@ def _calibration_dataset(config: Config, plugins: Plugins, laws: Mapping[str, Fi
     if varied[0]:
         curve, lower, upper = np.stack([laws[key].curve for key in keys], axis=1)
         values |= {"curve": curve, "curve_lower": lower, "curve_upper": upper}
-    groups = ["; ".join(determined_groups(config, models[key], laws[key].names, laws[key].fit)) for key in keys]
+    groups = [
+        "; ".join(determined_groups(config, model_of(candidates[key]), law.names, law.fit))
+        for key, law in ((key, laws[key]) for key in keys)
+    ]
     return dataset.assign(
         {name: (dataset[name].dims, array, dataset[name].attrs) for name, array in values.items()}
     ).assign_coords(determined=("model", groups))

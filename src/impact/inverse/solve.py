@@ -26,9 +26,11 @@ from ..config.input_names import InputName
 from ..config.load import Config
 from ..config.tables import Output
 from ..contact.fixed_step import EXACT
+from ..contact.friction import FrictionLaw
+from ..contact.frictions import find_friction
 from ..contact.model import ForceModel, Parameter
 from ..contact.models import find
-from ..contact.status import Status
+from ..contact.status import FrictionStatus, Status
 from ..contact.units import with_numbers
 from ..contact.variables import OUTPUTS
 from ..display import Block, Displayed
@@ -58,6 +60,9 @@ EXTREMUM_TOLERANCE = 1e-10
 # a refined root is a jump of the output if it is farther from the target
 REFINED_TOLERANCE = 1e-7
 
+# the laws of a result of one model and at most one friction law
+LAWS = {"model": 0, "friction": 0}
+
 SolveStatus: TypeAlias = Literal["ok", "at_bound", "several_roots", "no_root"]
 
 
@@ -75,7 +80,7 @@ class SolveResult(Displayed):
 
     Parameters
     ----------
-    name : the input: a parameter of the law, "K" or "e"
+    name : the input: a parameter of the law or of the friction law, "K", "e" or "mu"
     target : value by variable
     status : "at_bound" where the only root is the least or largest allowed value
     roots : in ascending order; over a range of inputs, the best value
@@ -92,10 +97,12 @@ class SolveResult(Displayed):
     roots: tuple[Root, ...]
     attainable: tuple[float, float]
     over: tuple[Mapping[str, float], ...] | None
+    friction: str = ""
 
     def as_dict(self) -> dict[str, Any]:
-        """Convert to plain data."""
-        return {"for" if name == "name" else name: value for name, value in asdict(self).items()}
+        """Convert to plain data; without a friction law there is no such field."""
+        fields = {name: value for name, value in asdict(self).items() if name != "friction" or value}
+        return {"for" if name == "name" else name: value for name, value in fields.items()}
 
     def records(self) -> Sequence[Mapping[str, Any]]:
         """List the conditions of a range of inputs; without one the roots."""
@@ -121,9 +128,12 @@ class SolveResult(Displayed):
                 yield f"{line}: {variable} from {' to '.join(ends)}"
         if not self.roots:
             smallest, largest = map(number, self.attainable)
-            yield (
-                f"{self.model}: no value of {self.name} gives {target}; {variable} is from {smallest} to {largest}"
-            )
+            attained = f"{variable} is from {smallest} to {largest}"
+            yield f"{_laws(self.model, self.friction)}: no value of {self.name} gives {target}; {attained}"
+
+
+def _laws(model: str, friction: str) -> str:
+    return f"{model} with {friction}" if friction else model
 
 
 def solve(
@@ -131,6 +141,7 @@ def solve(
     name: str,
     target: Mapping[str, float],
     *,
+    friction: str | None = None,
     source: str | Path | Mapping[str, object] | None = None,
     at: Mapping[str, float | str] | None = None,
     over: Mapping[str, object] | None = None,
@@ -142,8 +153,10 @@ def solve(
     Parameters
     ----------
     model : key of the law
-    name : what to solve for: a parameter of the law, the restitution "e" to ask it for, or the stiffness "K"
-    target : the value of one output, such as `{"e_out": 0.6}`
+    name : what to solve for: a parameter of the law or of the friction law, the restitution "e" to ask it for, the
+        stiffness "K", or the coefficient of friction "mu"
+    target : the value of one output, such as `{"e_out": 0.6}`, or with a friction law `{"beta": 0.4}`
+    friction : key of the friction law; by default the first one of the source, if it has any
     source : a TOML file, a mapping, or a result; by default the two balls of Table 1 of the paper
     at : values of the other inputs by config name, such as `{"v1": 1.0}`
     over : values of one input, such as `{"v1": {"linspace": [0.1, 3, 30]}}`, for which one value is found, with
@@ -172,14 +185,20 @@ def solve(
         raise UsageError(f"--over: got {len(over)} inputs, expected one")
     plugin_set = read_plugins(plugins)
     law = find(model, plugin_set.models)
-    unknown = unknown_of(law, name)
+    point_source = open_source(source, overrides, plugin_set)
+    friction_law = (
+        find_friction(friction) if friction is not None else next(iter(point_source.draft.frictions), None)
+    )
+    unknown = unknown_of(law, name, friction_law)
     inputs = {**placeholder(law, unknown), **(at or {})}
-    config, _ = single_point(open_source(source, overrides, plugin_set), model, inputs, over)
+    config, _ = single_point(point_source, model, inputs, over, friction=friction)
     return solve_input(config, plugin_set.of(config.models), unknown, target)
 
 
-def unknown_of(model: ForceModel, name: str) -> Parameter:
+def unknown_of(model: ForceModel, name: str, friction: FrictionLaw | None = None) -> Parameter:
     """Describe the input to solve for as a parameter with its unit and bounds.
+
+    A parameter of the friction law has its config name, `friction.KEY.NAME`, of which NAME is enough.
 
     >>> from impact.contact.models import find
     >>> unknown_of(find("hunt-crossley-1975"), "e").most
@@ -187,11 +206,25 @@ def unknown_of(model: ForceModel, name: str) -> Parameter:
     """
     unknowns = {parameter.name: parameter for parameter in model.parameters}
     unknowns["K"] = Parameter("K", "N/m^n", "stiffness", least=0.0)
-    if "e" in model.quantities:
+    if friction is not None:
+        unknowns["mu"] = Parameter("mu", "1", "coefficient of friction", default=0.3, least=0.0)
+        for parameter in friction.parameters:
+            if not parameter.choices:
+                full = replace(parameter, name=f"friction.{friction.key}.{parameter.name}")
+                unknowns |= {full.name: full, **({} if parameter.name in unknowns else {parameter.name: full})}
+    if "e" in model.quantities or (friction is not None and friction.may_use_e):
         unknowns["e"] = Parameter("e", "1", "restitution to ask for", default=0.5, least=0.0, most=1.0)
     if name not in unknowns:
-        raise UsageError(f'--for: {model.key} has no parameter "{name}"; {did_you_mean(name, list(unknowns))}')
+        laws = _laws(model.key, friction.key if friction else "")
+        raise UsageError(f'--for: {laws} has no parameter "{name}"; {did_you_mean(name, list(unknowns))}')
     return unknowns[name]
+
+
+def _config_name(model: ForceModel, unknown: Parameter) -> str:
+    """Write the config name of the unknown."""
+    name = unknown.name
+    is_shared = name in ("e", "mu") or (name == "K" and model.exponent is None)
+    return name if is_shared or name.startswith("friction.") else f"{model.key}.{name}"
 
 
 def placeholder(model: ForceModel, unknown: Parameter) -> dict[str, float]:
@@ -199,8 +232,7 @@ def placeholder(model: ForceModel, unknown: Parameter) -> dict[str, float]:
     if unknown.name == "K":
         return {}
     value = next((v for v in (unknown.default, unknown.typical) if v is not None), 1.0)
-    name = "e" if unknown.name == "e" else f"{model.key}.{unknown.name}"
-    return {name: min(max(value, unknown.least), unknown.most)}
+    return {_config_name(model, unknown): min(max(value, unknown.least), unknown.most)}
 
 
 def solve_input(config: Config, plugins: Plugins, unknown: Parameter, target: Mapping[str, float]) -> SolveResult:
@@ -211,6 +243,9 @@ def solve_input(config: Config, plugins: Plugins, unknown: Parameter, target: Ma
     ((name, value),) = target.items()
     if name not in names:
         raise UsageError(f'--target: no output "{name}"; {did_you_mean(name, names)}')
+    if OUTPUTS[name].of_friction and not config.frictions:
+        raise UsageError(f"--target {name}: got no friction law, expected --friction KEY")
+    Plan(config, plugins).pair_notes("frictions")
     if not (isinstance(value, int | float) and math.isfinite(value)):
         raise UsageError(f"--target {name}: got {value}, expected a finite number")
     problem = _SolveProblem(config, plugins, unknown, name)
@@ -232,10 +267,17 @@ class _SolveProblem:
 
     @property
     def name(self) -> str:
-        """Write the config name of the unknown."""
-        name = self.unknown.name
-        is_shared = name == "e" or (name == "K" and self.model.exponent is None)
-        return name if is_shared else f"{self.model.key}.{name}"
+        return _config_name(self.model, self.unknown)
+
+    @property
+    def friction(self) -> str:
+        """The key of the friction law; "" without one."""
+        return self.config.frictions[0].key if self.config.frictions else ""
+
+    @property
+    def is_of_order_one(self) -> bool:
+        """Whether differences of the target count as they are, as those of a restitution do."""
+        return OUTPUTS[self.variable].scale == "1"
 
     def plan(self, values: Array, conditions: NDArray[np.intp], *, is_scan: bool = False) -> Plan:
         """Plan to integrate each value under the condition of the same position."""
@@ -262,14 +304,16 @@ class _SolveProblem:
     ) -> xr.Dataset:
         """Compute the outputs at some values, along the dimension `trial`; NaN where the integration fails."""
         conditions = np.zeros(values.size, np.intp) if conditions is None else conditions
-        return sweep_in_memory(self.plan(values, conditions, is_scan=is_scan)).isel(model=0)
+        return sweep_in_memory(self.plan(values, conditions, is_scan=is_scan)).isel(LAWS, missing_dims="ignore")
 
     def raise_failure(self, values: Array, conditions: NDArray[np.intp] | None = None) -> NoReturn:
         """Raise a UsageError with the most frequent status of the integrations that fail."""
         result = self.evaluate(values, conditions, is_scan=True)
-        statuses = result["status"].values[np.isnan(result[self.variable].values)]
-        reason = Status(int(np.bincount(statuses).argmax())).meaning
-        raise UsageError(f"{self.model.key}: no {self.variable} at any value of {self.unknown.name}: {reason}")
+        of_friction = OUTPUTS[self.variable].of_friction
+        statuses = result[OUTPUTS[self.variable].status].values[np.isnan(result[self.variable].values)]
+        reason = (FrictionStatus if of_friction else Status)(int(np.bincount(statuses).argmax())).meaning
+        laws = _laws(self.model.key, self.friction)
+        raise UsageError(f"{laws}: no {self.variable} at any value of {self.unknown.name}: {reason}")
 
     def scan_values(self) -> Array:
         """List the allowed values that are tried first, in ascending order."""
@@ -303,8 +347,11 @@ class _SolveProblem:
             others = Inputs(self.config.scalars, (), self.config.materials)
             stiffness = float(build_impacts(others, self.model, ()).K[0])
             return stiffness if 0.0 < stiffness < math.inf else 1.0
-        if self.unknown.name == "e":
+        if self.unknown.name in ("e", "mu"):
             return 1.0
+        if self.unknown.name.startswith("friction."):
+            unit = 1.0 / float(impacts.in_own_units(np.ones(1), self.unknown.unit)[0])
+            return unit if 0.0 < unit < math.inf else 1.0
         unit = 1.0 / float(impacts.dimensionless(self.model, self.unknown.name)[0])
         return unit if 0.0 < unit < math.inf else 1.0
 
@@ -317,7 +364,7 @@ def _all_roots(problem: _SolveProblem, target: float) -> SolveResult:
         problem.raise_failure(scan)
     # a value at which the integration fails, often for want of steps, hides no root between its neighbours
     scan, values = scan[~np.isnan(values)], values[~np.isnan(values)]
-    scale = 1.0 if problem.variable.startswith("e_") else abs(target)
+    scale = 1.0 if problem.is_of_order_one else abs(target) or float(np.abs(values).max())
     tolerance = TARGET_TOLERANCE * problem.config.solver.rtol * scale
     is_exact = np.abs(values - target) <= SCAN_TOLERANCE * scale
     is_exact[[values.argmin(), values.argmax()]] = True
@@ -357,8 +404,7 @@ def _all_roots(problem: _SolveProblem, target: float) -> SolveResult:
 
 def _with_extrema(problem: _SolveProblem, scan: Array, values: Array, reached: Mask) -> tuple[Array, Array]:
     """Add each refined interior extremum to a scan, except those that reach the target."""
-    is_restitution = problem.variable.startswith("e_")
-    size = np.ones_like(values) if is_restitution else np.abs(values)
+    size = np.ones_like(values) if problem.is_of_order_one else np.abs(values)
     minima, maxima = _minima(values, size), _minima(-values, size)
     extrema, sign = np.append(minima, maxima), np.repeat([1.0, -1.0], [minima.size, maxima.size])
     extrema, sign = extrema[~reached[extrema]], sign[~reached[extrema]]
@@ -368,7 +414,7 @@ def _with_extrema(problem: _SolveProblem, scan: Array, values: Array, reached: M
         lambda x, *signs: signs[0] * problem.evaluate(x)[problem.variable].values,
         (scan[extrema - 1], scan[extrema], scan[extrema + 1]),
         args=(sign,),
-        tolerances={"fatol": EXTREMUM_TOLERANCE * is_restitution, "frtol": EXTREMUM_TOLERANCE},
+        tolerances={"fatol": EXTREMUM_TOLERANCE * problem.is_of_order_one, "frtol": EXTREMUM_TOLERANCE},
     )
     is_found = np.isfinite(refined.f_x)
     scan, first = np.unique(np.concatenate([refined.x[is_found], scan]), return_index=True)
@@ -461,4 +507,5 @@ def _result(
         # to the digits of the scan
         attainable=(float(f"{np.nanmin(values):.6g}"), float(f"{np.nanmax(values):.6g}")),
         over=over,
+        friction=problem.friction,
     )

@@ -90,20 +90,25 @@ class Problem:
 
 @dataclass(frozen=True)
 class Step:
-    """An accepted step, to interpolate: start (rows, n), length (n,), stages (7, rows, n), end as a fraction."""
+    """An accepted step, to interpolate: start (rows, n), length (n,), stages (7, rows, n), end as a fraction.
+
+    `params` are those with which its rates were computed; a switch may change them from step to step.
+    """
 
     start: Array
     length: Array
     stages: Array
     end: Array
+    params: Params = ()
 
     @classmethod
-    def of(cls, start: Array, length: Array, stages: list[Array], end: Array) -> Step:
-        """Copy a step; missing rows of a stage are zero, since they have no weight."""
+    def of(cls, start: Array, length: Array, stages: list[Array], params: Params) -> Step:
+        """Copy a step to its whole length; missing rows of a stage are zero, since they have no weight."""
         rows = np.zeros((len(stages), *start.shape))
         for target, stage in zip(rows, stages, strict=True):
             target[: len(stage)] = stage[: len(start)]
-        return cls(start.copy(), length, rows, end)
+        params = tuple(np.array(column) for column in params)
+        return cls(start.copy(), length, rows, np.ones(1), params)
 
     def at(self, theta: float | Array) -> Array:
         """Interpolate the integrated rows (rows, n) at a fraction of the step, with order four."""

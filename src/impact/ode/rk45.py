@@ -112,6 +112,8 @@ def _advance(problem: Problem, state: State, rtol: float, record: bool) -> Step 
     """Try a step of every running trajectory; accept, end or shorten it. Returns the step if it is recorded."""
     y, h, workspace, running = state.y, state.h, state.workspace, state.termination == RUNNING
     y_end, stages = rk_step(problem, y, state.k, h, state.params, workspace)
+    # copied here: a switch changes params and the last stage
+    step = Step.of(y, h, stages, state.params) if record else None
     error = local_error(problem, stages, y, y_end, h, workspace)
     trial = TrialStep(y_end, stages[-1], error <= rtol, next_step(h, error, rtol))
     if np.count_nonzero(trial.is_accurate) < error.size:
@@ -135,10 +137,10 @@ def _advance(problem: Problem, state: State, rtol: float, record: bool) -> Step 
     if np.count_nonzero(small):
         state.termination[small & (state.termination == RUNNING)] = Termination.STEP_UNDERFLOW
     state.steps += accepted
-    end = 1.0 + offset if ended.size else np.ones(1)
-    step = Step.of(y, h, stages, end) if record and accepted[0] else None
+    if step is not None and ended.size:
+        step = replace(step, end=1.0 + offset)
     _move_to_ends(state, trial)
-    return step
+    return step if step is not None and accepted[0] else None
 
 
 def rk_step(

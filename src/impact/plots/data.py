@@ -97,7 +97,7 @@ def encode_table(plot_data: PlotData, suffix: str, form: str = "wide") -> bytes:
 
 def encode_history(history: xr.Dataset) -> bytes:
     """Write a time history as a CSV table with units and all digits, which `read_points` reads again."""
-    frame = history.drop_vars("model").to_dataframe().reset_index()
+    frame = history.drop_vars(["model", "friction"], errors="ignore").to_dataframe().reset_index()
     units = {name: plain_unit(str(history[name].attrs["units"])) for name in frame.columns}
     return _csv_bytes(frame.rename(columns={name: heading(name, unit=unit) for name, unit in units.items()}))
 

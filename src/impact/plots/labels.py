@@ -174,12 +174,11 @@ def friction_text(key: str, inputs: Mapping[str, object]) -> str:
     chosen: dict[str, object] = {}
     for parameter in law.parameters:
         name = f"friction.{key}.{parameter.name}"
-        value = inputs.get(name, parameter.default)
-        if value != parameter.default:
-            # a word is stored as its position
-            chosen[name] = (
-                parameter.choices[int(value)] if parameter.choices and isinstance(value, float) else value
-            )
+        # a result has the position of a word, a time history the word
+        words: dict[object, object] = dict(enumerate(parameter.choices))
+        value, default = (words.get(each, each) for each in (inputs.get(name), parameter.default))
+        if value not in (None, default):
+            chosen[name] = value
     return ", ".join(filter(None, (law.title, parameter_text(f"friction.{key}", chosen))))
 
 

@@ -100,23 +100,32 @@ def _reference_curve(history: xr.Dataset, name: str, label: str) -> list[Curve]:
 
 
 def curves_over(
-    title: str, histories: Sequence[xr.Dataset], pairs: Sequence[tuple[str, str, str]], choice: Choice
+    title: str,
+    histories: Sequence[xr.Dataset],
+    pairs: Sequence[tuple[str, str, str]],
+    choice: Choice,
+    *,
+    of_friction: bool = False,
 ) -> CurveData:
-    """Draw a panel for each pair of names, whose third text is written at the end of its curves."""
+    """Draw a panel for each pair of names, whose third text is written at the end of its curves.
+
+    Curves of friction are named by the friction law too.
+    """
     if not histories:
         raise UsageError("no motion to draw: no model has an impact at this point")
     first = histories[0]
+    is_single = len({str(history["model"].item()) for history in histories}) == 1
     panels = []
     for x, y, end in pairs:
         curves = [
             curve_of(
-                _label(history, histories, numbered=choice.equations),
+                _pair_label(history, is_single) if of_friction else _model_label(history, choice.equations),
                 str(history["model"].item()),
                 _series(history, x),
                 _series(history, y),
                 y,
                 end,
-                friction=str(history["friction"].item()) if "friction" in history.coords else "",
+                friction=str(history["friction"].item()) if of_friction else "",
             )
             for history in histories
         ]
@@ -139,16 +148,13 @@ def _axis_label_and_unit(history: xr.Dataset, name: str) -> tuple[str, str]:
     return words_of(history[name].attrs, name), unit_of(history[name])
 
 
-def _label(history: xr.Dataset, histories: Sequence[xr.Dataset], *, numbered: bool) -> str:
-    """Write the names of the laws of a history; a single model is not named beside every friction law."""
-    if "friction" not in history.coords:
-        return _model_label(history, numbered=numbered)
+def _pair_label(history: xr.Dataset, is_single: bool) -> str:
+    """Write the names of both laws; a single model is not named beside every friction law."""
     friction = friction_text(str(history["friction"].item()), _impact_inputs(history))
-    is_single = len({str(each["model"].item()) for each in histories}) == 1
-    return friction if is_single else f"{_model_label(history, numbered=numbered)} with {friction}"
+    return friction if is_single else f"{_model_label(history, numbered=False)} with {friction}"
 
 
-def _model_label(history: xr.Dataset, *, numbered: bool) -> str:
+def _model_label(history: xr.Dataset, numbered: bool) -> str:
     """Write the name of a law, which may be a plug-in that is not installed."""
     key = str(history["model"].item())
     model, parameters = catalogue().get(key), parameter_text(key, _impact_inputs(history))

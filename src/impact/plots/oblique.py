@@ -106,7 +106,7 @@ def friction_loop_curves(histories: Sequence[xr.Dataset], choice: Choice) -> Cur
     if any("f" not in history for history in histories):
         raise UsageError("this time history has no friction; run a config with frictions = [...]")
     moved = [_with_displacement(history) for history in histories]
-    return curves_over("Friction over slip", moved, [("xi", "f", "")], choice)
+    return curves_over("Friction over slip", moved, [("xi", "f", "")], choice, of_friction=True)
 
 
 def _with_displacement(history: xr.Dataset) -> xr.Dataset:

@@ -289,7 +289,7 @@ def _spacing(values: NDArray[Any]) -> str:
 def _rank_models(dataset: xr.Dataset) -> tuple[Ranking | None, str]:
     """Rank the models, if possible, and write the answer in a sentence."""
     try:
-        ranked = rank_models(rankable_parts(dataset, {}, None, MAX_SUMMARY_POINTS), DEFAULT_TOL)
+        ranked = rank_models(rankable_parts(dataset, {}, None, max_points=MAX_SUMMARY_POINTS), DEFAULT_TOL)
     except UsageError as error:
         return None, f"The models are not ranked: {error}."
     return ranked, re.sub("^no ", "No ", f"{ranked.headline}.")

@@ -14,10 +14,10 @@ from ..array_types import Array
 from ..config.input_names import InputName
 from ..config.load import Config
 from ..config.tables import DEFAULT_TITLE
-from ..contact.model import ForceModel
 from ..contact.variables import OUTPUTS
 from ..engine.plan import Plan
 from ..engine.plugins import Plugins
+from ..engine.trajectories import PlanLaw, keys_of, model_of
 from ..formatting import decimals, number, safe_text
 from . import schema
 
@@ -50,8 +50,14 @@ def fit_rows(dataset: xr.Dataset) -> list[tuple[str, ...]]:
         for position, name in enumerate(names or [""]):
             estimate = _estimate_texts(law.sel(parameter=name)) if name else ("", "")
             rest = quality if position == 0 else ("",) * len(quality)
-            rows.append((key if position == 0 else "", name.removeprefix(f"{key}."), *estimate, *rest))
+            rows.append((key if position == 0 else "", _own_name(key, name), *estimate, *rest))
     return rows
+
+
+def _own_name(law: str, name: str) -> str:
+    """Write the config name of a parameter without the key of the law, or of a law of the pair."""
+    model, _, friction = law.partition(" with ")
+    return name.removeprefix(f"{model}.").removeprefix(f"friction.{friction}.")
 
 
 def _estimate_texts(parameter: xr.Dataset) -> tuple[str, str]:
@@ -71,7 +77,7 @@ def unidentified_notes(dataset: xr.Dataset) -> list[str]:
         names = [str(name) for name in law["parameter"].values[law["identifiable"].values == 0]]
         if names:
             groups = str(law["determined"].item())
-            parameters = ", ".join(name.removeprefix(f"{key}.") for name in names)
+            parameters = ", ".join(_own_name(key, name) for name in names)
             only = f"only {groups} is determined" if groups else "the data do not determine them"
             notes.append(f"{key}: {parameters}: {only}")
     return notes
@@ -160,29 +166,37 @@ def describe_data(dataset: xr.Dataset) -> str:
 
 
 def calibration_template(
-    config: Config, models: Sequence[ForceModel], plugins: Plugins, varied: tuple[str, Array]
+    config: Config, laws: Sequence[PlanLaw], plugins: Plugins, varied: tuple[str, Array]
 ) -> xr.Dataset:
     """Build the dataset of a calibration with placeholders for its results.
 
     Parameters
     ----------
     config : with the measurements
-    models : the laws, in the order of the dataset
+    laws : the models, or their pairs with friction laws, in the order of the dataset
     plugins : the models that are not built in
     varied : the input of the curves and its values; "" for none
     """
     data = config.data
     assert data is not None
-    plan = Plan(replace(config, models=tuple(models)), plugins)
+    models = tuple(map(model_of, laws))
+    distinct = {model.key: model for model in models}
+    plan = Plan(replace(config, models=tuple(distinct.values())), plugins)
+    # with friction laws, a position along `model` is a pair
+    of_laws = Plan(replace(config, models=models, frictions=()), plugins)
     coordinates: dict[str, object] = {
         str(name): coordinate
-        for name, coordinate in schema.plan_coordinates(plan).variables.items()
-        if name not in config.fits and name not in data.inputs
+        for name, coordinate in schema.plan_coordinates(of_laws).variables.items()
+        # with a speed, v1 follows from the angle, which may be measured
+        if name not in config.fits and name not in data.inputs and not (name == "v1" and "speed" in config.scalars)
     }
 
     def add(name: str, dim: str, values: Any, meaning: str) -> None:
         coordinates[name] = (dim, values, {"long_name": meaning})
 
+    if config.frictions:
+        add("model", "model", [law.key for law in laws], "contact force model and friction law")
+        add("friction", "model", [keys_of(law)[1] for law in laws], "friction law")
     parameters, outputs, rows = list(config.fits), list(data.outputs), len(data.lines)
     sigmas = [data.sigma.get(name, np.full(rows, np.nan)) for name in outputs]
     add("parameter", "parameter", parameters, "fitted parameter, by its config name")

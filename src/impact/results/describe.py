@@ -89,7 +89,7 @@ class Studies(Displayed):
             probabilities = [f"{probability:g}" for probability in study["quantile"].values]
             rows = (study.isel(input=position) for position in range(study.sizes["input"]))
             yield {
-                "model": point.pop("model"),
+                **{dim: point.pop(dim) for dim in ("model", "friction") if dim in point},
                 "at": point,
                 "of": self.dataset.attrs["of"],
                 **{name: design[name] for name in ("n", "method", "seed")},
@@ -106,7 +106,8 @@ class Studies(Displayed):
     def records(self) -> Sequence[Mapping[str, Any]]:
         """A row for each uncertain input of each study."""
         return [
-            {"model": study["model"], **study["at"], "of": study["of"], **indices}
+            {dim: study[dim] for dim in ("model", "friction") if dim in study}
+            | {**study["at"], "of": study["of"], **indices}
             for study in self._studies()
             for indices in study["indices"]
         ]

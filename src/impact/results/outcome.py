@@ -9,7 +9,7 @@ from typing import Any
 
 import xarray as xr
 
-from ..contact.status import FIRST_FAILURE, Status
+from ..contact.status import FIRST_FAILURE, FrictionStatus
 from ..display import Block, Displayed, Table, Wrapped
 from ..formatting import label, number
 from .plausibility import result_notes
@@ -69,12 +69,12 @@ class SweepOutcome(Displayed):
         }
 
     def records(self) -> Sequence[Mapping[str, Any]]:
-        """The first failed points."""
+        """The first failed points of models, else of pairs."""
         command = command_start(str(self.output), self.dataset)
-        statuses = self.dataset["status"]
         records = []
-        for status, model, index in self.summary.failed_at:
-            point = statuses.isel(dict(zip(statuses.dims, (model, *index), strict=True)))
+        for name, status, place, index in self.summary.first_failed:
+            statuses = self.dataset[name]
+            point = statuses.isel(dict(zip(statuses.dims, (*place, *index), strict=True)))
             at = inputs_of_model({str(dim): point[dim].values.item() for dim in statuses.dims})
             replay = replay_command(command, at) if command else None
             records.append({"status": status.name.lower(), "at": at, "replay": replay})
@@ -96,7 +96,7 @@ class SweepOutcome(Displayed):
         failures = self.records()
         for failure in failures:
             inputs = ", ".join(f"{name}={label(value)}" for name, value in failure["at"].items())
-            yield Wrapped(f"failed: {inputs}: {Status[failure['status'].upper()].meaning}")
+            yield Wrapped(f"failed: {inputs}: {FrictionStatus[failure['status'].upper()].meaning}")
             if failure["replay"]:
                 yield f"  {failure['replay']}"
         more = summary.failed - len(failures)

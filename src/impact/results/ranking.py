@@ -1,4 +1,4 @@
-"""Rank the models of a result by how closely they deliver the requested restitution."""
+"""Rank the models of a result, or its pairs with friction laws, by how closely they deliver a wanted output."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 
 from ..array_types import Mask
 from ..config.input_names import InputName
-from ..contact.status import FIRST_FAILURE, Status
+from ..contact.status import FIRST_FAILURE, FrictionStatus, Status
+from ..contact.variables import OUTPUTS
 from ..display import Block, Displayed, Table, html_of
-from ..errors import UsageError
+from ..errors import UsageError, did_you_mean
 from ..formatting import label, number, percentage, safe_text
 from .kinds import require_sweep
 from .replay_command import describe_point
@@ -30,7 +31,8 @@ MAX_RANKED_POINTS = 2**30
 MAX_PARAMETER_COMBINATIONS = 2**24
 # accepted |e_out - e|
 DEFAULT_TOL = 0.01
-RANKED_VARIABLES = ("e_error", "status")
+# outputs that may be a target: numbers of the order of 1
+TARGETS = tuple(name for name, variable in OUTPUTS.items() if variable.scale == "1" and variable.per_model)
 # rows of the text; the rest is only counted
 MAX_ROWS = 30
 # ranges of e that a table lists
@@ -38,17 +40,47 @@ MAX_RANGES = 8
 
 
 @dataclass(frozen=True)
+class Criterion:
+    """What laws are ranked by: the distance of an output from a target; without one, of e_out from the asked e."""
+
+    output: str = "e_out"
+    target: float | None = None
+
+    @property
+    def names(self) -> tuple[str, str]:
+        """The variable whose values are judged, and the status that explains its NaNs."""
+        name = "e_error" if self.target is None else self.output
+        return name, OUTPUTS[name].status
+
+    @property
+    def along(self) -> str:
+        """The input whose ranges are listed in which all points are within the tolerance."""
+        return "e" if self.target is None else "angle"
+
+    @property
+    def text(self) -> str:
+        return "e" if self.target is None else f"{self.output} = {number(self.target)}"
+
+
+BY_ERROR = Criterion()
+
+
+@dataclass(frozen=True)
 class Ranked:
-    """How well one model delivers the target restitution, with the best values of its own parameters.
+    """How well one model, or its pair with a friction law, delivers the target, with the best own parameters.
 
     parameters : the best values by path in the config, such as "model.bilinear.K"; empty if none is an axis
-    points : number of points with a target e and an impact
-    within, failed : number of those with |e_out - e| within the tolerance, and of those that failed
-    mean_error, max_error : of |e_out - e| over the points that did not fail; NaN if all failed. The mean is exact,
-        rounded once: it depends neither on the order of the points nor on slabs
-    at, e_out : the swept inputs by config name and e at the point with the largest error, empty if all failed, and
-        the restitution there
-    served : the ranges of e in which all points are within the tolerance; None unless e varies along one axis
+    points : number of points with a target and an impact
+    within, failed : number of those with |e_out - e|, or the distance of `output` from its target, within the
+        tolerance, and of those that failed
+    mean_error, max_error : of that distance over the points that did not fail; NaN if all failed. The mean is
+        exact, rounded once: it depends neither on the order of the points nor on slabs
+    at, e_out : the swept inputs by config name, and e, at the point with the largest error, empty if all failed,
+        and the value of `output` there
+    served : the ranges of e, or with a target of the angle, in which all points are within the tolerance; None
+        unless it varies along one axis
+    friction : key of the friction law; "" for a model alone
+    output : the output that is ranked
     """
 
     model: str
@@ -61,12 +93,22 @@ class Ranked:
     at: Mapping[str, float | str]
     e_out: float
     served: tuple[tuple[float, float], ...] | None
+    friction: str = ""
+    output: str = "e_out"
 
     @property
     def name(self) -> str:
-        """The model, and the parameters that were chosen."""
+        """The model, its friction law, and the parameters that were chosen."""
         chosen = (f"{path.rpartition('.')[2]} = {number(value)}" for path, value in self.parameters.items())
-        return " with ".join(filter(None, [self.model, ", ".join(chosen)]))
+        return " with ".join(filter(None, [self.model, ", ".join(filter(None, [self.friction, *chosen]))]))
+
+    @property
+    def record(self) -> dict[str, Any]:
+        """The fields as plain data, without those of friction and of a target that do not apply."""
+        record = {name: value for name, value in vars(self).items() if name not in ("output", "friction")}
+        if self.output != "e_out":
+            record = {self.output if name == "e_out" else name: value for name, value in record.items()}
+        return record | {"share": self.share} | ({"friction": self.friction} if self.friction else {})
 
     @property
     def share(self) -> float:
@@ -95,12 +137,12 @@ class Ranked:
         ('hertz', '10.0%', '0.9', '0.45', '0', 'e=0.1: e_out 1', '1')
         """
         errors = (number(error, 3) for error in (self.max_error, self.mean_error))
-        worst = f"{describe_point(self.at)}: e_out {number(self.e_out, 4)}" if self.at else "–"
+        worst = f"{describe_point(self.at)}: {self.output} {number(self.e_out, 4)}" if self.at else "–"
         return (self.name, self.percent, *errors, f"{self.failed:,}", worst, self._served_text)
 
     @property
     def _served_text(self) -> str:
-        """The first ranges of e that it serves."""
+        """The first ranges that it serves."""
         if self.served is None:
             return "–"
         ranges = [label(least) + (f" to {label(most)}" if most > least else "") for least, most in self.served]
@@ -110,10 +152,11 @@ class Ranked:
 
 @dataclass(frozen=True)
 class Ranking(Displayed):
-    """The models of a result, ordered by their share of points within the tolerance, then by their errors."""
+    """The models or pairs of a result, ordered by their share of points within the tolerance, then by errors."""
 
     tol: float
     models: tuple[Ranked, ...]
+    criterion: Criterion = BY_ERROR
 
     @property
     def headings(self) -> tuple[str, ...]:
@@ -125,7 +168,7 @@ class Ranking(Displayed):
             "mean error",
             "failed",
             "worst point",
-            "e served",
+            f"{self.criterion.along} served",
         )
 
     @property
@@ -142,23 +185,26 @@ class Ranking(Displayed):
         if self.best:
             others = len(self.best) - 1
             subject = f"{key} and {others} more give" if others else f"{key} gives"
-            return f"{subject} e within {tol} at {alone or f'all {points}'}"
+            return f"{subject} {self.criterion.text} within {tol} at {alone or f'all {points}'}"
+        nothing = f"no {'pair' if first.friction else 'model'} gives {self.criterion.text} within {tol}"
         if first.within:
-            return f"no model gives e within {tol} everywhere; {key} is nearest: {first.percent} of {points}"
-        return f"no model gives e within {tol} at {alone or f'any of {points}'}"
+            return f"{nothing} everywhere; {key} is nearest: {first.percent} of {points}"
+        return f"{nothing} at {alone or f'any of {points}'}"
 
     def as_dict(self) -> dict[str, Any]:
         """The ranking as plain data."""
+        target = {} if self.criterion.target is None else {self.criterion.output: self.criterion.target}
         return {
             "headline": self.headline,
             "tol": self.tol,
-            "best": [row.model for row in self.best],
+            **({"target": target} if target else {}),
+            "best": [" with ".join(filter(None, [row.model, row.friction])) for row in self.best],
             "models": self.records(),
         }
 
     def records(self) -> Sequence[Mapping[str, Any]]:
         """The models, the best first."""
-        return [{**vars(row), "share": row.share} for row in self.models]
+        return [row.record for row in self.models]
 
     def sections(self, width: int) -> Iterator[Block]:
         """The headline and a table of the first models."""
@@ -182,30 +228,35 @@ def recommend(
     tol: float = DEFAULT_TOL,
     sel: Mapping[str, float | str] | None = None,
     models: Sequence[str] | None = None,
+    target: Mapping[str, float] | None = None,
+    frictions: Sequence[str] | None = None,
 ) -> Ranking:
     """Rank the models of a result by the error of their restitution, over all points of the sweep.
 
-    The criterion is |e_out - e| at all points with a target e and an impact. A point that failed, or whose target
-    e is below 0 (1 - alpha v0 < 0), counts as not within the tolerance. The values of a model's own parameters are
-    chosen: the model is ranked over all other axes, with the values that give the largest share of points within
-    the tolerance, and among those the smallest error. The result may be of any size: points that differ only along
-    axes on which nothing varies are evaluated once, and counted as often as they occur.
+    The criterion is |e_out - e| at all points with a target e and an impact; with a target, the distance of that
+    output from it, by which pairs of a model and a friction law are ranked if it depends on friction. A point that
+    failed, or whose target e is below 0 (1 - alpha v0 < 0), counts as not within the tolerance. The values of a
+    law's own parameters are chosen: the law is ranked over all other axes, with the values that give the largest
+    share of points within the tolerance, and among those the smallest error. The result may be of any size: points
+    that differ only along axes on which nothing varies are evaluated once, and counted as often as they occur.
 
     Parameters
     ----------
     dataset : a result
-    tol : largest accepted |e_out - e|
+    tol : largest accepted |e_out - e|, or distance from the target
     sel : values of axes, such as `{"m2": 1.0}`; by default all values of an axis are ranked
     models : keys of the models to rank; by default all
+    target : the value of one output, such as `{"beta": 0.4}`; by default e_out is compared with the e asked for
+    frictions : keys of the friction laws to rank, for a target that depends on friction; by default all
 
     Returns
     -------
-    Ranking : the models, the best first; `ranking.best` are those within the tolerance at all points
+    Ranking : the models or pairs, the best first; `ranking.best` are those within the tolerance at all points
 
     Raises
     ------
     UsageError : the result has no requested e, or lacks what the arguments select, or has too many points; tol is
-        not a positive finite number
+        not a positive finite number; the target is not one number of an output of the order of 1
 
     >>> import impact
     >>> result = impact.sweep("configs/figure6.toml")
@@ -215,21 +266,46 @@ def recommend(
     require_sweep(dataset, "recommend")
     if not 0.0 < tol < math.inf:
         raise UsageError(f"tol: got {tol:g}, expected a positive finite number")
-    return rank_models(rankable_parts(dataset, sel or {}, models), tol)
+    criterion = BY_ERROR if target is None else _criterion_of(target)
+    if frictions and not OUTPUTS[criterion.names[0]].of_friction:
+        raise UsageError("--friction: expected a --target that depends on friction, such as beta=0.4")
+    return rank_models(rankable_parts(dataset, sel or {}, models, criterion, frictions), tol, criterion)
+
+
+def _criterion_of(target: Mapping[str, float]) -> Criterion:
+    """Check a target."""
+    if len(target) != 1:
+        raise UsageError(f"--target: got {len(target)} targets, expected one, such as beta=0.4")
+    ((name, value),) = target.items()
+    if name not in TARGETS:
+        raise UsageError(
+            f'--target: got "{name}", expected an output of the order of 1; {did_you_mean(name, TARGETS)}'
+        )
+    if not (isinstance(value, int | float) and math.isfinite(value)):
+        raise UsageError(f"--target {name}: got {value}, expected a finite number")
+    return Criterion(name, float(value))
 
 
 def rankable_parts(
     dataset: xr.Dataset,
     sel: Mapping[str, float | str],
     models: Sequence[str] | None,
+    criterion: Criterion = BY_ERROR,
+    frictions: Sequence[str] | None = None,
     max_points: int = MAX_RANKED_POINTS,
 ) -> list[xr.Dataset]:
-    """Select the part of each model to rank; refuse a result that lacks a target e or has too many points."""
-    _check_rankable(dataset)
-    chosen = law_positions(models, dataset) if models else range(dataset.sizes["model"])
-    selected = select(dataset[list(RANKED_VARIABLES)], sel)
-    parts = [_select_model(selected, position) for position in chosen]
-    evaluated = [_reduce_dims(part)[0] for part in parts if is_computed(part.variables["e_error"])]
+    """Select the part of each law to rank; refuse a result that lacks a target or has too many points."""
+    _check_rankable(dataset, criterion)
+    selected, places = select(dataset[list(criterion.names)], sel), [{"model": 0}]
+    wanted: dict[Literal["model", "friction"], Sequence[str] | None] = {"model": models, "friction": frictions}
+    for dim, keys in wanted.items():
+        if dim in selected.dims:
+            chosen = law_positions(keys, dataset, dim) if keys else range(dataset.sizes[dim])
+            places = [place | {dim: position} for place in places for position in chosen]
+    parts = [_select_law(selected, place) for place in places]
+    evaluated = [
+        _reduce_dims(part, criterion)[0] for part in parts if is_computed(part.variables[criterion.names[0]])
+    ]
     points = sum(math.prod(part.sizes.values()) for part in evaluated)
     if points > max_points:
         raise UsageError(
@@ -238,23 +314,28 @@ def rankable_parts(
     return parts
 
 
-def rank_models(parts: Sequence[xr.Dataset], tol: float) -> Ranking:
-    """Rank models by their parts of a result; refuse parts without any point to rank."""
-    ranked = [_rank_model(part, tol) for part in parts]
-    if not any(model.points for model in ranked):
-        raise UsageError("nothing to rank: no point has both a requested e and an impact")
-    return Ranking(tol, tuple(sorted(ranked, key=_rank_key)))
+def rank_models(parts: Sequence[xr.Dataset], tol: float, criterion: Criterion = BY_ERROR) -> Ranking:
+    """Rank laws by their parts of a result; refuse parts without any point to rank."""
+    ranked = [_rank_law(part, tol, criterion) for part in parts]
+    if not any(law.points for law in ranked):
+        wanted = "a requested e" if criterion.target is None else f"a value of {criterion.output}"
+        raise UsageError(f"nothing to rank: no point has both {wanted} and an impact")
+    return Ranking(tol, tuple(sorted(ranked, key=_rank_key)), criterion)
 
 
-def _check_rankable(dataset: xr.Dataset) -> None:
-    """Refuse a dataset by which models cannot be ranked."""
+def _check_rankable(dataset: xr.Dataset, criterion: Criterion) -> None:
+    """Refuse a dataset by which laws cannot be ranked."""
     if "t" in dataset.dims:
         raise UsageError("got a time history, expected the result of a sweep")
     if "model" not in dataset.dims:
         raise UsageError("model is not an axis of this result; select models as a list, sel(model=[...])")
-    missing = [name for name in RANKED_VARIABLES if name not in dataset]
+    missing = [name for name in criterion.names if name not in dataset]
+    if missing and OUTPUTS[criterion.names[0]].of_friction and "friction" not in dataset.dims:
+        raise UsageError(f"this result has no {missing[0]}: its sweep has no frictions")
     if missing:
         raise UsageError(f"this result has no {', '.join(missing)}; sweep without [output] variables, or add them")
+    if criterion.target is not None:
+        return
     if "e" not in dataset.coords or not _uses_e(dataset):
         raise UsageError("this sweep has no requested e, which the ranking needs; add e or alpha")
     dims = set(dataset["e_error"].dims)
@@ -274,28 +355,37 @@ def _uses_e(dataset: xr.Dataset) -> bool:
     return any(not np.isnan(e.isel(slab).values).all() for slab in slabs(e.sizes))
 
 
-def _select_model(dataset: xr.Dataset, position: int) -> xr.Dataset:
-    """Select one model of a result, without the axes of other models' parameters."""
-    first = dict.fromkeys(foreign_dims(dataset, str(dataset["model"].values[position])), 0)
-    return dataset.isel({"model": position, **first})
+def _select_law(dataset: xr.Dataset, place: Mapping[str, int]) -> xr.Dataset:
+    """Select a model of a result, or a pair, without the axes of other laws' parameters."""
+    keys = [str(dataset[dim].values[position]) for dim, position in place.items()]
+    return dataset.isel({**place, **dict.fromkeys(foreign_dims(dataset, *keys), 0)})
 
 
-def _reduce_dims(model_data: xr.Dataset) -> tuple[xr.Dataset, int]:
+def _keys(law_data: xr.Dataset) -> tuple[str, str]:
+    """The keys of the model and of the friction law of a part; "" for a model alone."""
+    return str(law_data["model"].item()), str(law_data["friction"].item()) if "friction" in law_data.coords else ""
+
+
+def _is_along_one(law_data: xr.Dataset, name: str) -> bool:
+    """Whether an input varies along one axis."""
+    return name in law_data.variables and law_data.variables[name].ndim == 1
+
+
+def _reduce_dims(law_data: xr.Dataset, criterion: Criterion) -> tuple[xr.Dataset, int]:
     """Keep the axes along which the ranked variables or e vary; return also the weight of each point."""
-    along_one = model_data.variables["e"].ndim == 1
-    return over_varying_dims(
-        model_data,
-        RANKED_VARIABLES,
-        *(model_data.variables["e"].dims if along_one else varying_dims(model_data, "e")),
-    )
+    if _is_along_one(law_data, criterion.along):
+        dims = law_data.variables[criterion.along].dims
+    else:
+        dims = varying_dims(law_data, "e") if criterion.target is None else ()
+    return over_varying_dims(law_data, criterion.names, *dims)
 
 
 @dataclass(frozen=True)
 class _JudgedSlab:
-    """Points of a slab: target e, its error, and which points count, failed, have an error and are within tol."""
+    """Points of a slab: the output, its distance from the target, and which points count, failed, have a distance
+    and are within tol."""
 
-    e: NDArray[Any]
-    error: NDArray[Any]
+    output: NDArray[Any]
     distance: NDArray[np.float64]
     judged: Mask
     failed: Mask
@@ -303,33 +393,44 @@ class _JudgedSlab:
     within: Mask
 
 
-def _judge_slab(evaluated: xr.Dataset, slab: Slab, sizes: Mapping[Hashable, int], tol: float) -> _JudgedSlab:
-    error, status, e = (_read_slab(evaluated.variables[name], slab, sizes) for name in (*RANKED_VARIABLES, "e"))
-    distance = np.abs(np.asarray(error, float))
-    judged = ~np.isnan(e) & (status != Status.NO_IMPACT)
+def _judge_slab(
+    evaluated: xr.Dataset, slab: Slab, sizes: Mapping[Hashable, int], tol: float, criterion: Criterion
+) -> _JudgedSlab:
+    values, status = (_read_slab(evaluated.variables[name], slab, sizes) for name in criterion.names)
+    values = np.asarray(values, float)
+    if criterion.target is None:
+        target = _read_slab(evaluated.variables["e"], slab, sizes)
+        output, distance, has_target = target + values, np.abs(values), ~np.isnan(target)
+    else:
+        # an answer without this output, such as beta without a slip, has no target
+        output, distance = values, np.abs(values - criterion.target)
+        has_target = ~(np.isnan(values) & np.isin(status, (FrictionStatus.OK, FrictionStatus.SLOW_LIMIT)))
+    judged = has_target & (status != Status.NO_IMPACT)
     failed = judged & (status >= FIRST_FAILURE)
     evaluable = judged & ~failed & ~np.isnan(distance)
-    return _JudgedSlab(e, error, distance, judged, failed, evaluable, evaluable & (distance <= tol))
+    return _JudgedSlab(output, distance, judged, failed, evaluable, evaluable & (distance <= tol))
 
 
 def _best_parameters(
-    model_data: xr.Dataset, parameter_dims: Sequence[Hashable], tol: float
+    law_data: xr.Dataset, parameter_dims: Sequence[Hashable], tol: float, criterion: Criterion
 ) -> dict[Hashable, int]:
-    """Find the index on each axis of a model's own parameters at which it ranks best over all other axes."""
-    evaluated, _ = over_varying_dims(model_data, RANKED_VARIABLES, *parameter_dims, *varying_dims(model_data, "e"))
+    """Find the index on each axis of a law's own parameters at which it ranks best over all other axes."""
+    of_e = varying_dims(law_data, "e") if criterion.target is None else ()
+    evaluated, _ = over_varying_dims(law_data, criterion.names, *parameter_dims, *of_e)
     shape = tuple(evaluated.sizes[dim] for dim in parameter_dims)
     if math.prod(shape) > MAX_PARAMETER_COMBINATIONS:
+        law = " with ".join(filter(None, _keys(law_data)))
         raise UsageError(
-            f"got {math.prod(shape):,} combinations of parameters of {model_data['model'].item()}, expected at "
+            f"got {math.prod(shape):,} combinations of parameters of {law}, expected at "
             f"most {MAX_PARAMETER_COMBINATIONS:,}; select values of them"
         )
-    dims = evaluated.variables["e_error"].dims
+    dims = evaluated.variables[criterion.names[0]].dims
     other_dims = (dim for dim in dims if dim not in parameter_dims)
     sizes = {dim: evaluated.sizes[dim] for dim in (*parameter_dims, *other_dims)}
     points, within, errors = np.zeros(shape, int), np.zeros(shape, int), np.full(shape, np.nan)
     others = tuple(range(len(parameter_dims), len(sizes)))
     for slab in slabs(sizes):
-        part = _judge_slab(evaluated, slab, sizes, tol)
+        part = _judge_slab(evaluated, slab, sizes, tol, criterion)
         parameter_slab = tuple(slab[dim] for dim in parameter_dims)
         points[parameter_slab] += part.judged.sum(axis=others)
         within[parameter_slab] += part.within.sum(axis=others)
@@ -340,30 +441,35 @@ def _best_parameters(
     return dict(zip(parameter_dims, map(int, np.unravel_index(best, shape)), strict=True))
 
 
-def _varies_parameters(model_data: xr.Dataset, dim: Hashable) -> bool:
-    """Check whether only parameters of the model, and perhaps of others, vary along a dimension."""
-    models = {InputName.parse(name).model for name in columns_along(model_data, dim)}
-    return str(model_data["model"].item()) in models and "" not in models
+def _varies_parameters(law_data: xr.Dataset, dim: Hashable) -> bool:
+    """Check whether only parameters of the law, and perhaps of others, vary along a dimension."""
+    names = [InputName.parse(name) for name in columns_along(law_data, dim)]
+    return all(map(_is_parameter, names)) and any(name.applies_to(*_keys(law_data)) for name in names)
 
 
-def _rank_model(model_data: xr.Dataset, tol: float) -> Ranked:
-    """Rank a model by its e_error, its status and the target e."""
-    key = str(model_data["model"].item())
-    parameter_dims = [dim for dim in model_data.variables["e_error"].dims if _varies_parameters(model_data, dim)]
-    best = _best_parameters(model_data, parameter_dims, tol) if parameter_dims else {}
-    chosen = _swept_inputs(model_data, best)
-    model_data = model_data.isel(best)
-    axes = model_data.variables["e_error"].dims
-    evaluated, weight = _reduce_dims(model_data)
-    sizes = {dim: evaluated.sizes[dim] for dim in evaluated.variables["e_error"].dims}
-    e, along_one = evaluated.variables["e"], model_data.variables["e"].ndim == 1
-    # if e varies along one axis, for each e: whether any point counts, and whether any is not within tol
-    requested, missed = np.zeros(e.shape, bool), np.zeros(e.shape, bool)
+def _is_parameter(name: InputName) -> bool:
+    return name.table in ("model", "friction")
+
+
+def _rank_law(law_data: xr.Dataset, tol: float, criterion: Criterion) -> Ranked:
+    """Rank a model or a pair by the judged variable, its status and the target."""
+    variable, along = criterion.names[0], criterion.along
+    parameter_dims = [dim for dim in law_data.variables[variable].dims if _varies_parameters(law_data, dim)]
+    best = _best_parameters(law_data, parameter_dims, tol, criterion) if parameter_dims else {}
+    chosen = _swept_inputs(law_data, best)
+    law_data = law_data.isel(best)
+    axes = law_data.variables[variable].dims
+    evaluated, weight = _reduce_dims(law_data, criterion)
+    sizes = {dim: evaluated.sizes[dim] for dim in evaluated.variables[variable].dims}
+    along_one = _is_along_one(law_data, along)
+    served_input = evaluated.variables[along] if along_one else xr.Variable((), 0.0)
+    # for each value of an input along one axis: whether any point counts, and whether any is not within tol
+    requested, missed = np.zeros(served_input.shape, bool), np.zeros(served_input.shape, bool)
     points = evaluable_points = within_points = failed_points = 0
     total, max_error, e_out = Fraction(), math.nan, math.nan
     worst: dict[Hashable, int] | None = None
     for slab in slabs(sizes):
-        part = _judge_slab(evaluated, slab, sizes, tol)
+        part = _judge_slab(evaluated, slab, sizes, tol, criterion)
         distance, evaluable = part.distance, part.evaluable
         points += weight * int(part.judged.sum())
         evaluable_points += weight * int(evaluable.sum())
@@ -374,23 +480,41 @@ def _rank_model(model_data: xr.Dataset, tol: float) -> Ranked:
             index = np.unravel_index(int(np.argmax(np.where(evaluable, distance, -1.0))), distance.shape)
             if worst is None or distance[index] > max_error:
                 max_error = float(distance[index])
-                e_out = float(part.e[index]) + float(part.error[index])
+                e_out = float(part.output[index])
                 worst = {dim: slab[dim].start + int(position) for dim, position in zip(sizes, index, strict=True)}
         if along_one:
-            others = tuple(axis for axis, dim in enumerate(sizes) if dim not in e.dims)
-            along = slab[e.dims[0]]
-            requested[along] |= np.logical_or.reduce(part.judged, axis=others)
-            missed[along] |= np.logical_or.reduce(part.judged & ~part.within, axis=others)
+            others = tuple(axis for axis, dim in enumerate(sizes) if dim not in served_input.dims)
+            positions = slab[served_input.dims[0]]
+            requested[positions] |= np.logical_or.reduce(part.judged, axis=others)
+            missed[positions] |= np.logical_or.reduce(part.judged & ~part.within, axis=others)
     at: dict[str, float | str] = {}
     mean_error = math.nan
     if worst is not None:
         # an infinite error comes from a file that was not written by a sweep
         mean_error = max_error if math.isinf(max_error) else float(total / evaluable_points)
-        requested_e = float(e.isel({dim: worst[dim] for dim in e.dims}).values.item())
-        at = _swept_inputs(model_data, {dim: worst.get(dim, 0) for dim in axes}) | chosen | {"e": requested_e}
-    parameters = {name.config_key: chosen[str(name)] for name in map(InputName.parse, chosen) if name.model == key}
-    served = _served_ranges(e.values, requested, missed) if along_one else None
-    return Ranked(key, parameters, points, within_points, failed_points, mean_error, max_error, at, e_out, served)
+        at = _swept_inputs(law_data, {dim: worst.get(dim, 0) for dim in axes}) | chosen
+        if criterion.target is None:
+            e = evaluated.variables["e"]
+            at["e"] = float(e.isel({dim: worst[dim] for dim in e.dims}).values.item())
+    parameters = {
+        name.config_key: chosen[str(name)] for name in map(InputName.parse, chosen) if _is_parameter(name)
+    }
+    served = _served_ranges(served_input.values, requested, missed) if along_one else None
+    model, friction = _keys(law_data)
+    return Ranked(
+        model,
+        parameters,
+        points,
+        within_points,
+        failed_points,
+        mean_error,
+        max_error,
+        at,
+        e_out,
+        served,
+        friction,
+        criterion.output,
+    )
 
 
 def _read_slab(variable: xr.Variable, slab: Slab, sizes: Mapping[Hashable, int]) -> NDArray[Any]:
@@ -412,14 +536,14 @@ def _exact_sum(values: Sequence[float]) -> Fraction:
     return sum(map(Fraction, parts), Fraction())
 
 
-def _swept_inputs(model_data: xr.Dataset, positions: Mapping[Hashable, int]) -> dict[str, float | str]:
-    """List the swept inputs at a position along each axis, without the parameters of other models."""
-    variables, key = model_data.variables, str(model_data["model"].item())
+def _swept_inputs(law_data: xr.Dataset, positions: Mapping[Hashable, int]) -> dict[str, float | str]:
+    """List the swept inputs at a position along each axis, without the parameters of other laws."""
+    variables = law_data.variables
     return {
         name: variables[name].values[position].item()
         for dim, position in positions.items()
-        for name in dict.fromkeys([str(dim), *columns_along(model_data, dim)])
-        if InputName.parse(name).applies_to(key)
+        for name in dict.fromkeys([str(dim), *columns_along(law_data, dim)])
+        if InputName.parse(name).applies_to(*_keys(law_data))
     }
 
 

@@ -30,13 +30,13 @@ def command_start(path: str, dataset: xr.Dataset) -> tuple[str, ...]:
 
 
 def inputs_of_model(at: Mapping[str, InputValue]) -> dict[str, InputValue]:
-    """Leave out the parameters of other models.
+    """Leave out the parameters of other models and friction laws.
 
     >>> inputs_of_model({"model": "mine", "e": 0.5, "mine.c": 2.0, "other.c": 3.0, "materials.steel.E": 2e11})
     {'model': 'mine', 'e': 0.5, 'mine.c': 2.0, 'materials.steel.E': 200000000000.0}
     """
-    key = str(at.get("model", ""))
-    return {name: value for name, value in at.items() if InputName.parse(name).applies_to(key)}
+    keys = [str(at.get(dim, "")) for dim in ("model", "friction")]
+    return {name: value for name, value in at.items() if InputName.parse(name).applies_to(*keys)}
 
 
 def describe_point(at: Mapping[str, float | str]) -> str:

@@ -289,7 +289,8 @@ def plan_coordinates(plan: Plan) -> xr.Coordinates:
     if "alpha" in plan.inputs.names():
         equation = "e = 1 - alpha (v1 - v2)  (24)"
         attributes = {"units": "1", "long_name": "requested restitution", "equation": equation}
-        restitutions = _derived_values(plan, ("alpha", "v1", "v2"), partial(restitution_at, plan.inputs))
+        speed = ("speed", "angle") if "speed" in plan.inputs.names() else ("v1",)
+        restitutions = _derived_values(plan, ("alpha", *speed, "v2"), partial(restitution_at, plan.inputs))
         coordinates["e"] = (*restitutions, attributes)
     for ball in "12":
         material = (
@@ -319,6 +320,9 @@ def coordinate_attributes(plan: Plan, name: str) -> dict[str, str]:
     if quantity is None:
         return {"long_name": MATERIAL_KEYS[name]}
     of_material = f" of {parsed.material}" if parsed.material else ""
+    if quantity.words:
+        words = ", ".join(f"{position} is {word}" for position, word in enumerate(quantity.words))
+        return {"units": "1", "long_name": f"{quantity.meaning}; {words}"}
     return {"units": udunits(quantity.unit), "long_name": f"{quantity.meaning}{of_material}"}
 
 

@@ -46,7 +46,7 @@ def law_positions(
 
 def select(dataset: xr.Dataset, sel: Mapping[str, float | str]) -> xr.Dataset:
     """Select at values of coordinates; an axis is dropped, unless several numbered points have the value."""
-    axes = [str(dim) for dim in dataset.sizes if dim != "model"]
+    axes = [str(dim) for dim in dataset.sizes if dim not in ("model", "friction")]
     masks: dict[Hashable, Mask] = {}
     for name, value in sel.items():
         if name not in dataset.coords or len(dataset[name].dims) != 1 or dataset[name].dims == ("model",):

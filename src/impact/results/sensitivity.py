@@ -124,6 +124,8 @@ def describe_study(study: xr.Dataset) -> str:
     failed = int(study["failed"])
     if failed:
         return f"{of}: {failed:,} points have no result, so there are no indices; narrow the distributions"
+    if np.isnan(study["mean"]):
+        return f"{of}: the friction law is not combinable with the model"
     suffix = "" if unit == "1" else f" {unit}"
     if not np.isfinite(study["total"].values).any():
         return f"{of}: {number(float(study['mean']))}{suffix}; it does not depend on the uncertain inputs"

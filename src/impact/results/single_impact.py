@@ -1,7 +1,8 @@
-"""One impact by one model: its config, from a file or a point of a result, its outputs and its time history."""
+"""One impact by one model, and perhaps a friction law: its config, its outputs and its time history."""
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 import warnings
@@ -25,17 +26,20 @@ from ..config.starter import STARTER_CONFIG
 from ..config.tables import MATERIAL_QUANTITIES, SWEEP_DEFAULTS, expand_models, law_quantities
 from ..contact.fixed_step import EXACT
 from ..contact.force_expressions import unload_to_residual, unload_with_stiffness
-from ..contact.history import History, integrate_history
+from ..contact.friction import FrictionLaw, Pair
+from ..contact.frictions import find_friction
+from ..contact.history import History, SlipHistory, integrate_history, integrate_slip
 from ..contact.impacts import Impacts
 from ..contact.materials import Material
 from ..contact.model import ForceModel
 from ..contact.models import find
 from ..contact.output_formulas import collide
-from ..contact.status import FIRST_FAILURE, Status
+from ..contact.rigid import ObliqueImpacts
+from ..contact.status import FIRST_FAILURE, FrictionStatus, Status
 from ..contact.units import with_numbers
-from ..contact.variables import HISTORY, OUTPUTS
+from ..contact.variables import CENTRAL_OUTPUTS, HISTORY, OUTPUTS, SLIP_HISTORY
 from ..display import Block, Displayed, Table
-from ..engine.build_impacts import build_impacts, fixed_steps_at
+from ..engine.build_impacts import build_impacts, build_oblique, fixed_steps_at
 from ..engine.plan import Plan
 from ..engine.plugins import Plugins, read_plugins
 from ..errors import UsageError, did_you_mean
@@ -49,6 +53,8 @@ from .xarray_backend import open_result
 STARTER_E = Setting(("sweep", "e"), 0.5, "--set sweep.e=0.5")
 
 ConfigSource = str | Path | Mapping[str, object] | xr.Dataset | None
+# dimensions of laws
+LAW_DIMS = ("model", "friction")
 # name, unit and meaning of the quantities that are derived from the inputs and the history of one impact
 DERIVED_QUANTITIES = (
     ("m1", "kg", "mass of ball 1"),
@@ -63,11 +69,18 @@ DERIVED_QUANTITIES = (
     ("W_r", "J", "work of the restitution (39)"),
     ("rebound_speed_bound", "m s-1", "K/lambda, bound of the rebound speed (26)"),
 )
+# the same for oblique impacts
+OBLIQUE_QUANTITIES = (
+    ("v1", "m/s", "velocity of ball 1 along the normal before the impact"),
+    ("u1", "m/s", "tangential velocity of ball 1 before the impact"),
+    ("slip", "m/s", "slip speed of the contact points before the impact"),
+    ("m_t", "kg", "effective tangential mass"),
+)
 
 
 @dataclass(frozen=True)
 class Impact(Displayed):
-    """One impact by one model.
+    """One impact by one model, and perhaps a friction law.
 
     Parameters
     ----------
@@ -76,7 +89,8 @@ class Impact(Displayed):
     first : names of axes of the source that are at their first value
     values : the outputs under the names of the result file, in SI
     materials : those of the balls, by name
-    derived : the quantities of DERIVED_QUANTITIES by name, in SI; NaN for those that do not apply
+    derived : the quantities of DERIVED_QUANTITIES, and of oblique impacts OBLIQUE_QUANTITIES, by name, in SI; NaN
+        for those that do not apply
     integrator : "exact", or the scheme with a fixed step, which gives no history
     exponent : compliance exponent n of the law
     closing_speed : v0 = v1 - v2 [m/s]
@@ -85,6 +99,7 @@ class Impact(Displayed):
         the last two by quadrature of the force over the history; without a history those of the outputs, which
         are 0 if the balls stay together
     history : the time history as a dataset over t, or None if the motion cannot be integrated
+    friction : the friction law; None for a central impact
     """
 
     model: ForceModel
@@ -101,39 +116,52 @@ class Impact(Displayed):
     e_kinetic: float
     e_energetic: float
     history: xr.Dataset | None
+    friction: FrictionLaw | None = None
 
     @property
     def status(self) -> Status:
         return Status(int(self.values["status"]))
 
     @property
+    def friction_status(self) -> FrictionStatus:
+        """Outcome of the tangential motion; that of the normal motion without a friction law."""
+        return FrictionStatus(int(self.values.get("friction_status", self.status)))
+
+    @property
     def failed(self) -> bool:
-        return self.status >= FIRST_FAILURE
+        return self.friction_status >= FIRST_FAILURE
 
     @property
     def why_no_history(self) -> str:
         """Why there is no time history, for a message."""
-        return self.status.meaning if self.integrator == EXACT else no_motion(self.integrator)
+        if self.integrator != EXACT:
+            return no_motion(self.integrator)
+        return self.status.meaning if self.status != Status.OK else self.friction_status.meaning
 
     def rows(self) -> dict[str, str]:
         """What `impact run` prints: the inputs, outputs, the three restitutions and estimated errors, by name."""
         rows = {"model": self.model.key, "equation": self.model.equation}
+        if self.friction:
+            rows |= {"friction": self.friction.key, "friction equation": self.friction.equation}
         for name, value in self.point.items():
             note = "  (first value of its axis)" if name in self.first else ""
-            rows[name] = quantity(value, self._unit_of(name), 10) + note
+            rows[name] = _with_degrees(value, self._unit_of(name)) + note
         for name, material in self.materials.items():
             properties = {field: value for field, value in asdict(material).items() if value is not None}
             rows[f"[materials.{name}]"] = ", ".join(
                 f"{field} = {quantity(value, MATERIAL_QUANTITIES[field].unit, 10)}"
                 for field, value in properties.items()
             )
-        for name, unit, meaning in DERIVED_QUANTITIES:
+        for name, unit, meaning in (*DERIVED_QUANTITIES, *(OBLIQUE_QUANTITIES if self.friction else ())):
             if self.derived[name] == self.derived[name] and name not in self.point:
                 rows[name] = f"{quantity(self.derived[name], self._with_numbers(plain_unit(unit)), 10)}  {meaning}"
         rows["status"] = f"{self.status.name.lower()}: {self.status.meaning}"
+        if self.friction:
+            rows["friction_status"] = f"{self.friction_status.name.lower()}: {self.friction_status.meaning}"
+            rows["contact_regime"] = _flag("contact_regime", self.values).replace("_", " ")
         for name, variable in OUTPUTS.items():
             if name in self.values and variable.dtype == "f8" and name not in ("e_kinetic", "e_energetic"):
-                rows[name] = quantity(self.values[name], self._with_numbers(variable.unit), 10)
+                rows[name] = _with_degrees(self.values[name], self._with_numbers(variable.unit))
         rows["e_kinematic"] = quantity(self.e_kinematic, "1", 12) + "  (1), from the velocities"
         rows["e_kinetic"] = quantity(self.e_kinetic, "1", 12) + "  (2), tau_r/tau_c"
         rows["e_energetic"] = quantity(self.e_energetic, "1", 12) + "  (3), the root of -W_r/W_c"
@@ -145,14 +173,18 @@ class Impact(Displayed):
 
     def as_dict(self) -> dict[str, Any]:
         """The impact as plain data."""
+        words = {"status": self.status.name.lower()}
+        if self.friction:
+            words |= {name: _flag(name, self.values) for name in ("friction_status", "contact_regime")}
         return {
             "model": self.model.key,
+            **({"friction": self.friction.key} if self.friction else {}),
             "inputs": dict(self.point),
             "first_value_of": list(self.first),
             "integrator": self.integrator,
             "exponent": self.exponent,
             "closing_speed": self.closing_speed,
-            "outputs": {**self.values, "status": self.status.name.lower()},
+            "outputs": {**self.values, **words},
             "materials": {name: asdict(material) for name, material in self.materials.items()},
             "derived": dict(self.derived),
             "damping": self.damping,
@@ -164,7 +196,8 @@ class Impact(Displayed):
     def records(self) -> Sequence[Mapping[str, Any]]:
         """One row: the model, the inputs and the outputs."""
         data = self.as_dict()
-        return [{"model": data["model"], **data["inputs"], **data["outputs"]}]
+        keys = {name: data[name] for name in ("model", "friction") if name in data}
+        return [{**keys, **data["inputs"], **data["outputs"]}]
 
     def sections(self, width: int) -> Iterable[Block]:
         """The inputs, outputs, the three restitutions and estimated errors, one per line."""
@@ -186,10 +219,22 @@ class Impact(Displayed):
         return with_numbers(unit, {**values, "n": self.exponent})
 
 
+def _with_degrees(value: float | str, unit: str) -> str:
+    """Write a value of a point; an angle also in degrees."""
+    degrees = f"  ({number(math.degrees(value), 6)} deg)" if unit == "rad" and isinstance(value, float) else ""
+    return quantity(value, unit, 10) + degrees
+
+
+def _flag(name: str, values: Mapping[str, float]) -> str:
+    """Find the word for the value of a variable with flags."""
+    return next(word for word, value in OUTPUTS[name].flags.items() if value == int(values[name]))
+
+
 def run(
     source: str | Path | Mapping[str, object] | None = None,
     *,
     model: str | None = None,
+    friction: str | None = None,
     at: Mapping[str, float | str] | None = None,
     overrides: Sequence[str] = (),
     plugins: Sequence[ForceModel | str | Path] = (),
@@ -201,6 +246,7 @@ def run(
     ----------
     source : a TOML file, a mapping, or a result; by default the two balls of Table 1 of the paper, at e = 0.5
     model : key of the model; by default the first one of the source
+    friction : key of the friction law; by default the first one of the source, if it has any
     at : values by config name, such as `{"e": 0.05}`; the default of an axis is its first value
     overrides : changes to the config, such as `"sweep.m2=2"`
     plugins : plug-in models, and paths of Python files with such models; a result that was computed with them
@@ -220,7 +266,7 @@ def run(
     if times is not None and times < 2:
         raise UsageError(f"times: got {times}, expected a whole number >= 2")
     plugin_set = read_plugins(plugins)
-    config, first = single_point(open_source(source, overrides, plugin_set), model, at)
+    config, first = single_point(open_source(source, overrides, plugin_set), model, at, friction=friction)
     return run_single_impact(Plan(config, plugin_set.of(config.models)), first, times)
 
 
@@ -231,9 +277,14 @@ def no_motion(integrator: str) -> str:
 
 def run_single_impact(plan: Plan, first: tuple[str, ...], times: int | None = None) -> Impact:
     """Integrate the only impact of a plan without axes; `first` names axes of its source at their first value."""
+    plan.pair_notes("frictions")
     config = plan.config
     law = config.models[0]
     impacts = build_impacts(plan.inputs, law, ())
+    oblique = None
+    if config.frictions:
+        pair = Pair(law, config.frictions[0])
+        oblique = pair, build_oblique(plan.inputs, impacts, (), pair.friction)
     solver = config.solver
     errors: dict[str, str] = {}
     collision = collide(
@@ -244,26 +295,37 @@ def run_single_impact(plan: Plan, first: tuple[str, ...], times: int | None = No
         integrator=solver.integrator,
         fixed_step=fixed_steps_at(plan.inputs, impacts, ()),
         errors=errors,
+        names=OUTPUTS if oblique else CENTRAL_OUTPUTS,
+        oblique=oblique,
     )
     values = {name: array[0].item() for name, array in collision.items()}
     for error in errors.values():
         warnings.warn(error, stacklevel=2)
-    history = None
+    history = slip = None
     # a history is that of the continuous law
-    if values["status"] == Status.OK and solver.integrator == EXACT:
-        history = integrate_history(law, impacts, rtol=solver.rtol, max_steps=solver.max_steps, times=times)
+    has_slip = values.get("friction_status", FrictionStatus.OK) < FIRST_FAILURE
+    if values["status"] == Status.OK and solver.integrator == EXACT and has_slip:
+        rtol, max_steps = solver.rtol, solver.max_steps
+        if oblique:
+            history, slip = integrate_slip(*oblique, rtol=rtol, max_steps=max_steps, times=times)
+        else:
+            history = integrate_history(law, impacts, rtol=rtol, max_steps=max_steps, times=times)
     v0 = impacts.v0[0].item()
     # a law may have its own n, which replaces that of the config
     point = {**config.scalars, "n": impacts.n[0].item()}
+    point = {name: InputName.parse(name).word(value) for name, value in point.items()}
     if "alpha" in config.scalars:
         point["e"] = impacts.e[0].item()
+    derived = _derived_quantities(law, impacts, values, history)
+    if oblique:
+        derived |= _oblique_quantities(oblique[1])
     return Impact(
         model=law,
         point=point,
         first=first,
         values=values,
         materials=plan.materials_used,
-        derived=_derived_quantities(law, impacts, values, history),
+        derived=derived,
         integrator=solver.integrator,
         exponent=impacts.n[0].item(),
         closing_speed=v0,
@@ -271,8 +333,15 @@ def run_single_impact(plan: Plan, first: tuple[str, ...], times: int | None = No
         e_kinematic=(values["v2_post"] - values["v1_post"]) / v0 if v0 > 0.0 else float("nan"),
         e_kinetic=history.e_kinetic if history else values["e_kinetic"],
         e_energetic=history.e_energetic if history else values["e_energetic"],
-        history=history_dataset(history, law.key, point) if history else None,
+        history=history_dataset(history, plan, point, slip) if history else None,
+        friction=config.frictions[0] if config.frictions else None,
     )
+
+
+def _oblique_quantities(oblique: ObliqueImpacts) -> dict[str, float]:
+    """Compute OBLIQUE_QUANTITIES."""
+    values = {"v1": oblique.impacts.v1, "u1": oblique.u1, "slip": oblique.slip, "m_t": oblique.m_t}
+    return {name: value.item() for name, value in values.items()}
 
 
 def _derived_quantities(
@@ -298,14 +367,19 @@ def _derived_quantities(
     return {name: quantities.get(name, math.nan) for name, _, _ in DERIVED_QUANTITIES}
 
 
-def history_dataset(history: History, model: str, point: Mapping[str, float | str]) -> xr.Dataset:
+def history_dataset(
+    history: History, plan: Plan, point: Mapping[str, float | str], slip: SlipHistory | None = None
+) -> xr.Dataset:
     """Build the dataset of a time history over t, with the inputs of the impact as an attribute."""
+    laws = {"model": plan.models[0].key, **({"friction": plan.frictions[0].key} if slip else {})}
+    names = [name for name in HISTORY if slip or name not in SLIP_HISTORY]
+    arrays = {name: getattr(slip if name in SLIP_HISTORY else history, name) for name in names}
     dataset = xr.Dataset(
-        {name: ("t", getattr(history, name), attributes_of(variable)) for name, variable in HISTORY.items()},
-        coords={"t": ("t", history.t, {"units": "s", "long_name": "time since first contact"}), "model": model},
+        {name: ("t", array, attributes_of(HISTORY[name])) for name, array in arrays.items()},
+        coords={"t": ("t", history.t, {"units": "s", "long_name": "time since first contact"}), **laws},
     )
     dataset.attrs = {
-        "title": f"Time history of one impact, {model}",
+        "title": f"Time history of one impact, {' with '.join(laws.values())}",
         "schema_version": SCHEMA_VERSION,
         "impact_version": __version__,
         "inputs": json.dumps(dict(point)),
@@ -320,18 +394,19 @@ def histories(
     models: Sequence[str] | None,
     at: Mapping[str, float | str],
     plugins: Plugins,
+    frictions: Sequence[str] | None = None,
 ) -> list[xr.Dataset]:
     """Integrate the histories of one point by several models; a dataset that is a time history is returned.
 
     Values of `at` need not be on the grid, and other axes take their first value. A parameter of one model is
-    ignored by the others. An unknown model or input, and a point without a history, are UsageErrors.
+    ignored by the others. An unknown model or input, and a point without a history, are UsageErrors. A result with
+    friction laws has the histories of the models with its first friction law, or those of `frictions`.
     """
     if "t" in dataset.dims:
         return [dataset]
-    keys = [str(key) for key in dataset["model"].values.ravel()]
-    for key in models or ():
-        if key not in keys:
-            raise UsageError(f'no model "{key}" in this result; {did_you_mean(key, keys)}')
+    keys = _chosen_keys(dataset, "model", models)
+    friction_keys = _chosen_keys(dataset, "friction", frictions) if "friction" in dataset.coords else []
+    friction_keys = friction_keys if frictions else friction_keys[:1]
     integrator = str(dataset.attrs.get("integrator", EXACT))
     if integrator != EXACT:
         raise UsageError(f"no motion to draw in this result: {no_motion(integrator)}")
@@ -342,14 +417,14 @@ def histories(
     datasets: list[xr.Dataset] = []
     ends: dict[str, str] = {}
     first: dict[str, float | str] = {}
-    for key in dict.fromkeys(models or keys):
-        others = {str(name) for name in dataset.coords if not InputName.parse(name).applies_to(key)}
-        model_inputs = {name: value for name, value in at.items() if name not in others}
-        config, names = single_point(source, key, model_inputs)
+    for key, friction in itertools.product(keys, friction_keys or [""]):
+        others = {str(name) for name in dataset.coords if not InputName.parse(name).applies_to(key, friction)}
+        law_inputs = {name: value for name, value in at.items() if name not in others}
+        config, names = single_point(source, key, law_inputs, friction=friction or None)
         impact = run_single_impact(Plan(config, plugins.of(config.models)), names)
         first |= {name: impact.point[name] for name in names}
         if impact.history is None:
-            ends[key] = impact.status.meaning
+            ends[key] = impact.why_no_history
         else:
             datasets.append(impact.history)
     if not datasets:
@@ -357,6 +432,15 @@ def histories(
         reason = next(iter(ends.values()))
         raise UsageError(f"no motion to draw at {point}: {reason}; choose a point, such as --sel e=0.5")
     return datasets
+
+
+def _chosen_keys(dataset: xr.Dataset, dim: str, chosen: Sequence[str] | None) -> list[str]:
+    """List the chosen keys of models or friction laws of a result, each once; by default all."""
+    keys = [str(key) for key in dataset[dim].values.ravel()]
+    for key in chosen or ():
+        if key not in keys:
+            raise UsageError(f'no {dim} "{key}" in this result; {did_you_mean(key, keys)}')
+    return list(dict.fromkeys(chosen or keys))
 
 
 @dataclass(frozen=True)
@@ -402,7 +486,7 @@ def _open_stored(dataset: xr.Dataset, overrides: Sequence[str], plugins: Plugins
     for note in (*changed_plugins(dataset.attrs, plugins, name), *unknown_plugins(dataset.attrs, plugins, name)):
         warnings.warn(note, stacklevel=4)
     labels = {str(key): label.values.item() for key, label in dataset.coords.items() if label.ndim == 0}
-    return PointSource(draft, plugins, {key: value for key, value in labels.items() if key != "model"})
+    return PointSource(draft, plugins, {k: value for k, value in labels.items() if k not in LAW_DIMS})
 
 
 def single_point(
@@ -410,6 +494,8 @@ def single_point(
     model: str | None = None,
     at: Mapping[str, float | str] | None = None,
     over: Mapping[str, object] | None = None,
+    *,
+    friction: str | None = None,
 ) -> tuple[Config, tuple[str, ...]]:
     """Reduce a config to one impact, or to impacts over one input; also name the inputs that took a first value.
 
@@ -420,6 +506,7 @@ def single_point(
     at : values by config name, which need not be on the grid. Inputs that vary together, in a zip group or in a
         table of cases, are an exception: their values, or the number of a case, select one of its points
     over : values of an input, as in a config, that stay an axis
+    friction : key of the friction law; by default the config's first, if it has any
     """
     draft, fixed = source.draft, {str(InputName.parse(name)): value for name, value in (at or {}).items()}
     for name, value in fixed.items():
@@ -429,6 +516,8 @@ def single_point(
         raise UsageError("--at alpha: got alpha and e, expected one of the two")
     law = None if model is None else find(model, source.plugins.models)
     settings = [] if law is None else [Setting(("models",), [law.key], f"--model {law.key}")]
+    if friction is not None:
+        settings.append(Setting(("frictions",), [find_friction(friction).key], f"--friction {friction}"))
     settings += [Setting(InputName.parse(k).path, values, f"--over {k}") for k, values in (over or {}).items()]
     draft = draft.with_settings(settings)
     if isinstance(draft.table("sweep").get("cases"), str):
@@ -463,7 +552,8 @@ def _setting_at(draft: Draft, name: str, value: float | str, law: ForceModel | N
     """Fix an input at a value; K of a model with another exponent than [sweep] is that of its own table."""
     if not _has_input(draft, InputName.parse(name)):
         raise _unknown_input(draft, name)
-    path = InputName.parse(name).path
+    parsed = InputName.parse(name)
+    path, value = parsed.path, parsed.word(value)
     if name == "K" and law is not None and has_other_stiffness(draft, law):
         path = ("model", law.key, "K")
     return Setting(path, value, f"--at {name}={value}")
@@ -474,13 +564,19 @@ def _has_input(draft: Draft, name: InputName) -> bool:
     if name.material:
         value = as_table(draft.table("materials").get(name.material)).get(name.key)
         return isinstance(value, list | dict)
-    if name.model:
-        return any(model.key == name.model and name.key in law_quantities(model) for model in draft.models)
+    if name.owner:
+        laws = draft.models if name.model else draft.frictions
+        return any(law.key == name.owner and name.key in law_quantities(law) for law in laws)
     return name.key in SWEEP_INPUTS
 
 
 def _unknown_input(draft: Draft, name: str) -> UsageError:
-    parameters = [f"{model.key}.{parameter.name}" for model in draft.models for parameter in model.parameters]
+    parameters = [
+        str(InputName(table, law.key, parameter.name))
+        for table, laws in (("model", draft.models), ("friction", draft.frictions))
+        for law in laws
+        for parameter in law.parameters
+    ]
     names = {*draft.input_names, *SWEEP_DEFAULTS, *parameters}
     choices = {choice for choice in names if _has_input(draft, InputName.parse(choice))} | _joint_inputs(draft)
     hint = did_you_mean(name, [*choices, *SWEEP_INPUTS])
@@ -501,7 +597,9 @@ def _without_axes(
         scalars |= {name: values[position] for name, values in axis.columns.items()}
         if axis.size > 1 and at.keys().isdisjoint(_selectable_columns(axis)):
             first += axis.columns
-    return replace(config, axes=tuple(kept), scalars=scalars, models=config.models[:1]), tuple(first)
+    return replace(
+        config, axes=tuple(kept), scalars=scalars, models=config.models[:1], frictions=config.frictions[:1]
+    ), tuple(first)
 
 
 def _selectable_columns(axis: Axis) -> dict[str, Sequence[float | str]]:

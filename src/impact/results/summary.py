@@ -33,6 +33,8 @@ class Summary:
         not evaluated
     failed_at : the first points that failed: status, number of the model, and index along the axes
     friction_counts : numbers of points of pairs by friction status
+    friction_failed_at : the first points of pairs that failed: friction status, numbers of the model and of the
+        friction law, and index along the axes; a file does not hold them
     deep, deepest : number of points with a peak indentation above `MAX_SMALL_INDENTATION`, and the largest one, as
         fractions of the smaller radius; only of points with known radii
     """
@@ -44,6 +46,9 @@ class Summary:
     max_failed_at: int = field(default=MAX_FAILED_AT, compare=False)
     not_counted: int = 0
     friction_counts: dict[FrictionStatus, int] = field(default_factory=dict)
+    friction_failed_at: list[tuple[FrictionStatus, tuple[int, ...], tuple[int, ...]]] = field(
+        default_factory=list, compare=False
+    )
     # a file does not hold the radii: these are available after a sweep only
     deep: int = field(default=0, compare=False)
     deepest: float = field(default=0.0, compare=False)
@@ -63,6 +68,13 @@ class Summary:
             if FIRST_FAILURE <= status != FrictionStatus.NOT_COMBINABLE
         }
 
+    @property
+    def first_failed(self) -> list[tuple[str, FrictionStatus, tuple[int, ...], tuple[int, ...]]]:
+        """List the first failed points of models, else of pairs: status variable, status, law and index."""
+        if not self.failed_at:
+            return [("friction_status", *failure) for failure in self.friction_failed_at]
+        return [("status", FrictionStatus(status), (model,), index) for status, model, index in self.failed_at]
+
     def add(
         self,
         values: Mapping[str, NDArray[Any]],
@@ -81,9 +93,21 @@ class Summary:
             self._measure(values["peak_indentation"], radius, weight)
         return self
 
-    def add_friction(self, values: Mapping[str, NDArray[Any]], weight: int = 1) -> Summary:
-        """Count the points of a pair by their friction status, each `weight` times."""
-        statuses, counts = np.unique(values["friction_status"], return_counts=True)
+    def add_friction(
+        self,
+        values: Mapping[str, NDArray[Any]],
+        pair: tuple[int, ...],
+        start: Sequence[int],
+        weight: int = 1,
+    ) -> Summary:
+        """Count the points of a pair from an index on by their friction status, each `weight` times."""
+        array = values["friction_status"]
+        failed = (array >= FIRST_FAILURE) & (array != FrictionStatus.NOT_COMBINABLE)
+        n_more = self.max_failed_at - len(self.friction_failed_at)
+        for offsets in np.argwhere(failed)[:n_more].tolist():
+            index = tuple(map(operator.add, start, offsets))
+            self.friction_failed_at.append((FrictionStatus(int(array[tuple(offsets)])), pair, index))
+        statuses, counts = np.unique(array, return_counts=True)
         for number, count in zip(statuses.tolist(), counts.tolist(), strict=True):
             status = FrictionStatus(number)
             self.friction_counts[status] = self.friction_counts.get(status, 0) + weight * count
@@ -121,7 +145,7 @@ def add_slab(summary: Summary, table: TrajectoryTable, slab: ExpandedSlab) -> No
     first = tuple(slice(None) if axis in axes else slice(1) for axis in range(len(slab.region)))
     counted = {name: array[first or ...] for name, array in slab.values.items()}
     if len(slab.place) > 1:
-        summary.add_friction(counted)
+        summary.add_friction(counted, slab.place, [part.start for part in slab.region])
         return
     radius = np.fmin(slab.impacts.R1, slab.impacts.R2)
     summary.add(counted, slab.number, [part.start for part in slab.region], radius)
@@ -166,11 +190,13 @@ def summarize(
 
 def count_friction(summary: Summary, dataset: xr.Dataset, max_points: float) -> None:
     """Count the points of pairs of a model and a friction law by their friction status."""
-    for pair in parts_of_pairs(dataset):
+    for number, pair in enumerate(parts_of_pairs(dataset)):
+        place = divmod(number, dataset.sizes["friction"])
         variable, weight = distinct_points(pair, "friction_status")
         if variable.size <= max_points or not is_computed(variable):
             for slab in slabs(variable.sizes):
-                summary.add_friction({"friction_status": variable.isel(slab).values}, weight)
+                start = [part.start for part in slab.values()]
+                summary.add_friction({"friction_status": variable.isel(slab).values}, place, start, weight)
 
 
 class Extremes(NamedTuple):
@@ -250,7 +276,7 @@ def summarize_table(dataset: xr.Dataset, table: TrajectoryTable) -> tuple[Summar
                 so_far = extremes[name]
                 extremes[name] = so_far and so_far.add(values[name], weight)
             if "friction_status" in values:
-                summary.add_friction(values, weight)
+                summary.add_friction(values, table.place(model), [part.start for part in region], weight)
             if model < len(table.laws):
                 summary.add(values, model, [part.start for part in region], weight=weight)
     return summary, extremes

@@ -12,26 +12,22 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
-import numpy as np
 import xarray as xr
 
 from ..atomic import atomic_write, check_output, check_outputs
 from ..config.grid import MAX_POINTS
 from ..config.input_names import InputName
 from ..config.load import read_config
-from ..contact.friction import Pair, check_friction, friction_problems
 from ..contact.model import ForceModel
 from ..contact.records import Record
-from ..contact.status import FrictionStatus
 from ..engine import checkpoint
-from ..engine.build_impacts import build_impacts, build_oblique
 from ..engine.execute import FindReused, integrate_ranges, reuse_nothing
 from ..engine.executors import SERIAL, ExecutorSpec, choose_executor
 from ..engine.plan import Plan
 from ..engine.plugins import read_plugins
 from ..engine.run import DEFAULT_RUN, ProgressCallback, ProgressCounter, Run, ignore, never, report_kept_ranges
-from ..engine.trajectories import RANGE_TRAJECTORIES, TrajectoryRange, probe_index
-from ..errors import ConfigError, ResultError, StoreError, UnfinishedError, UsageError
+from ..engine.trajectories import RANGE_TRAJECTORIES, TrajectoryRange
+from ..errors import ResultError, StoreError, UnfinishedError, UsageError
 from .layouts import LAYOUTS, FillSlab
 from .netcdf import MAX_LABEL_BYTES, encode_text, is_text
 from .outcome import SweepOutcome
@@ -227,26 +223,10 @@ def prepare(
     name = str(source) if isinstance(source, Path) else "config"
     plan.check_count(run.max_points, name)
     columns = {name: values for axis in config.axes for name, values in axis.columns.items()}
-    notes = [*material_notes(plan.material_record, columns), *_pair_notes(plan, name)]
+    notes = [*material_notes(plan.material_record, columns), *plan.pair_notes(f"{name}: frictions")]
     for note in notes:
         run.on_note(note)
     return plan
-
-
-def _pair_notes(plan: Plan, name: str) -> list[str]:
-    """Note each pair that has no meaning at some points; refuse a sweep whose pairs have none at all."""
-    index = probe_index(plan.inputs)
-    problems, combinable = [], not plan.frictions
-    for law in plan.laws[len(plan.models) :]:
-        assert isinstance(law, Pair)
-        impacts = build_impacts(plan.inputs, law.model, index)
-        oblique = build_oblique(plan.inputs, impacts, index, law.friction)
-        with np.errstate(all="ignore"):
-            combinable |= bool((check_friction(law, oblique) != FrictionStatus.NOT_COMBINABLE).any())
-            problems += [f"{law.key}: {reason}" for reason in friction_problems(law, oblique)]
-    if not combinable:
-        raise ConfigError(*(f"{name}: frictions: {problem}" for problem in problems))
-    return [f"{problem}; these points are NaN" for problem in problems]
 
 
 def sweep_in_memory(plan: Plan, run: Run = DEFAULT_RUN) -> xr.Dataset:

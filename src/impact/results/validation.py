@@ -136,7 +136,7 @@ def _attribute_violations(dataset: xr.Dataset) -> Iterator[str]:
 def _history_violations(dataset: xr.Dataset) -> Iterator[str]:
     """Variables of a time history along other axes than t."""
     for name, variable in dataset.variables.items():
-        if variable.dims != (() if name == "model" else ("t",)):
+        if variable.dims != (() if name in ("model", "friction") else ("t",)):
             yield f"{name}: expected t as its only axis"
 
 

@@ -18,6 +18,7 @@ from ..config.lines import path_text
 from ..config.load import Config
 from ..config.tables import power_of_two_problem
 from ..contact.model import ForceModel
+from ..contact.status import FrictionStatus
 from ..contact.variables import OUTPUTS
 from ..engine.plan import Plan
 from ..engine.run import Run
@@ -43,6 +44,8 @@ def sensitivity(
     execute: Callable[[Plan], xr.Dataset] = sweep_in_memory,
 ) -> xr.Dataset:
     """Find which uncertain input matters: Sobol indices of an output, its mean and quantiles, for every model.
+
+    An output that depends on friction is studied for every pair of a model and a friction law.
 
     For n samples of d uncertain inputs, n (d + 2) points are computed for each model and each point of the other
     axes.
@@ -121,13 +124,16 @@ def sensitivities(
     >>> [round(study["mean"].item(), 5) for study in studies]
     [187.75797, 0.00998]
     """
-    names = [name for name in OUTPUTS if name not in ("status", "in_domain")]
+    names = [name for name, variable in OUTPUTS.items() if not variable.flags]
     for name in of:
         if name not in names:
             raise UsageError(f'--of: no output "{name}"; {did_you_mean(name, names)}')
     if output is not None and len(of) > 1:
         raise UsageError(f"--output: got {len(of)} outputs (--of), expected one for a file")
     plan = prepare(source, overrides, plugins, Run(max_points=max_points))
+    for name in of if not plan.frictions else ():
+        if OUTPUTS[name].of_friction:
+            raise UsageError(f'--of {name}: got no friction law, expected frictions, such as ["coulomb-1785"]')
     plan = sensitivity_plan(plan, of, max_points, str(source) if isinstance(source, str | Path) else "config")
     check_outputs([output], [source, *plugins, *plan.config.files], overwrite=overwrite)
     swept = execute(plan)
@@ -182,6 +188,10 @@ def sensitivity_of(plan: Plan, of: str, swept: xr.Dataset) -> xr.Dataset:
     values = np.asarray(outputs.values, float).reshape(-1, len(inputs) + 2, n)
     result = sensitivity_template(plan, of, others)
     statistics = _statistics(values, config)
+    if OUTPUTS[of].of_friction:
+        # a pair that has no meaning has not failed
+        status = swept["friction_status"].transpose("model", ..., SAMPLE).values.reshape(values.shape)
+        statistics["failed"] -= (status == FrictionStatus.NOT_COMBINABLE).sum(axis=(1, 2))
     return result.assign(
         {
             name: (
