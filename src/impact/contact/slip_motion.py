@@ -46,6 +46,8 @@ MODE_MARGIN, SIGN_MARGIN = 0, 1
 MARGIN_TOLERANCE = 1e-12
 # a force within this part of the limit is at the limit where the formulas change
 CAP_TOLERANCE = 1e-9
+# least s to which steps of difference quotients are relative
+MIN_REACH = 1e-2
 # powers of x that differ by less are the same
 ORDER_TOLERANCE = 1e-6
 # steps of the central difference quotients for the rate of N and the rate of the slip that it determines
@@ -54,7 +56,7 @@ RATE_OF_LIMIT_STEP, RATE_OF_SLIP_STEP = 1e-5, 1e-3
 # is singular at s = 0
 START_S, RATE_S, LEAST_S = 1e-7, 1e-4, 1e-10
 # s below which a mode does not change any more
-END_S = 1e-7
+END_S = 1e-6
 # step of the central difference quotient there, relative to s; it sees the rate of N beside a force that jumps
 RATE_STEP = 1e-2
 
@@ -357,7 +359,8 @@ class SlipPhase:
 
     def _rate_of_force(self, y: Array, k: Array, params: Params) -> Array:
         """Compute the rate of the normal force by a difference quotient."""
-        reach = np.clip(np.abs(y[0]), motion.MIN_RELEASE_S, 1.0)
+        # near s = 0 a force with a part that does not vanish there loses its rate to rounding in shorter steps
+        reach = np.clip(np.abs(y[0]), MIN_REACH, 1.0)
         if self.form.cap == "total":
             small = motion.RELEASE_STEP * reach
             return np.asarray((self.normal.rates(y[:2] + small * k[:2], params)[4] - k[FORCE_ROW]) / small)
@@ -372,8 +375,10 @@ class SlipPhase:
         """Compute the rate of the trial force if the contact sticks, at a force phi and one of the spring."""
         s = _away_from_zero(y[0])
         growth = k[0] / s
-        drag_per_slip = columns.damping * self._power(s, self.drag_power)
-        drag_rate: Array = self.drag_power * growth * local.drag - drag_per_slip * (local.weight * phi)
+        drag_rate: Array = -columns.damping * self._power(y[0], self.drag_power) * (local.weight * phi)
+        if self.drag_power:
+            growing = self.drag_power * self._power(y[0], self.drag_power - 1.0) * k[0]
+            drag_rate = drag_rate + columns.damping * growing * y[SLIP_ROW]
         if self.form.kind == "dashpot":
             return drag_rate
         stiffness = columns.root * columns.root * local.weight * self._power(y[0], self.stiffness_power)

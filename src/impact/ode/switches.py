@@ -34,9 +34,11 @@ def locate_switches(problem: Problem, switch: Switch, state: State, trial: Trial
     secant, unknown = (margins - before) / state.h, np.isnan(rates)
     slopes = np.where(unknown, secant, rates)
     slopes_before = np.where(np.isnan(rates_before), secant, rates_before)
+    # a trajectory that has ended has no next step, and its end may lie beyond where its rates are smooth
+    goes_on = state.termination == RUNNING
+    h_ahead = np.where(goes_on, trial.h_next, 0.0)
+    slopes = np.where(goes_on, slopes, np.fmin(slopes, 0.0))
     turns = (slopes_before < 0.0) & (slopes > 0.0)
-    # a trajectory that has ended has no next step
-    h_ahead = np.where(state.termination == RUNNING, trial.h_next, 0.0)
     falls = is_event_ahead(margins, slopes, h_ahead) | turns
     positions = (falls.any(axis=0) & accepted).nonzero()[0]
     if positions.size:
