@@ -414,6 +414,15 @@ class SlipPhase:
         margin, margin_rate = np.where(free, 1.0, margin), np.where(free, 0.0, margin_rate)
         return np.array([margin, sign_margin]), np.array([margin_rate, sign_rate])
 
+    def rates_of_margins(self, y: Array, k: Array, params: Params) -> Array:
+        """Compute the rates of the margins by central difference quotients, see `Switch`."""
+        small = RATE_OF_SLIP_STEP * np.clip(np.abs(y[0]), MIN_REACH, 1.0)
+        behind, ahead = (y[:N_COMPONENTS] + step * k[:N_COMPONENTS] for step in (-small, small))
+        rise = self.margins(ahead, self.rates(ahead, params), params)[0]
+        rise = rise - self.margins(behind, self.rates(behind, params), params)[0]
+        # at first contact and at the release the formulas are smooth on one side only
+        return np.where(y[0] > 2.0 * small, rise / (2.0 * small), np.nan)
+
     def change(self, which: NDArray[np.intp], y: Array, k: Array, params: Params) -> tuple[Array, Params]:
         """Change the modes and signs of trajectories where margins vanish, see `Switch`."""
         y, columns = self._released(y, params), self.columns(params)

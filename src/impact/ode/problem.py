@@ -44,7 +44,11 @@ class Switch(Protocol):
     """
 
     def margins(self, y: Array, k: Array, params: Params, /) -> Margins:
-        """Compute functions that are positive as long as a mode lasts, and their rates, NaN where unknown."""
+        """Compute functions that are positive as long as a mode lasts, and their rates, NaN if expensive."""
+        ...
+
+    def rates_of_margins(self, y: Array, k: Array, params: Params, /) -> Array:
+        """Compute the rates of the margins that `margins` leaves out; NaN where that is not possible."""
         ...
 
     def change(self, which: NDArray[np.intp], y: Array, k: Array, params: Params, /) -> tuple[Array, Params]:

@@ -16,10 +16,12 @@ from .problem import Problem, Switch
 from .state import RUNNING, State, TrialStep
 
 # a mode changes at the end of a step within this part of the last two steps, or within this time, of the zero
-SWITCH_RTOL, SWITCH_ATOL = 1e-8, 1e-12
+SWITCH_RTOL, SWITCH_ATOL = 1e-8, 3e-10
 # a step ends at the least value of a margin in its inside if that is less than this part of those at its ends, and
 # not as near to the start as the second number, in steps
 LOW_MARGIN, NEAR_START = 0.05, 0.01
+# the rates of a margin are computed at both ends of a step over which it changes by more than this part
+LARGE_CHANGE = 0.5
 
 
 def locate_switches(problem: Problem, switch: Switch, state: State, trial: TrialStep, accepted: Mask) -> None:
@@ -34,6 +36,14 @@ def locate_switches(problem: Problem, switch: Switch, state: State, trial: Trial
     secant, unknown = (margins - before) / state.h, np.isnan(rates)
     slopes = np.where(unknown, secant, rates)
     slopes_before = np.where(np.isnan(rates_before), secant, rates_before)
+    changes = np.abs(margins - before) > LARGE_CHANGE * np.maximum(np.abs(margins), np.abs(before))
+    steep = ((unknown & changes).any(axis=0) & accepted).nonzero()[0]
+    if steep.size:
+        params = tuple(column[steep] for column in state.params)
+        for rows, (y, k) in ((slopes, (trial.y, trial.k)), (slopes_before, (state.y, state.k))):
+            exact = switch.rates_of_margins(y[:, steep], k[:, steep], params)
+            rows[:, steep] = np.where(unknown[:, steep] & np.isfinite(exact), exact, rows[:, steep])
+            unknown[:, steep] &= ~np.isfinite(exact)
     # a trajectory that has ended has no next step, and its end may lie beyond where its rates are smooth
     goes_on = state.termination == RUNNING
     h_ahead = np.where(goes_on, trial.h_next, 0.0)
