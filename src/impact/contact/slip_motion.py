@@ -409,7 +409,7 @@ class SlipPhase:
         if held.size:
             margin[held], margin_rate[held] = self._held_margin(y[:, held], _taken(params, held))[0], np.nan
         # without a limit the mode does not matter, nor without a force; and where the contact ends growth vanishes
-        free = (columns.press == 0.0) | ((columns.root == 0.0) & (columns.damping == 0.0))
+        free = (columns.press == 0.0) | self._without_force(columns)
         free |= (k[0] < 0.0) & (y[0] < np.where(sticks, -END_S, END_S))
         margin, margin_rate = np.where(free, 1.0, margin), np.where(free, 0.0, margin_rate)
         return np.array([margin, sign_margin]), np.array([margin_rate, sign_rate])
@@ -451,6 +451,10 @@ class SlipPhase:
         spring_force = np.where(~turned & (old == 0.0), direction * local.N - capped_drag, spring_force)
         return self._enter(index, old, new, sign, local.spring_force, spring_force, y, params)
 
+    def _without_force(self, columns: Columns) -> Mask:
+        """Find trajectories without spring and dashpot."""
+        return np.asarray((columns.root == 0.0) & (columns.damping == 0.0))
+
     def _mode_at_limit(
         self, growth: Array, direction: Array, y: Array, columns: Columns, turned: Mask | bool = False
     ) -> Array:
@@ -461,9 +465,9 @@ class SlipPhase:
         free = columns.press == 0.0
         forwards = np.where(y[SLIP_ROW] < 0.0, -1.0, 1.0)
         kept = np.where(columns.mode == 0.0, forwards, np.sign(columns.mode))
-        if self.form.kind == "dashpot":
-            return np.where(free, kept, np.where((columns.mode == 0.0) | turned, forwards, 0.0))
-        return np.where(free, kept, np.where(growth > 0.0, direction, 0.0))
+        slips = (columns.mode == 0.0) | turned if self.form.kind == "dashpot" else growth > 0.0
+        new = np.where(free, kept, np.where(slips, forwards if self.form.kind == "dashpot" else direction, 0.0))
+        return np.where(self._without_force(columns), 0.0, new)
 
     def _enter(
         self,

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..array_types import Array, Mask
 from .events import event_offset, is_event_ahead
-from .problem import Problem, Switch
+from .problem import Problem, Switch, Termination
 from .state import RUNNING, State, TrialStep
 
 # a mode changes at the end of a step within this part of the last two steps, or within this time, of the zero
@@ -31,6 +31,11 @@ def locate_switches(problem: Problem, switch: Switch, state: State, trial: Trial
     """
     assert state.margins is not None
     assert state.h_free is not None
+    # the end of a trajectory is not the end of the step
+    ended = (state.termination == Termination.EVENT_REACHED).nonzero()[0]
+    if ended.size:
+        params = tuple(column[ended] for column in state.params)
+        trial.k[:, ended] = problem.rates(trial.y[: problem.n_components, ended], params)
     before, rates_before = state.margins
     margins, rates = switch.margins(trial.y, trial.k, state.params)
     secant, unknown = (margins - before) / state.h, np.isnan(rates)
