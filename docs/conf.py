@@ -13,6 +13,7 @@ import impact
 from impact.cli.main import COMMANDS, load_command
 from impact.config.tables import (
     FIXED_STEP_DEFAULTS,
+    OBLIQUE_DEFAULTS,
     SWEEP_DEFAULTS,
     Data,
     Design,
@@ -78,7 +79,9 @@ def config_page() -> str:
         "# Config keys",
         "",
         '`impact schema` prints the JSON Schema. Numbers are in SI, or strings with a unit such as `"5 km/h"`.',
-        "Any number of `[sweep]`, `[materials.NAME]` and `[model.KEY]` may be a list or a range (an axis),",
+        "`models` and `frictions` list contact force models and friction laws; parameters of a law are in",
+        "`[model.KEY]` and `[friction.KEY]` ([the models](../models.md), [the friction laws](../frictions.md)).",
+        "Any number of these, of `[sweep]` and of `[materials.NAME]` may be a list or a range (an axis),",
         "a column of a CSV file, `{ fit = [least, most] }` ([calibrate](../calibrate.md)) or a distribution",
         "([uncertain inputs](../uncertainty.md)).",
     ]
@@ -89,7 +92,9 @@ def config_page() -> str:
         for key, field in table.model_fields.items():
             quantity = quantities.get(key)
             meaning = quantity.description if quantity else field.description or ""
-            default = {**SWEEP_DEFAULTS, **FIXED_STEP_DEFAULTS}.get(key) if name == "sweep" else None
+            default = (
+                {**SWEEP_DEFAULTS, **FIXED_STEP_DEFAULTS, **OBLIQUE_DEFAULTS}.get(key) if name == "sweep" else None
+            )
             values = (quantity.expected if quantity else "") + (
                 f"; default {default:g}" if default is not None else ""
             )

@@ -5,12 +5,13 @@ python scripts/make_docs.py
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 import impact
+from frictions_page import frictions_page
 from gallery import gallery_page, write_gallery
-from impact.contact.status import Status
+from impact.contact.status import FrictionStatus, Status
 from impact.contact.variables import Variable
 from impact.plots.style import save_figure
 from impact.results.kinds import Kind
@@ -38,13 +39,14 @@ A netCDF-4 file in HDF5, schema version {version}, with a seal ([storage.md](sto
 `factored` contains trajectories instead of values, and opens as the dataset described here. A *point* is one
 cell of the grid for one model; cells that differ only in parameters of other models count once.
 
-The dimensions are `model`, followed by the swept axes in config order under their config names, such as `v1`,
-`bilinear.K` or `materials.steel.E`. A zip group is named after its first member; the other members are
-coordinates along it. Cases, and groups in which every column has repeated values, have the dimension `case`,
-with points numbered from 0 and all columns as coordinates; samples of uncertain inputs have the dimension
-`sample`. Scalars of the config are scalar coordinates.
-Coordinates along `model` are `title`, `year`, `equation`, `reference`, `doi` and `exponent` (n). With `alpha`,
-`e` is a coordinate over the axes that it depends on, and so is a mass that is computed from radius and density.
+The dimensions are `model`, then `friction` if the config has friction laws, followed by the swept axes in config
+order under their config names, such as `v1`, `bilinear.K` or `materials.steel.E`. A zip group is named after its
+first member; the other members are coordinates along it. Cases, and groups in which every column has repeated
+values, have the dimension `case`, with points numbered from 0 and all columns as coordinates; samples of uncertain
+inputs have the dimension `sample`. Scalars of the config are scalar coordinates. Coordinates along `model` are
+`title`, `year`, `equation`, `reference`, `doi` and `exponent` (n). With `alpha`, `e` is a coordinate over the axes
+that it depends on, and so is a mass that is computed from radius and density. Variables with the dimension
+`friction` are in results with friction laws only ([oblique.md](oblique.md)).
 
 | variable | unit | dimensions | judged by compare | meaning | equation |
 |---|---|---|---|---|---|
@@ -82,6 +84,14 @@ Points with status 1 to 9 have values; with status 10 and above they are NaN.
 | value | name | meaning |
 |---|---|---|
 {statuses}
+
+### Friction status
+
+`friction_status` belongs to a contact force with a friction law, and has the same numbers, and two more.
+
+| value | name | meaning |
+|---|---|---|
+{friction_statuses}
 
 ## Attributes
 
@@ -149,10 +159,13 @@ def schema_page() -> str:
         equation = variable.equation.replace("|", "\\|")
         return udunits(variable.unit), ", ".join(variable.dims), variable.judged, variable.meaning, equation
 
-    statuses = [f"| {status.value} | {status.name.lower()} | {status.meaning} |" for status in Status]
+    def status_rows(statuses: Iterable[Status | FrictionStatus]) -> list[str]:
+        return [f"| {status.value} | {status.name.lower()} | {status.meaning} |" for status in statuses]
+
     tables = {
         "variables": rows("sweep", output_cells),
-        "statuses": statuses,
+        "statuses": status_rows(Status),
+        "friction_statuses": status_rows(FrictionStatus),
         "history": rows("history", lambda variable: (udunits(variable.unit), variable.meaning)),
         "calibration": rows(
             "calibration",
@@ -168,7 +181,12 @@ def schema_page() -> str:
 
 
 # each generated page of docs, and the function that returns its text
-PAGES = {"schema.md": schema_page, "models.md": models_page, "gallery.md": gallery_page}
+PAGES = {
+    "schema.md": schema_page,
+    "models.md": models_page,
+    "frictions.md": frictions_page,
+    "gallery.md": gallery_page,
+}
 
 
 def write_pictures(folder: Path) -> None:
@@ -197,12 +215,21 @@ def write_timestep_figure(path: Path) -> None:
     save_figure(impact.plot(result, kind="restitution", x="phase", sel=at), path)
 
 
+def write_oblique_figures(folder: Path) -> None:
+    """Write the pictures of docs/oblique.md."""
+    balls = impact.sweep(ROOT / "configs" / "oblique.toml")
+    measured = folder / "kharaz.csv"
+    save_figure(impact.plot(balls, kind="e-t", points=measured), folder / "kharaz.svg")
+    save_figure(impact.plot(impact.sweep(folder / "psi.toml"), kind="psi"), folder / "psi.svg")
+
+
 def main() -> None:
     for name, page in PAGES.items():
         (ROOT / "docs" / name).write_text(page(), encoding="utf-8")
     write_pictures(ROOT / "docs" / "models")
     write_gallery(ROOT / "docs" / "gallery")
     write_timestep_figure(ROOT / "docs" / "timestep.svg")
+    write_oblique_figures(ROOT / "docs" / "oblique")
     write_paper_figures(ROOT / "docs" / "paper")
     result = impact.sweep(ROOT / "configs" / "figure6.toml")
     save_figure(impact.plot(result, equations=True), ROOT / "docs" / "figure6.png")

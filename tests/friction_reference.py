@@ -84,11 +84,13 @@ def normal_law(model: ForceModel, n: float, values: Mapping[str, float]) -> Norm
 
     for name, formula in model.coefficients.items():
         known[name] = call(formula)
-    if model.velocity_coordinate == "force":
+    if model.key == "hertz":
+        return spring_dashpot(n)
+    if model.velocity_coordinate == "force" and model.unloading is None:
         return spring_dashpot(n, known["c"], known["q"], model.release)
-    if model.velocity_coordinate == "log":
+    if model.velocity_coordinate == "log" and model.unloading is None:
         chi = known["chi"]
-        return NormalLaw(lambda x, v: x**n * (1.0 + chi * v), ((1.0 + chi, n),), release=model.release)
+        return spring_dashpot(n, chi, n, model.release)
 
     def force(x: float, v: float) -> float:
         return call(model.force, x=x, v=v, elastic=x**n)
@@ -171,12 +173,18 @@ class Outcome:
 S, V, G, Z, SPRING_WORK, DAMPING_WORK, MEMORY_WORK, IMPULSE = range(8)
 
 
-def directional(function: Callable[[float, float], float], s: float, v: float, ds: float, dv: float) -> float:
-    """Derivative of a function of (s, v) along (ds, dv) by differences of fourth order."""
+def directional(
+    function: Callable[[float, float], float], s: float, v: float, ds: float, dv: float, ends: tuple[float, float]
+) -> float:
+    """Derivative of a function of (s, v) along (ds, dv) by differences of fourth order, within the ends of s."""
     h = 1e-3 * min(1.0, abs(s) / max(abs(ds), 1e-3))
-    one = function(s + h * ds, v + h * dv) - function(s - h * ds, v - h * dv)
-    two = function(s + 2 * h * ds, v + 2 * h * dv) - function(s - 2 * h * ds, v - 2 * h * dv)
-    return (8.0 * one - two) / (12.0 * h)
+    if ends[0] <= s - 2 * h * abs(ds) and s + 2 * h * abs(ds) <= ends[1]:
+        one = function(s + h * ds, v + h * dv) - function(s - h * ds, v - h * dv)
+        two = function(s + 2 * h * ds, v + 2 * h * dv) - function(s - 2 * h * ds, v - 2 * h * dv)
+        return (8.0 * one - two) / (12.0 * h)
+    h *= -1.0 if (s - ends[0] < ends[1] - s) == (ds < 0.0) else 1.0
+    weights = (-25.0, 48.0, -36.0, 16.0, -3.0)
+    return math.fsum(w * function(s + k * h * ds, v + k * h * dv) for k, w in enumerate(weights)) / (12.0 * h)
 
 
 class Phase:
@@ -187,6 +195,8 @@ class Phase:
         # -1 after F = 0, so that the limit is smooth on both sides of it
         self.side = 1.0
         self.counts_memory = True
+        # s between breakpoints of the force, beyond which no difference quotient reaches
+        self.ends = (0.0, math.inf)
 
     def x(self, s: float) -> float:
         return self.residual + s**P
@@ -216,7 +226,7 @@ class Phase:
 
     def limit_rate(self, s: float, v: float) -> float:
         """d(mu N)/dσ."""
-        return directional(self.limit, s, v, v, -self.weight(s) * self.force(s, v))
+        return directional(self.limit, s, v, v, -self.weight(s) * self.force(s, v), self.ends)
 
     def steady_slip(self, sign: int, s: float, v: float) -> float:
         """The slip speed at which the spring's force grows as its limit does."""
@@ -226,7 +236,9 @@ class Phase:
 
     def third_force(self, sign: int, s: float, v: float) -> float:
         """f in the third regime."""
-        rate = directional(lambda s, v: self.steady_slip(sign, s, v), s, v, v, -self.weight(s) * self.force(s, v))
+        rate = directional(
+            lambda s, v: self.steady_slip(sign, s, v), s, v, v, -self.weight(s) * self.force(s, v), self.ends
+        )
         return -self.friction.m_t * rate / self.weight(s)
 
     def forces(self, y: np.ndarray, mode: int) -> tuple[float, float, float]:
@@ -259,7 +271,7 @@ class Phase:
             if mode == STICK:
                 # w k^(1 - r), which has no pole at s = 0
                 loading = w * self.stiffness(s) ** (1.0 - self.r) * g if s > 0.0 else 0.0
-            if f.kp and s > 0.0 and (self.counts_memory or mode == STICK):
+            if f.kp and s > 0.0 and self.counts_memory:
                 memory = (0.5 - self.r) * spring * spring * f.kp * self.growth(s) * v / self.stiffness(s)
         return [
             v,
@@ -354,7 +366,7 @@ class Trajectory:
         self.points: list[float] = []
         self.pulls = False
         self.slip_start: tuple[float, float, float] | None = None
-        self.first_run = True
+        self.begins_at_limit = False
 
     # -- modes
 
@@ -395,10 +407,9 @@ class Trajectory:
         limit = self.phase.limit(TINY_S, 1.0)
         total = self.phase.damping(TINY_S) * y[G] if f.cap == "total" else 0.0
         spring = 0.0
-        if mode != STICK:
-            spring = mode * limit - total
-        elif total > limit * (1.0 + 1e-9):
-            spring = limit - total
+        self.begins_at_limit = mode != STICK or total > limit * (1.0 + 1e-9)
+        if self.begins_at_limit:
+            spring = (mode or 1) * limit - total
         self.jump(0.0, spring)
         self.enter(mode, spring, counts=False)
         # a finite displacement at x = 0
@@ -567,6 +578,8 @@ class Trajectory:
     def solve(self) -> Outcome:
         f, out = self.friction, self.outcome
         self.points = [p for p in self.normal.breakpoints if math.isfinite(p)]
+        self.all_points = list(self.points)
+        self.set_ends()
         self.begin()
         if f.kind == "dashpot":
             self.mode = STICK if self.phase.damping(1e-6) * abs(self.y[G]) < self.phase.limit(1e-6, 1.0) else 1
@@ -574,11 +587,20 @@ class Trajectory:
         for _ in range(1000):
             name = self.run()
             if abs(self.mode) == THIRD:
-                self.y[G] = self.phase.steady_slip(self.mode // 2, self.y[S], self.y[V])
+                # at s = 0 itself it is 0/0
+                s = self.y[S] if self.phase.residual else max(self.y[S], 1e-5)
+                self.y[G] = self.phase.steady_slip(self.mode // 2, s, self.y[V])
             if name in ("gap", "release"):
                 return self.finish(name)
             self.switch(name)
         raise ArithmeticError("too many switches")
+
+    def set_ends(self) -> None:
+        """Bound difference quotients by the breakpoints around the present indentation."""
+        phase, x = self.phase, self.phase.x(self.y[S])
+        known = [(p - phase.residual) ** (1.0 / P) for p in self.all_points]
+        below = [s for s in known if phase.residual + s**P < x or (s == self.y[S] and not self.is_back)]
+        phase.ends = (max(below, default=0.0), min((s for s in known if s not in below), default=math.inf))
 
     def spring_now(self) -> float:
         if abs(self.mode) == THIRD:
@@ -600,7 +622,8 @@ class Trajectory:
             self.choose(spring)
         elif name.startswith("breakpoint"):
             del self.points[int(name.split()[1])]
-            y[S] += math.copysign(1e-14, y[V])
+            y[S] += math.copysign(1e-13, y[V])
+            self.set_ends()
             self.choose(spring)
         elif name == "zero":
             self.pulls = not self.pulls
@@ -642,9 +665,10 @@ class Trajectory:
         if normal.unloading is not None:
             points = normal.unloading_breakpoints(peak, at_peak) if normal.unloading_breakpoints else ()
         self.points = [p for p in points if math.isfinite(p) and residual < p < peak * (1.0 - 1e-12)]
+        self.all_points = list(self.points)
         if residual:
             y[S] = (peak - residual) ** (1.0 / P)
-            peak = self.phase.x(y[S])
+        self.set_ends()
 
     def finish(self, name: str) -> Outcome:
         out, y, f = self.outcome, self.y, self.friction
@@ -663,7 +687,8 @@ class Trajectory:
             spring = self.spring_now()
             self.leave(spring)
             out.elastic_left, out.memory_work = self.phase.energy(y[S], spring), float(y[MEMORY_WORK])
-            out.slip_and_memory = out.slip_work + out.memory_work
+            # in every mode f_e g is the rate of the spring's energy and of these two
+            out.slip_and_memory = float(y[SPRING_WORK]) - out.elastic_left
         return out
 
 
@@ -671,13 +696,13 @@ def solve(normal: NormalLaw, friction: Friction, g0: float) -> Outcome:
     """Integrate one impact with a slip speed g0 > 0."""
     if friction.kind != "spring" or not friction.kp:
         return Trajectory(normal, friction, g0).solve()
-    # where a slip at x = 0 leaves energy in the spring, its slip work and its memory work each have a pole there
+    # where there is energy in the spring at x = 0, slip work and memory work each have a pole there
     first = Trajectory(normal, friction, g0)
     first.phase.counts_memory = False
     outcome = first.solve()
     powers = [normal.damping[1]] * bool(normal.damping and normal.damping[0])
     powers += [friction.q] * bool(friction.c_t and friction.cap == "total")
-    slides = [outcome.modes[0][1] != STICK, first.mode != STICK and normal.release == "gap"]
+    slides = [first.begins_at_limit, first.mode != STICK and normal.release == "gap"]
     if any(slides) and powers and 2.0 * min(powers) <= friction.kp:
         outcome.slip_work = outcome.memory_work = math.nan
         return outcome

@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 
 import impact
-from impact.contact.status import Status
+from impact.contact.status import FrictionStatus, Status
 from impact.results.summary import summarize
 
 from .conftest import ROOT
@@ -43,6 +43,19 @@ def test_every_model_is_in_a_baseline(baselines: list[xr.Dataset]) -> None:
     assert laws == {key for baseline in baselines for key in baseline["model"].values.tolist()}
 
 
+def test_every_friction_law_and_status_is_in_a_baseline(baselines: list[xr.Dataset]) -> None:
+    of_friction = [baseline for baseline in baselines if "friction" in baseline.dims]
+    assert set(impact.frictions()) == {key for baseline in of_friction for key in baseline["friction"].values}
+    statuses = {int(status) for baseline in of_friction for status in np.unique(baseline["friction_status"])}
+    assert statuses == {
+        FrictionStatus.OK,
+        FrictionStatus.NO_IMPACT,
+        FrictionStatus.LIMIT,
+        FrictionStatus.SLOW_LIMIT,
+        FrictionStatus.NOT_COMBINABLE,
+    }
+
+
 def test_every_kind_of_axis_is_in_a_baseline(baselines: list[xr.Dataset]) -> None:
     axes = {str(dim) for baseline in baselines for dim in baseline.dims}
     assert {
@@ -57,6 +70,10 @@ def test_every_kind_of_axis_is_in_a_baseline(baselines: list[xr.Dataset]) -> Non
         "material2",
         "dt",
         "phase",
+        "angle",
+        "mu",
+        "u1",
+        "friction.lammps-linear-history.xt",
         "ismail-stronge-2008.gamma",
     } <= axes
     zipped = [baseline for baseline in baselines if "m1" in baseline.dims and baseline["m2"].dims == ("m1",)]

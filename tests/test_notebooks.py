@@ -20,7 +20,14 @@ PATHS = sorted(NOTEBOOKS.glob("*.ipynb"))
 
 
 def test_there_is_a_notebook_for_each_question_and_each_has_its_pictures() -> None:
-    assert [path.stem for path in PATHS] == ["calibrate", "figure6", "teaching", "uncertainty", "which-law"]
+    assert [path.stem for path in PATHS] == [
+        "calibrate",
+        "figure6",
+        "spin",
+        "teaching",
+        "uncertainty",
+        "which-law",
+    ]
     for path in PATHS:
         shown = texts(nbformat.read(path, as_version=4))
         assert ["picture"] in shown, path.name

@@ -83,6 +83,11 @@ def config(**sweep: Any) -> Config:
          ['x.toml:11: sweep.angle: got 30 rad; did you mean "30 deg"?']),
         (HEAD + "v1 = 2\nmu = 0.3\nangle = 90",
          ["x.toml:11: sweep.angle: got 90 rad, expected an angle from 0 to below 90 deg"]),
+        (HEAD + 'v1 = 2\nmu = 0.3\nangle = { arange = ["0 deg", "95 deg", "10 deg"] }',
+         ["x.toml:11: sweep.angle.arange: got a value 1.5707963267949 rad, expected an angle from 0 to below 90 "
+          "deg"]),
+        (HEAD + "v1 = 2\nmu = 0.3\nangle = { arange = [0, 90, 10] }",
+         ['x.toml:11: sweep.angle.arange: got a value 80 rad; did you mean "80 deg"?']),
         (HEAD + 'v1 = 2\nmu = 0.3\nangle = "30 %"',
          ['x.toml:11: sweep.angle: got "30 %", expected a unit of rad, such as "1 rad"']),
         (HEAD + 'v1 = 2\nu1 = 2\nmu = "17 deg"', ['x.toml:11: sweep.mu: got "17 deg", expected a bare number']),

@@ -33,7 +33,8 @@ def test_the_toml_and_the_commands_of_daily_use(cli: Run, tmp_path: Path) -> Non
     (toml,) = blocks("toml")
     (tmp_path / "config.toml").write_text(toml, encoding="utf-8")
     commands = [line for block in blocks("sh")[2:] for line in block.splitlines() if line]
-    assert len(commands) == 17
+    assert len(commands) == 20
+    (tmp_path / "configs").symlink_to(ROOT / "configs")
     (tmp_path / "measured.csv").write_text("e, e_out, sigma\n0.5, 0.45, 0.02\n", encoding="utf-8")
     for line in commands:
         program, *words = shlex.split(line)
@@ -41,6 +42,7 @@ def test_the_toml_and_the_commands_of_daily_use(cli: Run, tmp_path: Path) -> Non
         done = cli(*words, cwd=tmp_path)
         assert done.returncode == 0, (line, done.stderr)
     written = {"results.h5", "results.png", "baseline.h5", "differences.png", "figure-map.svg", "report.html"}
+    written |= {"oblique.h5", "oblique-spin.svg"}
     assert written <= {path.name for path in tmp_path.iterdir()}
 
 

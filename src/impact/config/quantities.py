@@ -475,7 +475,8 @@ class Quantity:
             and math.isfinite(number)
             and (is_bare or re.fullmatch(r"[^a-zA-Z]+rad\s*", str(value)))
         ):
-            if 0.0 < number < math.degrees(self.most):
+            # between pi/2 and pi only whole numbers seem to be degrees
+            if 0.0 < number < math.degrees(self.most) and (number > math.pi or number.is_integer()):
                 return f'got {number:.15g} rad; did you mean "{number:.15g} deg"?'
             return f"got {number:.15g} rad, expected {self.expected}"
         return f"got {as_text(value)}, expected {self.expected}"

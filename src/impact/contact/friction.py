@@ -200,12 +200,12 @@ def check_friction(pair: Pair, oblique: ObliqueImpacts) -> NDArray[np.int8]:
     Returns the status before integration, of a shape that broadcasts to that of the impacts: NOT_COMBINABLE for
     the reasons of `friction_problems`, INVALID_PARAMETER for a dynamic friction above the static one, a viscous
     one without it, and an e outside [0, 1] from which a damping is computed, OUT_OF_RANGE where a stiffness or a
-    damping is not finite.
+    damping is NaN; an infinite one may be that of a limit of the normal motion, and is judged after that.
     """
     law = pair.friction
     status = np.full((1,) * max(1, len(oblique.impacts.shape)), FrictionStatus.OK, np.int8)
     for value in _spring_values(pair, oblique).values():
-        status = _where(~(value >= 0.0) | np.isinf(value), FrictionStatus.OUT_OF_RANGE, status)
+        status = _where(~(value >= 0.0), FrictionStatus.OUT_OF_RANGE, status)
     for mask in _invalid(law, oblique):
         status = _where(mask, FrictionStatus.INVALID_PARAMETER, status)
     for mask, _ in _problems(pair, oblique):

@@ -18,7 +18,7 @@ from ..array_types import Array
 from ..ode.problem import Params, Problem, Solution, Step
 from ..ode.rk45 import integrate
 from . import motion
-from .dimensionless import with_coefficients, with_units
+from .dimensionless import exact_restitution, with_coefficients, with_units
 from .formula_calls import argument_names
 from .model import ForceModel
 from .piecewise import in_parts
@@ -182,6 +182,7 @@ def _simulate_distinct(
     if form.kind == "coulomb":
         # with infinite damping the balls stop at first contact
         result.sliding_impulse[status == LIMIT] = 1.0
+        result.exact[:] *= 1.0 + exact_restitution(model, law_values, count)
     return result
 
 
@@ -259,6 +260,10 @@ def _integrate(
     if form.kind == "coulomb":
         status[stopped] = LIMIT
     status[(status == STATUS_OK) & track.is_slow] = FrictionStatus.SLOW_LIMIT
+    if form.kind != "coulomb":
+        # whatever the reason, an answer is a number
+        has_answer = (status == STATUS_OK) | (status == FrictionStatus.SLOW_LIMIT)
+        status[has_answer & ~np.isfinite(result.slip)] = FrictionStatus.NOT_FINITE
     return replace(result, steps=steps, status=status)
 
 
@@ -278,7 +283,8 @@ def _result(form: TangentialForm, n: float, base: Columns, track: Track, state: 
     nan = np.full(ended.size, np.nan)
     result = replace(TangentialResult.blank(ended.size), sliding_impulse=np.where(ended, track.impulse, np.nan))
     if form.kind == "coulomb":
-        return result
+        # without tension Lambda is 1 + e_out
+        return replace(result, exact=np.where(ended & (track.sign > 0.0), 1.0, np.nan))
     regime = np.where(track.modes == 1, STICKS, np.where(track.modes & 1, BOTH, SLIDES))
     if form.kind == "regularized":
         regime = np.zeros_like(regime)
