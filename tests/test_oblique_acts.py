@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -346,3 +347,11 @@ def test_a_pair_without_meaning_is_noted_and_a_failed_pair_has_the_command_that_
                 friction={"lammps-mindlin": {"kt_over_kn": 0.8}},
             )
         )
+
+
+@pytest.mark.parametrize("layout", ["full", "factored"])
+def test_info_counts_the_points_of_pairs_and_writes_words(swept: dict[str, xr.Dataset], layout: str) -> None:
+    described = impact.info(swept[layout].encoding["source"])
+    # 8 angles, 2 mu and, for one law, 2 stiffnesses
+    assert described["friction_status"] == {"ok": 3 * (16 + 32)}
+    assert re.search(r"^friction\.coulomb-1785\.limit +abs *$", str(described), re.MULTILINE)
