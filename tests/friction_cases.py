@@ -91,7 +91,7 @@ class Batch:
         status = np.array(np.broadcast_to(check_inputs(self.pair.model, impacts), len(self.g0)))
         of_friction = np.broadcast_to(check_friction(self.pair, self.oblique), len(self.g0))
         status = np.where(of_friction != FrictionStatus.OK, of_friction, status).astype(np.int8)
-        return simulate_friction(self.pair, impacts.n, self.values(), status, rtol=rtol, max_steps=3_000)
+        return simulate_friction(self.pair, impacts.n, self.values(), status, rtol=rtol, max_steps=1_000)
 
     def reference(self, row: int) -> Outcome:
         """The trajectory of an impact by the reference solver."""

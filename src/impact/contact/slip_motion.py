@@ -310,7 +310,7 @@ class SlipPhase:
             out[DAMPING_ROW] = power * working_drag
         out[SLIP_WORK_ROW] = power * slip_force
         if self.has_spring and self.stiffness_power and self.memory != 0.5:
-            safe = _away_from_zero(s)
+            safe = np.where(np.abs(s) < END_S, END_S, s)
             fading = (0.5 - self.memory) * self.stiffness_power * columns.compliance * v
             fading /= self._power(safe, self.stiffness_power + 1.0)
             np.multiply(fading, spring_force * spring_force, out[STICK_MEMORY_ROW])
@@ -403,8 +403,9 @@ class SlipPhase:
         held = np.flatnonzero(np.abs(columns.mode) == 2.0)
         if held.size:
             margin[held], margin_rate[held] = self._held_margin(y[:, held], _taken(params, held))[0], np.nan
-        # without a limit the mode does not matter, and where the contact ends all margins vanish
-        free = (columns.press == 0.0) | (y[0] < END_S)
+        # without a limit the mode does not matter, nor without a force; and where the contact ends growth vanishes
+        free = (columns.press == 0.0) | ((columns.root == 0.0) & (columns.damping == 0.0))
+        free |= (k[0] < 0.0) & (y[0] < np.where(sticks, -END_S, END_S))
         margin, margin_rate = np.where(free, 1.0, margin), np.where(free, 0.0, margin_rate)
         return np.array([margin, sign_margin]), np.array([margin_rate, sign_rate])
 
@@ -429,6 +430,8 @@ class SlipPhase:
         direction = np.sign(np.where(turned, rate, local.trial))
         new = self._mode_at_limit(direction * rate - dN, direction, y, other, turned)
         new = np.where(~turned & (np.abs(old) == 1.0), 0.0, new)
+        # a held force that goes through zero is at the limit of both slip and stick from there
+        new = np.where(turned & (np.abs(old) == 2.0) & (other.press != 0.0), 0.0, new)
         new = self._held_mode(~turned & (old != 0.0), np.abs(old) == 2.0, np.sign(old), new, y, params)
         capped_drag = local.drag if self.is_total else 0.0
         spring_force = np.where(~turned & (old == 0.0), direction * local.N - capped_drag, spring_force)
@@ -482,16 +485,30 @@ class SlipPhase:
         fading = self.memory * self.stiffness_power * k[0] / _away_from_zero(y[0]) * N
         return direction * (dN - fading) / stiffness, N
 
+    def _held_force(self, y: Array, params: Params, direction: Array) -> Array:
+        """Compute the friction force that gives the slip its rate, over G0."""
+        small = RATE_OF_SLIP_STEP * np.clip(np.abs(y[0]), motion.MIN_RELEASE_S, 1.0)
+        k = self.rates(y, params)
+        step = small * k[:N_COMPONENTS]
+        ahead, behind = (self._held_slip(y + sign * step, params, direction)[0] for sign in (1.0, -1.0))
+        return np.asarray((behind - ahead) / (2.0 * small * k[TIME_ROW]))
+
+    def friction_at(self, y: Array, params: Params) -> tuple[Array, Array, Array]:
+        """Compute Gamma, the friction force phi and its part phi_e in the spring, over G0, from rows of a step."""
+        near = np.array([_away_from_zero(y[0]), *y[1:N_COMPONENTS]])
+        near = self._released(near, params)
+        k = self.rates(near, params)
+        mode, force = self.columns(params).mode, -k[SLIP_ROW] / k[TIME_ROW]
+        if (np.abs(mode) == 2.0).any():
+            force = np.where(np.abs(mode) == 2.0, self._held_force(near, params, np.sign(mode)), force)
+        return near[SLIP_ROW], force, self.local(near, k, params).spring_force
+
     def _held_margin(self, y: Array, params: Params, direction: Array | None = None) -> tuple[Array, Mask]:
         """Compute a margin, positive while the force is between slip and stick, and where it is nearer to slip."""
         columns, y = self.columns(params), y[:N_COMPONENTS]
         direction = np.sign(columns.mode) if direction is None else direction
         slip, N = self._held_slip(y, params, direction)
-        small = RATE_OF_SLIP_STEP * np.clip(np.abs(y[0]), motion.MIN_RELEASE_S, 1.0)
-        k = self.rates(y, params)
-        step = small * k[:N_COMPONENTS]
-        ahead, behind = (self._held_slip(y + sign * step, params, direction)[0] for sign in (1.0, -1.0))
-        force = (behind - ahead) / (2.0 * small * k[TIME_ROW])
+        force = self._held_force(y, params, direction)
         drag = columns.damping * self._power(y[0], self.drag_power) * slip
         above_slip = (force - direction * N) * np.sign(drag)
         return np.minimum(above_slip, np.abs(drag) - above_slip), above_slip < 0.5 * np.abs(drag)

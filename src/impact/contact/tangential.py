@@ -163,7 +163,8 @@ def _simulate_distinct(
     status = check_coefficients(model, law_values, values, count)
     zero = np.zeros(count)
     slip = np.ones(count) if form.kind == "coulomb" else np.abs(values[SLIP])
-    stiffness, damping = values.get(TANGENTIAL_STIFFNESS, zero), values.get(TANGENTIAL_DAMPING, zero)
+    stiffness = values[TANGENTIAL_STIFFNESS] if form.kind == "spring" else zero
+    damping = values.get(TANGENTIAL_DAMPING, zero) if form.kind in ("spring", "dashpot") else zero
     is_positive = values.get(LIMIT_POSITIVE, zero)
     is_trivial = (slip == 0.0) | ~np.isfinite(slip)
     for array in (stiffness, damping):

@@ -27,10 +27,12 @@ def locate_switches(problem: Problem, switch: Switch, state: State, trial: Trial
 
     A step across the zero of a margin, or across a low minimum, is rejected and tried again with the length to it.
     """
-    before, rates_before = state.margins or switch.margins(state.y, state.k, state.params)
+    assert state.margins is not None
+    assert state.h_free is not None
+    before, rates_before = state.margins
     margins, rates = switch.margins(trial.y, trial.k, state.params)
-    secant = (margins - before) / state.h
-    slopes = np.where(np.isnan(rates), secant, rates)
+    secant, unknown = (margins - before) / state.h, np.isnan(rates)
+    slopes = np.where(unknown, secant, rates)
     slopes_before = np.where(np.isnan(rates_before), secant, rates_before)
     turns = (slopes_before < 0.0) & (slopes > 0.0)
     # a trajectory that has ended has no next step
@@ -39,7 +41,12 @@ def locate_switches(problem: Problem, switch: Switch, state: State, trial: Trial
     positions = (falls.any(axis=0) & accepted).nonzero()[0]
     if positions.size:
         g, dg, g_before, dg_before = (values[:, positions] for values in (margins, slopes, before, slopes_before))
-        which, offset = _first_zero(g, dg, g_before, dg_before, state.h[positions])
+        # the secant of a step that was shortened before has half the height at its start, so that steps across a
+        # zero do not approach it from beyond for ever (the Illinois rule)
+        height = np.where(state.h_free[positions] > 0.0, 0.5, 1.0) * g_before
+        which, offset = _first_zero(
+            g, dg, g_before, dg_before, state.h[positions], np.where(unknown[:, positions], height, np.nan)
+        )
         near = SWITCH_RTOL * (state.h[positions] + state.h_last[positions]) + SWITCH_ATOL
         reached = (np.abs(offset) <= near) & (state.termination[positions] == RUNNING)
         crossed = (offset < -near) & ~reached
@@ -55,12 +62,16 @@ def locate_switches(problem: Problem, switch: Switch, state: State, trial: Trial
 
 
 def _first_zero(
-    g: Array, dg: Array, g_before: Array, dg_before: Array, h: Array
+    g: Array, dg: Array, g_before: Array, dg_before: Array, h: Array, height: Array
 ) -> tuple[NDArray[np.intp], Array]:
-    """Find the margin that vanishes first, and the offset from the end of the step, shape (n,)."""
+    """Find the margin that vanishes first, and the offset from the end of the step, shape (n,).
+
+    `height` is the value at the start for the secant of margins with unknown rates, and NaN for the others.
+    """
     offset, certain = event_offset(g, dg, g_before, dg_before, h)
-    inside = (offset < 0.0) & (offset > -h)
-    crossing = np.where(g_before > 0.0, -h * g / (g - g_before), -h * (1.0 - NEAR_START))
+    inside = (offset < 0.0) & (offset > -h) & np.isnan(height)
+    start = np.where(np.isnan(height), g_before, height)
+    crossing = np.where(start > 0.0, -h * g / (g - start), -h * (1.0 - NEAR_START))
     crossing = np.where(inside, offset, crossing)
     ahead = np.where(certain & (offset >= 0.0), offset, np.inf)
     turns = (dg_before < 0.0) & (dg > 0.0)
