@@ -339,4 +339,10 @@ def test_a_pair_without_meaning_is_noted_and_a_failed_pair_has_the_command_that_
     with pytest.raises(UsageError, match="failed, the first at model=tsuji-1992, friction=drake-regularized"):
         impact.bless(output, tmp_path / "baseline.h5", reason="test")
     with pytest.raises(ConfigError, match=reason):
-        impact.sweep({**source, "models": "lankarani-nikravesh-1994", "frictions": "lammps-mindlin"})
+        impact.sweep(
+            config(
+                models="lankarani-nikravesh-1994",
+                frictions="lammps-mindlin",
+                friction={"lammps-mindlin": {"kt_over_kn": 0.8}},
+            )
+        )
