@@ -125,6 +125,12 @@ EXAMPLES = {
         "Slip after over slip before the impact in the units of Maw, Barber and Fawcett (1976), in which the "
         "curves do not depend on mu and hardly on the materials. Below the line of sticking the slip is reversed.",
     ),
+    "friction-loop": (
+        "oblique",
+        "--sel 'angle=15 deg'",
+        "Friction over the slip displacement of one impact: the enclosed area is the energy lost. Rigid "
+        "friction stops the slip; the springs then push it back, until they slip the other way.",
+    ),
     "calibration": (
         "drops",
         "",

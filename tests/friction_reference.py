@@ -515,11 +515,18 @@ class Trajectory:
             values = [math.inf] + [
                 event(dense(t)) if dense(t)[S] > 0.0 or name == "gap" else math.nan for t in times[1:]
             ]
-            if armed[name] or name in ("gap", "peak"):
-                values[0] = event(dense(start)) if dense(start)[S] > 0.0 else math.inf
+            if dense(start)[S] > 0.0:
+                values[0] = event(dense(start))
+                armed[name] = armed[name] or values[0] > tolerance
             time = self.crossing(name, event, armed, dense, times, values, tolerance)
             if time is not None and (best is None or time < best[1]):
                 best = name, time
+        if best is not None and best[0] == "gap" and armed.get("slip"):
+            # the limit vanishes at x = 0, so that a slip may begin after the last sample
+            margin, end = events["slip"], best[1] - 10.0 * TINY_S / abs(dense(best[1])[V])
+            before = [t for t in (start, *(start + length * SAMPLES)) if t < end]
+            if end > start and margin(dense(end)) < 0.0 < margin(dense(before[-1])):
+                best = "slip", brentq(lambda t: margin(dense(t)), before[-1], end, xtol=1e-16, rtol=1e-15)
         return best
 
     def crossing(self, name, event, armed, dense, times, values, tolerance) -> float | None:
@@ -531,7 +538,7 @@ class Trajectory:
                     armed[name] = True
                 elif values[i] < -tolerance:
                     # it was never positive: it happens at once
-                    return times[i - 1] if i > 1 else times[0]
+                    return times[i - 1]
                 continue
             if values[i] < 0.0:
                 low, high = times[i - 1], times[i]

@@ -256,6 +256,31 @@ def test_slips_are_those_of_maw_barber_and_fawcett() -> None:
     check_layout(draw(data, Look(width="84mm")))
 
 
+def test_the_area_of_a_friction_loop_is_the_energy_lost(beads: xr.Dataset, cli: Run, tmp_path: Path) -> None:
+    data = curves_of(beads, "friction-loop", sel={"angle": "15 deg", "mu": 0.3})
+    (panel,) = data.panels
+    assert (panel.x_name, panel.y_name, panel.x_unit, panel.y_unit) == ("xi", "f", "m", "N")
+    # a pair that cannot be combined has no motion
+    assert [curve.law for curve in panel.curves] == [curve.law for curve in of_pairs(curves_of(beads, "beta"))]
+    for curve in panel.curves:
+        lost = beads["friction_loss"].sel(model=curve.model, friction=curve.friction, mu=0.3).isel(angle=2)
+        assert np.trapezoid(curve.y, curve.x) == pytest.approx(float(lost), rel=1e-3)
+    one = curves_of(beads, "friction-loop", models=[TSUJI], frictions=[FORCE, COULOMB])
+    shown = [curve.label.replace("\N{NO-BREAK SPACE}", " ") for curve in of_pairs(one)]
+    assert shown == ["LAMMPS mindlin/force, xt = 0, limit = positive", "Coulomb"]
+    check_layout(draw(one, Look(width="84mm")))
+    # a time history is drawn as it is, if it has friction
+    impact.save(beads, tmp_path / "beads.h5")
+    for friction, name in ((["--friction", FORCE], "oblique.h5"), ([], "central.h5")):
+        source = ["beads.h5"] if friction else []
+        assert cli("run", *source, *friction, "--history", name, cwd=tmp_path).returncode == 0
+    done = cli("plot", "oblique.h5", "-k", "friction-loop", "-o", "a.svg", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    failed = cli("plot", "central.h5", "-k", "friction-loop", "-o", "b.svg", cwd=tmp_path)
+    message = "this time history has no friction; run a config with frictions = [...]\n"
+    assert (failed.returncode, failed.stderr) == (2, message)
+
+
 def test_other_pictures_do_not_depend_on_friction(beads: xr.Dataset) -> None:
     for kind, variable in (("final-velocities", "v1_post"), ("restitution", "e_out"), ("error", "e_error")):
         curve = next(c for c in curves_of(beads, kind).panels[0].curves if c.model and c.variable == variable)
@@ -320,9 +345,9 @@ def test_bands_of_uncertain_friction_are_of_pairs() -> None:
 def test_a_report_has_a_section_on_friction(beads: xr.Dataset, central: xr.Dataset) -> None:
     text = impact.report(beads)
     section = text.partition("<h2>Friction</h2>")[2].partition("</section>")[0]
-    captions = [find_kind(kind).caption for kind in SHOWN]
+    captions = [find_kind(kind).caption for kind in (*SHOWN, "friction-loop")]
     assert all(section.count(caption) == 2 for caption in captions)
-    assert text.count("<figure>") > section.count("<figure>") == len(SHOWN)
+    assert text.count("<figure>") > section.count("<figure>") == len(captions)
     for key in FRICTIONS:
         assert find_friction(key).title in section
     combined = int((beads["friction_status"] < 10).sum())

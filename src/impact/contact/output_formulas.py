@@ -115,15 +115,13 @@ def collide(
     pair, inputs = oblique
     with np.errstate(all="ignore"):
         own = np.where(checked == STATUS_OK, check_friction(pair, inputs), checked).astype(np.int8)
-        columns = {
-            name: np.broadcast_to(column, impacts.n.shape)
-            for name, column in friction_values(pair, inputs).items()
-        }
+        columns = {**of_law, **friction_values(pair, inputs)}
+    shape = np.broadcast_shapes(own.shape, *(column.shape for column in columns.values()))
     tangential = simulate_friction(
         pair,
-        impacts.n,
-        of_law | columns,
-        np.broadcast_to(own, impacts.n.shape),
+        np.broadcast_to(impacts.n, shape),
+        {name: np.broadcast_to(column, shape) for name, column in columns.items()},
+        np.broadcast_to(own, shape),
         rtol=rtol,
         max_steps=max_steps,
         collapse=collapse,

@@ -68,7 +68,7 @@ class TangentialResult(Record):
     `slip` is G at the end for a positive G0; works are in units of mu^2 (m v0)^2/m_t; `sliding_impulse` is the
     integral of the limiting normal force, Lambda; `exact` is `slip` in closed form, NaN without one; `stiffness`
     is kappa m/m_t, where kappa is that of Maw, Barber and Fawcett, NaN for a kind without a spring. For the kind
-    "coulomb" there is only `sliding_impulse`, and the slip follows from it.
+    "coulomb" there is only `sliding_impulse`, from which the slip follows, and `exact` is its closed form.
     """
 
     slip: Array

@@ -107,7 +107,10 @@ def get_plot_data(
     if default.source in STUDIES and found != default:
         raise UsageError(f"this result has the kind {default.name}, not {kind}")
     if found.source == "history":
-        return found.data(histories(dataset, choice.models, choice.sel or {}, plugin_set), choice)
+        frictions = choice.frictions
+        if found.of_friction and "friction" in dataset.dims:
+            frictions = frictions or dataset["friction"].values.tolist()
+        return found.data(histories(dataset, choice.models, choice.sel or {}, plugin_set, frictions), choice)
     return found.data(dataset, choice)
 
 

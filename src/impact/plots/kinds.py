@@ -36,6 +36,7 @@ KINDS = {
     "impulse-ratio": "oblique",
     "spin": "oblique",
     "psi": "oblique",
+    "friction-loop": "oblique",
     "calibration": "calibrations",
     "uncertainty": "uncertainty",
     "sensitivity": "sensitivity",

@@ -198,9 +198,10 @@ def choose_pairs(dataset: xr.Dataset, keys: Sequence[str], needed: str = "beta")
 
 
 def choose_loop(dataset: xr.Dataset, keys: Sequence[str]) -> Choice | None:
-    """Choose the point of a motion with friction; None for a result without friction."""
+    """Choose the point of a motion with friction, of at most MAX_PAIRS; None for a result without friction."""
     choice = choose_point(dataset, keys) if "friction" in dataset.dims else None
-    return choice and replace(choice, x=_first_axis(dataset, Choice()))
+    few = keys[: max(1, MAX_PAIRS // dataset.sizes["friction"])] if choice else keys
+    return choice and replace(choice, x=_first_axis(dataset, Choice()), models=few)
 
 
 _pairs = partial(Kind, of_friction=True)

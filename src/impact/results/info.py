@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from ..config.input_names import InputName
 from ..display import PIPE_WIDTH, Block, Displayed, Table
 from ..formatting import label, number
 from .attributes import read_attribute
@@ -103,6 +104,7 @@ def _describe(result: xr.Dataset, name: str = "") -> Info:
         "coordinates": [str(name) for name in result.coords],
         "variables": variables,
         "status": counts_by_name(summary.counts),
+        **({"friction_status": counts_by_name(counts)} if (counts := summary.friction_counts) else {}),
         "not_evaluated": summary.not_counted,
         "worst": worst_by_model(summary, result),
         "attributes": {
@@ -126,8 +128,9 @@ def _tables(result: xr.Dataset, name: str, description: Mapping[str, Any]) -> li
     rows |= {key: attributes[key] for key in SHOWN_ATTRIBUTES if attributes.get(key, "{}") != "{}"}
     if read_attribute(attributes, "config_set"):
         rows["config_set"] = attributes["config_set"]
-    if description["status"]:
-        rows["status"] = ", ".join(f"{count:,} {status}" for status, count in description["status"].items())
+    for name in ("status", "friction_status"):
+        if counts := description.get(name):
+            rows[name] = ", ".join(f"{count:,} {status}" for status, count in counts.items())
     if description["not_evaluated"]:
         rows["not evaluated"] = f"the status of {description['not_evaluated']:,} points"
     headings = ("variable", "unit", "dimensions", "smallest", "largest", "missing")
@@ -167,7 +170,7 @@ def _values_text(dataset: xr.Dataset, name: str) -> str:
     distinct = list(dict.fromkeys(array.tolist()))
     if array.dtype.kind in "fi" and len(distinct) > MAX_LISTED_NUMBERS:
         return f"{number(array.min())} … {number(array.max())}, {array.size} values{suffix}"
-    return ", ".join(map(label, distinct)) + suffix
+    return ", ".join(label(InputName.parse(name).word(value)) for value in distinct) + suffix
 
 
 def _count_points(dataset: xr.Dataset) -> int:

@@ -42,7 +42,7 @@ from ..display import Block, Displayed, Table
 from ..engine.build_impacts import build_impacts, build_oblique, fixed_steps_at
 from ..engine.plan import Plan
 from ..engine.plugins import Plugins, read_plugins
-from ..errors import UsageError, did_you_mean
+from ..errors import ConfigError, UsageError, did_you_mean
 from ..formatting import number, quantity, safe_text
 from .kinds import require_sweep
 from .provenance import changed_plugins, stored_draft, unknown_plugins
@@ -400,13 +400,13 @@ def histories(
 
     Values of `at` need not be on the grid, and other axes take their first value. A parameter of one model is
     ignored by the others. An unknown model or input, and a point without a history, are UsageErrors. A result with
-    friction laws has the histories of the models with its first friction law, or those of `frictions`.
+    friction laws has the history of each model with the first friction law that it can be combined with, or those
+    of all pairs with `frictions`.
     """
     if "t" in dataset.dims:
         return [dataset]
     keys = _chosen_keys(dataset, "model", models)
     friction_keys = _chosen_keys(dataset, "friction", frictions) if "friction" in dataset.coords else []
-    friction_keys = friction_keys if frictions else friction_keys[:1]
     integrator = str(dataset.attrs.get("integrator", EXACT))
     if integrator != EXACT:
         raise UsageError(f"no motion to draw in this result: {no_motion(integrator)}")
@@ -417,16 +417,28 @@ def histories(
     datasets: list[xr.Dataset] = []
     ends: dict[str, str] = {}
     first: dict[str, float | str] = {}
+    refused: list[ConfigError] = []
+    drawn: set[str] = set()
     for key, friction in itertools.product(keys, friction_keys or [""]):
+        if not frictions and key in drawn:
+            continue
         others = {str(name) for name in dataset.coords if not InputName.parse(name).applies_to(key, friction)}
         law_inputs = {name: value for name, value in at.items() if name not in others}
-        config, names = single_point(source, key, law_inputs, friction=friction or None)
-        impact = run_single_impact(Plan(config, plugins.of(config.models)), names)
+        try:
+            config, names = single_point(source, key, law_inputs, friction=friction or None)
+            impact = run_single_impact(Plan(config, plugins.of(config.models)), names)
+        except ConfigError as error:
+            # the model and the friction law cannot be combined
+            refused.append(error)
+            continue
         first |= {name: impact.point[name] for name in names}
         if impact.history is None:
             ends[key] = impact.why_no_history
         else:
             datasets.append(impact.history)
+            drawn.add(key)
+    if refused and not (datasets and friction_keys):
+        raise refused[0]
     if not datasets:
         point = ", ".join(f"{name} = {value}" for name, value in {**first, **at}.items())
         reason = next(iter(ends.values()))

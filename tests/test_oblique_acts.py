@@ -1,0 +1,357 @@
+"""Each act with a meaning for friction takes friction laws: run, solve, recommend, calibrate, sensitivity."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import impact
+from impact.errors import ConfigError, UsageError
+
+from .conftest import Run
+
+ANGLE = math.radians(60.0)
+# like solid spheres of the linear or Hertzian contact: m_t/m is 2/7
+CONFIG: dict[str, Any] = {
+    "models": ["hertz", "tsuji-1992"],
+    "frictions": ["coulomb-1785", "lammps-mindlin"],
+    "sweep": {
+        "v1": 1.0,
+        "angle": ANGLE,
+        "mu": 0.1,
+        "m1": 1.0,
+        "m2": 1.0,
+        "R1": 0.1,
+        "R2": 0.1,
+        "K": 1e6,
+        "e": 0.8,
+    },
+    "friction": {"lammps-mindlin": {"kt_over_kn": 0.8, "xt": 0.0}},
+}
+
+
+def config(**changes: Any) -> dict[str, Any]:
+    """CONFIG with other values of [sweep]; a key of another table is that table."""
+    tables = {name: changes.pop(name) for name in ("models", "frictions", "friction", "design") if name in changes}
+    return {**CONFIG, **tables, "sweep": {**CONFIG["sweep"], **changes}}
+
+
+def pair_at(source: dict[str, Any], model: str, friction: str, **at: float) -> impact.Impact:
+    return impact.run(source, model=model, friction=friction, at=at)
+
+
+# ---- run
+
+LAWS = {
+    "coulomb-1785": {},
+    "lammps-mindlin": {"kt_over_kn": 0.8, "xt": 0.0},
+    "lammps-mindlin-rescale": {"kt_over_kn": 0.8, "xt": 0.5},
+    "lammps-linear-nohistory": {"xt": 1.0},
+    "drake-regularized": {"v_s": 0.01},
+}
+
+
+@pytest.mark.parametrize("angle", [10.0, 60.0])
+@pytest.mark.parametrize("friction", LAWS)
+def test_the_history_of_slip_and_friction_is_that_of_the_outputs(friction: str, angle: float) -> None:
+    source = config(frictions=[friction], friction={friction: LAWS[friction]} if LAWS[friction] else {})
+    shot = pair_at(source, "tsuji-1992", friction, angle=math.radians(angle))
+    assert shot.history is not None
+    history, m_t = shot.history, shot.derived["m_t"]
+    assert history["slip"].values[0] == pytest.approx(shot.derived["slip"], rel=1e-12)
+    assert history["slip"].values[-1] == pytest.approx(shot.values["slip_post"], rel=1e-6, abs=1e-9)
+    # the impulse of friction changes the slip: by the trapezoidal rule, across the corners of the force
+    impulse = np.trapezoid(history["f"].values, history["t"].values)
+    assert impulse == pytest.approx(m_t * (shot.derived["slip"] - shot.values["slip_post"]), rel=5e-3)
+    # near first contact and release the force of the dashpot x^(1/4) is steep in time
+    limit = 0.1 * np.abs(history["F"].values)
+    assert (np.abs(history["f"].values) <= limit * (1.0 + 1e-6) + 1e-3 * limit.max()).all()
+    slides = np.abs(history["mode"].values) == 1
+    if friction != "drake-regularized":
+        np.testing.assert_allclose(
+            np.abs(history["f"].values[slides]), limit[slides], rtol=1e-4, atol=1e-3 * limit.max()
+        )
+    assert {*np.unique(history["mode"].values)} <= {-2, -1, 0, 1, 2}
+
+
+def test_the_history_has_the_mirrored_slip_of_a_mirrored_impact() -> None:
+    source = config(frictions=["lammps-mindlin"])
+    del source["sweep"]["angle"]
+    left, right = (impact.run(source, at={"u1": u1}, times=50).history for u1 in (-0.7, 0.7))
+    assert left is not None
+    assert right is not None
+    for name in ("slip", "f", "mode"):
+        np.testing.assert_array_equal(left[name].values, -right[name].values)
+    np.testing.assert_array_equal(left["F"].values, right["F"].values)
+
+
+def test_a_run_is_the_point_of_the_sweep_of_its_pair() -> None:
+    source = config(angle=[0.2, ANGLE], mu=[0.1, 0.3])
+    result = impact.sweep(source)
+    point = {"angle": ANGLE, "mu": 0.3}
+    for model in CONFIG["models"]:
+        for friction in CONFIG["frictions"]:
+            shot = impact.run(result, model=model, friction=friction, at=point)
+            pair = result.sel(model=model, friction=friction, **point)
+            for name in ("beta", "omega1_post", "rebound_angle", "e_out", "friction_status"):
+                assert shot.values[name] == pair[name].item(), (model, friction, name)
+    assert impact.run(source).as_dict()["friction"] == "coulomb-1785"
+    assert "friction" not in impact.run().as_dict()
+    central = impact.run().history
+    assert central is not None
+    assert not {"slip", "f", "mode"} & {*map(str, central)}
+
+
+def test_the_command_runs_an_oblique_impact_without_a_config(cli: Run, tmp_path: Path) -> None:
+    words = ("run", "--friction", "coulomb-1785", "--at", "mu=0.3", "--at", "angle=30 deg")
+    text = cli(*words).stdout
+    # two thirds of the tangential velocity of rolling without sliding remain: 5/7
+    assert "e_t                          0.7142857143" in text
+    assert "(30 deg)" in text
+    assert "sticks and slides" in text
+    data = json.loads(cli(*words, "--json").stdout)
+    assert data["friction"] == "coulomb-1785"
+    assert data["outputs"]["friction_status"] == "ok"
+    assert data["inputs"]["friction.coulomb-1785.limit"] == "abs"
+    for suffix in ("csv", "h5"):
+        path = tmp_path / f"history.{suffix}"
+        assert f"{path}: " in cli(*words, "--history", str(path)).stderr
+    assert ",slip [m/s],f [N],mode\n" in (tmp_path / "history.csv").read_text(encoding="utf-8")
+    assert impact.load(tmp_path / "history.h5")["f"].attrs["units"] == "N"
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("run", "--friction", "coulom"), 'no friction law "coulom"; did you mean "coulomb-1785"?'),
+        (("run", "--at", "mu=0.3"), "set without a friction law"),
+        (
+            ("run", "--model", "bilinear", "--friction", "lammps-linear-nohistory", "--at", "mu=0.3"),
+            "the contact force has no dashpot",
+        ),
+        (("solve", "--model", "hertz", "--for", "mu", "--target", "e_out=1"), 'no parameter "mu"'),
+        (("solve", "--model", "tsuji-1992", "--for", "e", "--target", "beta=0"), "expected --friction KEY"),
+        (("recommend", "central.h5", "--target", "beta=0"), "its sweep has no frictions"),
+        (("recommend", "central.h5", "--target", "v1_post=0"), "expected an output of the order of 1"),
+        (("recommend", "central.h5", "--friction", "coulomb-1785"), "expected a --target"),
+        (("sensitivity", "central.toml", "--of", "beta"), "got no friction law"),
+        (("calibrate", "fit.toml"), "got a measured beta without a friction law"),
+    ],
+)
+def test_a_mistake_is_an_error_of_one_line(cli: Run, tmp_path: Path, words: tuple[str, ...], message: str) -> None:
+    central = 'models = "hertz"\n[sweep]\nv1 = 1.0\nm1 = 1.0\nm2 = 1.0\nK = 1e6\ne = { fit = [0.1, 1.0] }\n'
+    (tmp_path / "fit.toml").write_text(central + "[data.columns]\nbeta = [0.1]\nangle = [0.1]\n", encoding="utf-8")
+    (tmp_path / "central.toml").write_text(central.replace("{ fit = [0.1, 1.0] }", "0.5"), encoding="utf-8")
+    if "central.h5" in words:
+        impact.sweep(tmp_path / "central.toml", output=tmp_path / "central.h5")
+    result = cli(*words, cwd=tmp_path)
+    assert result.returncode == 2
+    assert message in result.stderr
+    assert result.stderr.count("\n") == 1
+
+
+# ---- solve
+
+
+def test_solve_finds_the_mu_that_slides_with_a_given_beta() -> None:
+    # Hertz, e = 1, slides throughout: beta = 2/G0 - 1, G0 = (2/7) tan(angle)/mu
+    found = impact.solve("hertz", "mu", {"beta": -0.5}, friction="coulomb-1785", source=CONFIG)
+    assert [root.value for root in found.roots] == [pytest.approx(math.tan(ANGLE) / 14.0, rel=1e-8)]
+    assert found.as_dict()["friction"] == "coulomb-1785"
+    sticks = impact.solve("hertz", "mu", {"beta": 0.4}, friction="coulomb-1785", source=CONFIG)
+    assert sticks.status == "no_root"
+    assert str(sticks).startswith("hertz with coulomb-1785: no value of mu gives beta = 0.4; beta is from -1 to 0")
+
+
+@pytest.mark.parametrize("name", ["kt_over_kn", "friction.lammps-mindlin.kt_over_kn"])
+def test_solve_finds_a_friction_parameter_that_gives_the_output_again(name: str) -> None:
+    source = config(frictions="lammps-mindlin", friction={"lammps-mindlin": {"xt": 0.0}}, mu=0.5)
+    found = impact.solve("tsuji-1992", name, {"omega1_post": -5.5}, source=source)
+    assert found.roots
+    for root in found.roots:
+        at = {"friction.lammps-mindlin.kt_over_kn": root.value}
+        again = impact.run(source, model="tsuji-1992", at=at).values["omega1_post"]
+        assert again == pytest.approx(-5.5, rel=1e-7)
+
+
+# ---- recommend
+
+
+@pytest.fixture(scope="module")
+def swept(tmp_path_factory: pytest.TempPathFactory) -> dict[str, xr.Dataset]:
+    source = config(
+        models=["hertz", "tsuji-1992", "lankarani-nikravesh-1994"],
+        angle={"linspace": [0.0, 1.4, 8]},
+        mu=[0.1, 0.3],
+        friction={"lammps-mindlin": {"kt_over_kn": [0.8, 1.2], "xt": 0.0}},
+    )
+    folder = tmp_path_factory.mktemp("recommend")
+    layouts = ("full", "factored")
+    return {
+        layout: impact.sweep(source, output=folder / f"{layout}.h5", overrides=[f'output.layout="{layout}"'])
+        for layout in layouts
+    }
+
+
+@pytest.mark.parametrize("layout", ["full", "factored"])
+@pytest.mark.parametrize(("output", "target"), [("beta", 0.1), ("e_t", 0.7), ("impulse_ratio", 0.1)])
+def test_pairs_are_ranked_by_their_distance_from_the_target(
+    swept: dict[str, xr.Dataset], layout: str, output: str, target: float
+) -> None:
+    result = swept[layout]
+    ranking = impact.recommend(result, target={output: target}, tol=0.2)
+    shares = [law.share for law in ranking.models]
+    assert shares == sorted(shares, reverse=True)
+    assert {(law.model, law.friction) for law in ranking.models} == {
+        (model, friction) for model in result["model"].values for friction in result["friction"].values
+    }
+    for law in ranking.models:
+        parameters = {name: float(value) for name, value in law.parameters.items()}
+        pair = result.sel(model=law.model, friction=law.friction, **parameters)
+        if not parameters:
+            pair = pair.isel({"friction.lammps-mindlin.kt_over_kn": 0})
+        # without a slip there is no such output
+        distance = np.abs(pair[output].values - target)
+        distance = distance[~np.isnan(distance)]
+        assert law.within == np.count_nonzero(distance <= 0.2)
+        assert law.points == distance.size
+        assert law.max_error == distance.max()
+        assert law.mean_error == pytest.approx(distance.mean(), rel=1e-12)
+        assert bool(law.parameters) == (law.friction == "lammps-mindlin")
+
+
+def test_the_ranking_by_e_error_has_no_word_of_friction(swept: dict[str, xr.Dataset], cli: Run) -> None:
+    path = swept["factored"].encoding["source"]
+    default = cli("recommend", path, "--json").stdout
+    assert "friction" not in default.replace("friction.lammps", "")
+    assert {"target", "friction"}.isdisjoint(json.loads(default))
+    pairs = json.loads(
+        cli("recommend", path, "--target", "beta=0.1", "--friction", "coulomb-1785", "--json").stdout
+    )
+    assert pairs["target"] == {"beta": 0.1}
+    assert {law["friction"] for law in pairs["models"]} == {"coulomb-1785"}
+    assert "beta" in pairs["models"][0]
+    e_out = impact.recommend(swept["factored"], target={"e_out": 0.8})
+    assert [law.name for law in e_out.best] == ["lankarani-nikravesh-1994", "tsuji-1992"]
+
+
+# ---- calibrate
+
+
+def test_calibrate_recovers_mu_and_the_stiffness_and_finds_the_law(tmp_path: Path) -> None:
+    angles = [10.0, 20.0, 30.0, 45.0, 60.0, 75.0]
+    truth = config(models="tsuji-1992", frictions="lammps-mindlin", angle=[math.radians(a) for a in angles])
+    measured = impact.sweep(truth).isel(model=0, friction=0)
+    fit = config(models="tsuji-1992", mu={"fit": [0.01, 0.5]})
+    del fit["sweep"]["angle"]
+    fit["friction"] = {"lammps-mindlin": {"kt_over_kn": {"fit": [0.3, 2.0]}, "xt": 0.0}}
+    fit["data"] = {
+        "columns": {
+            "angle": np.radians(angles).tolist(),
+            **{name: measured[name].values.tolist() for name in ("e_t", "omega1_post")},
+            "sigma_e_t": [0.01] * 6,
+            "sigma_omega1_post": [0.1] * 6,
+        }
+    }
+    best = tmp_path / "best.toml"
+    result = impact.calibrate(fit, best=best)
+    assert result["model"].values.tolist() == ["tsuji-1992 with lammps-mindlin", "tsuji-1992 with coulomb-1785"]
+    assert result["friction"].values.tolist() == ["lammps-mindlin", "coulomb-1785"]
+    estimates = result["estimate"].isel(model=0)
+    assert estimates.sel(parameter="mu").item() == pytest.approx(0.1, rel=1e-5)
+    assert estimates.sel(parameter="friction.lammps-mindlin.kt_over_kn").item() == pytest.approx(0.8, rel=1e-4)
+    # Coulomb's friction does not have the parameter
+    assert result["identifiable"].isel(model=1).values.tolist() == [1, -1]
+    assert "  kt_over_kn" in str(impact.describe(result))
+    again = impact.sweep(best).isel(model=0, friction=0)
+    np.testing.assert_allclose(again["e_t"].values, measured["e_t"].values, rtol=1e-4)
+    impact.save(result, tmp_path / "fit.h5")
+    xr.testing.assert_equal(impact.load(tmp_path / "fit.h5").load(), result)
+
+
+def test_calibrate_has_the_same_bits_in_any_number_of_processes() -> None:
+    fit = config(models="hertz", frictions=["coulomb-1785", "drake-regularized"], mu={"fit": [0.01, 0.5]})
+    fit["friction"] = {"drake-regularized": {"v_s": 0.01}}
+    fit["data"] = {"columns": {"beta": [-0.6, -0.59]}}
+    assert impact.compare(impact.calibrate(fit), impact.calibrate(fit, jobs=2), tol=0.0).equal
+
+
+# ---- sensitivity
+
+
+def test_each_pair_has_a_study_and_one_without_meaning_has_not_failed() -> None:
+    source = config(
+        models=["hertz", "lankarani-nikravesh-1994"],
+        mu={"uniform": [0.01, 0.05]},
+        e={"uniform": [0.7, 0.9]},
+        K=None,
+        friction={"lammps-mindlin": {"xt": 0.0}},
+        design={"n": 64},
+    )
+    source["sweep"] = {k: v for k, v in source["sweep"].items() if k != "K"} | {"material": "table1"}
+    source["materials"] = {"table1": {"E": 5.6e10, "nu": 0.3}}
+    study = impact.sensitivity(source, of="beta")
+    assert study["total"].dims == ("model", "friction", "input")
+    # Hertz, slides throughout: beta is linear in mu, and independent of e
+    slides = study.sel(model="hertz", friction="coulomb-1785")
+    assert slides["total"].values.tolist() == [pytest.approx(1.0, abs=0.02), 0.0]
+    mean = 7.0 * 0.03 / math.tan(ANGLE) - 1.0
+    assert slides["mean"].item() == pytest.approx(mean, rel=1e-3)
+    meaningless = study.sel(model="lankarani-nikravesh-1994", friction="lammps-mindlin")
+    assert meaningless["failed"].item() == 0
+    assert np.isnan(meaningless["mean"].item())
+    assert "beta: the friction law is not combinable with the model" in str(impact.describe(study))
+    assert impact.describe(study).as_dict()["studies"][0]["friction"] == "coulomb-1785"
+
+
+# ---- the sweep
+
+
+def test_a_pair_without_meaning_is_noted_and_a_failed_pair_has_the_command_that_repeats_it(tmp_path: Path) -> None:
+    source = config(
+        models=["tsuji-1992", "lankarani-nikravesh-1994"],
+        frictions=["lammps-mindlin", "drake-regularized"],
+        mu=[0.1, 0.3],
+        # a dynamic friction above the static one at the first mu
+        friction={"lammps-mindlin": {"kt_over_kn": 0.8}, "drake-regularized": {"v_s": 0.01, "mu_d": 0.2}},
+    )
+    notes: list[str] = []
+    output = tmp_path / "failed.h5"
+    outcome = impact.sweep_to_file(source, output, on_note=notes.append)
+    reason = "lankarani-nikravesh-1994 with lammps-mindlin: the contact force has no dashpot"
+    assert sum(reason in note for note in notes) == 1
+    assert {*outcome.summary.counts} == {1}
+    failures = outcome.records()
+    assert [failure["status"] for failure in failures] == ["invalid_parameter"] * 2
+    assert [failure["at"]["model"] for failure in failures] == source["models"]
+    for failure in failures:
+        assert failure["at"]["mu"] == 0.1
+        assert "--friction drake-regularized --at mu=0.1" in failure["replay"]
+    shot = impact.run(output, model="tsuji-1992", friction="drake-regularized", at={"mu": 0.1})
+    assert shot.friction_status == 14
+    assert shot.failed
+    with pytest.raises(UsageError, match="failed, the first at model=tsuji-1992, friction=drake-regularized"):
+        impact.bless(output, tmp_path / "baseline.h5", reason="test")
+    with pytest.raises(ConfigError, match=reason):
+        impact.sweep(
+            config(
+                models="lankarani-nikravesh-1994",
+                frictions="lammps-mindlin",
+                friction={"lammps-mindlin": {"kt_over_kn": 0.8}},
+            )
+        )
+
+
+@pytest.mark.parametrize("layout", ["full", "factored"])
+def test_info_counts_the_points_of_pairs_and_writes_words(swept: dict[str, xr.Dataset], layout: str) -> None:
+    described = impact.info(swept[layout].encoding["source"])
+    # 8 angles, 2 mu and, for one law, 2 stiffnesses
+    assert described["friction_status"] == {"ok": 3 * (16 + 32)}
+    assert re.search(r"^friction\.coulomb-1785\.limit +abs *$", str(described), re.MULTILINE)
