@@ -378,9 +378,9 @@ def is_case(name: str) -> bool:
 
 def derived_names(coords: Mapping[Any, xr.DataArray]) -> frozenset[str]:
     """Name the coordinates that were computed: e from alpha, masses and radii from rho, v1 from speed."""
-    derived = {
-        name for name in ("m1", "m2", "R1", "R2", "v1") if "equation" in getattr(coords.get(name), "attrs", ())
-    }
+    # xarray's `get` of a name that is not there is slow
+    computed = (name for name in ("m1", "m2", "R1", "R2", "v1") if name in coords)
+    derived = {name for name in computed if "equation" in coords[name].attrs}
     return frozenset(derived | ({"e"} if "alpha" in coords else set()))
 
 

@@ -253,7 +253,9 @@ def sweep_into(
     check_storable(plan)
     few = plan.stored_points <= NO_CHECKPOINT_POINTS or plan.layout == "factored"
     folder = checkpoint.work_folder_of(output)
-    if plan.trajectories <= RANGE_TRAJECTORIES and few and not os.path.lexists(folder):
+    # slips take longer
+    most = RANGE_TRAJECTORIES // 64 if plan.frictions else RANGE_TRAJECTORIES
+    if plan.trajectories <= most and few and not os.path.lexists(folder):
         finished: dict[TrajectoryRange, Record] = {}
         # so short that it is neither stopped nor reported
         counter = ProgressCounter.start(plan.ranges, plan.points, DEFAULT_RUN)
