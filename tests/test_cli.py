@@ -247,7 +247,7 @@ def test_run_repeats_a_point_of_a_result(cli: Run, tmp_path: Path) -> None:
     ("words", "line"),
     [
         (["run", "--at", "e=1.4"], "--at e=1.4: sweep.e: got 1.4, expected a number from 0 to 1"),
-        (["run", "--at", "speed=1"], 'no input "speed" here; known: e, m1, m2, material, n, v1, v2'),
+        (["run", "--at", "mass=1"], 'no input "mass" here; known: e, m1, m2, material, n, v1, v2'),
         (
             ["run", "--at", "e"],
             "impact run: Invalid value for '--at': got \"e\", expected NAME=VALUE, such as m2=1.0; see ",
@@ -748,10 +748,10 @@ def test_a_shell_completes_models_keys_axes_and_outputs(forked: ForkServer, stor
     assert completed("impact", "plot", stored, "--x", "") == axes
     assert completed("impact", "plot", "--sel", "m2=1", stored, "--sel", "e") == ["e="]
     assert completed("impact", "plot", "no-such-file.h5", "--x", "") == []
-    assert completed("impact", "plot", stored, "--kind", "f") == ["final-velocities"]
+    assert completed("impact", "plot", stored, "--kind", "f") == ["final-velocities", "friction-loop"]
     assert completed("impact", "sweep", "--set", "solver.max") == ["solver.max_steps="]
-    assert completed("impact", "sweep", "--set", "sweep.m") == [f"sweep.m{k}=" for k in (1, 2)] + [
-        f"sweep.material{k}=" for k in ("", 1, 2)
+    assert completed("impact", "sweep", "--set", "sweep.m") == [
+        f"sweep.m{k}=" for k in (1, 2, "u", "aterial", "aterial1", "aterial2")
     ]
     assert completed("impact", "run", "--model", "mujoco-solref", "--at", "d") == ["dt=", "dampratio="]
     assert completed("impact", "run", "--at", "d") == ["dt="]

@@ -104,7 +104,7 @@ def test_a_dry_run_estimates_transferred_bytes_and_the_useful_number_of_workers(
     for part in ranges:
         columns, context = plan.columns_of(part), context_of(plan)
         transferred += len(pickle.dumps((columns, context)))
-        transferred += len(pickle.dumps(integrate_remotely(plan.models[part.model].key, columns, context)))
+        transferred += len(pickle.dumps(integrate_remotely([plan.models[part.model].key], columns, context)))
     # the estimate measures one range only
     assert estimate["wire"] == pytest.approx(transferred, rel=0.1)
     seconds = {int(count): time for count, time in estimate["by_workers"].items()}

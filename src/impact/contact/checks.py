@@ -19,7 +19,7 @@ from .model import QUANTITIES, ForceModel, Parameter
 from .output_formulas import Outputs, collide
 from .status import FIRST_FAILURE, Status
 from .units import dimension
-from .variables import OUTPUTS
+from .variables import CENTRAL_OUTPUTS
 
 CONTRACT_RTOL, CONTRACT_MAX_STEPS = 1e-10, 10_000
 # largest error of an identity by rounding, relative to its largest term
@@ -245,6 +245,6 @@ def _alone_differs(collided: Callable[[Impacts], Outputs], impacts: Impacts, bas
         # an output that is the same for all impacts has length one
         differ += any(
             np.broadcast_to(base[name], impacts.shape)[[index]].tobytes() != alone[name].tobytes()
-            for name in OUTPUTS
+            for name in CENTRAL_OUTPUTS
         )
     return differ
