@@ -756,7 +756,7 @@ def test_a_shell_completes_models_keys_axes_and_outputs(forked: ForkServer, stor
     assert completed("impact", "run", "--model", "mujoco-solref", "--at", "d") == ["dt=", "dampratio="]
     assert completed("impact", "run", "--at", "d") == ["dt="]
     assert completed("impact", "solve", "--model", "mujoco-solref", "--for", "") == [
-        "dampratio", "timeconst", "K", "e"
+        "dampratio", "timeconst", "K", "e", "mu"
     ]  # fmt: skip
     assert completed("impact", "solve", "--target", "e_o") == ["e_out="]
     assert completed("impact", "sensitivity", "--of", "peak_f") == ["peak_force"]
