@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 RESULTS ?= results
 
 .DEFAULT_GOAL := help
-.PHONY: help figure figures regress test test-faults test-fast test-peers check release-check docs site bench clean
+.PHONY: help figure figures regress test test-faults test-long test-fast test-peers check release-check docs site bench clean
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-13s %s\n", $$1, $$2}'
@@ -33,6 +33,9 @@ test: $(VENV)/dev  ## run the tests
 
 test-faults: $(VENV)/dev  ## run the fault-injection tests and the slow tests, and print their summaries
 	$(BIN)/python -m pytest -n auto --dist worksteal -m 'faults or slow' -rP tests
+
+test-long: $(VENV)/dev  ## compare thousands of slips with the slow reference, and fit parameters of friction
+	$(BIN)/python -m pytest -n auto --dist worksteal -m long tests
 
 test-fast: $(VENV)/dev  ## test the compiled core; installs the extra "fast"
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[fast]'

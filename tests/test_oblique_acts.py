@@ -170,7 +170,7 @@ def test_solve_finds_the_mu_that_slides_with_a_given_beta() -> None:
     assert str(sticks).startswith("hertz with coulomb-1785: no value of mu gives beta = 0.4; beta is from -1 to 0")
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["kt_over_kn", "friction.lammps-mindlin.kt_over_kn"])
 def test_solve_finds_a_friction_parameter_that_gives_the_output_again(name: str) -> None:
     source = config(frictions="lammps-mindlin", friction={"lammps-mindlin": {"xt": 0.0}}, mu=0.5)
@@ -246,7 +246,7 @@ def test_the_ranking_by_e_error_has_no_word_of_friction(swept: dict[str, xr.Data
 # ---- calibrate
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_calibrate_recovers_mu_and_the_stiffness_and_finds_the_law(tmp_path: Path) -> None:
     angles = [10.0, 20.0, 30.0, 45.0, 60.0, 75.0]
     truth = config(models="tsuji-1992", frictions="lammps-mindlin", angle=[math.radians(a) for a in angles])
@@ -278,7 +278,7 @@ def test_calibrate_recovers_mu_and_the_stiffness_and_finds_the_law(tmp_path: Pat
     xr.testing.assert_equal(impact.load(tmp_path / "fit.h5").load(), result)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_calibrate_has_the_same_bits_in_any_number_of_processes() -> None:
     fit = config(models="hertz", frictions=["coulomb-1785", "drake-regularized"], mu={"fit": [0.01, 0.5]})
     fit["friction"] = {"drake-regularized": {"v_s": 0.01}}
