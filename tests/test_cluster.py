@@ -206,7 +206,7 @@ def test_a_block_integrated_twice_gives_the_same_bits(
     (tmp_path / "c.toml").write_text(CONFIG)
     plan = prepare(tmp_path / "c.toml")
     part = plan.ranges[0]
-    block = (plan.models[part.model].key, plan.columns_of(part), context_of(plan))
+    block = ([plan.models[part.model].key], plan.columns_of(part), context_of(plan))
     with Client(cluster.address, set_as_default=False) as client:
         returned = [
             client.submit(integrate_remotely, *block, workers=[name], pure=False).result() for name in "ab"
