@@ -245,8 +245,8 @@ def run(
 
     Parameters
     ----------
-    source : a TOML file, a mapping, a result, or a calibration; by default the two balls of Table 1 of the paper, at
-        e = 0.5
+    source : a TOML file, a mapping, a result, or a calibration; by default the two balls of Table 1 of the paper,
+        at e = 0.5
     model : key of the model; by default the first one of the source
     friction : key of the friction law; by default the first one of the source, if it has any
     at : values by config name, such as `{"e": 0.05}`; the default of an axis is its first value
