@@ -447,13 +447,13 @@ for solver in ("GeneralizedAlpha", "RK44"):
 
 # ---- Newton, of single precision; its kd acts on approach only, and those of two shapes have a mean
 
-NEWTON = Code("Newton", "run_newton.py", steps_per_contact=150)
+NEWTON = Code("Newton", "run_newton.py", steps_per_contact=60)
 
 ENTRIES += [
     Entry(
         "newton-semi-implicit", NEWTON,
         lambda c: {"ke": (1.4 * c["K"], 0.6 * c["K"]), "kd": (0.2 * c["kd"], 1.8 * c["kd"])},
-        collisions(kd=(300.0, 900.0, 50.0), K=1e5, n=1.0),
+        collisions(kd=(60.0, 150.0, 20.0), K=1e5, n=1.0),
     ),
 ]  # fmt: skip
 
