@@ -1,4 +1,6 @@
 # `make help` lists the targets; everything runs in .venv, which is created on first use
+# the tests start hundreds of interpreters, which would compile every module again
+export PYTHONDONTWRITEBYTECODE :=
 PYTHON ?= python3
 VENV ?= .venv
 PEERS ?= .venv-peers
