@@ -33,6 +33,8 @@ OWN_PARAMETERS = {
     "modelica": {"modelica-elastogap.d": 1e3},
     "adams": {"adams-impact.c": 1e3, "adams-impact.d": 1e-5},
     "simscape": {"simscape-contact.b": 1e3, "simscape-contact.w": 1e-5},
+    "newton": {"newton-semi-implicit.kd": 1e3},
+    **{name: {"kelvin-voigt-no-tension.C": 1e3} for name in ("pybullet", "physx")},
 }
 
 
