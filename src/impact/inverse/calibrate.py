@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from fractions import Fraction
@@ -108,6 +109,8 @@ def calibrate(
     read = Path(source) if isinstance(source, str) else source
     config = read_config(read, overrides, plugin_set.models, purpose="calibrate")
     check_outputs([output, best], [source, *plugins, *config.files], overwrite=overwrite)
+    for note in config.notes:
+        warnings.warn(note, stacklevel=2)
     result = calibrate_config(config, plugin_set.of(config.models), jobs)
     if output is not None:
         save(result, output, overwrite=overwrite)
