@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from .engine.friction_catalogue import frictions as frictions
     from .engine.model_catalogue import models as models
     from .errors import ImpactError as ImpactError
+    from .exporters.environment import doctor as doctor
     from .exporters.export import export as export, export_codes as export_codes
     from .inverse.calibrate import calibrate as calibrate
     from .inverse.solve import solve as solve
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
     from .plots.files import plot_to_files as plot_to_files
     from .progress_display import progress_bar as progress_bar
     from .reporting.page import report as report
+    from .results.citations import cite as cite
     from .results.describe import describe as describe
     from .results.estimate import estimate as estimate
     from .results.extend import extend as extend, extend_to_file as extend_to_file
@@ -53,8 +55,10 @@ _MODULES = {
     "bless": "comparison.bless",
     "calibrate": "inverse.calibrate",
     "check_model": "contact.checks",
+    "cite": "results.citations",
     "compare": "comparison.compare",
     "describe": "results.describe",
+    "doctor": "exporters.environment",
     "estimate": "results.estimate",
     "expand": "results.xarray_backend",
     "explore": "plots.explore",

@@ -622,7 +622,8 @@ def number_type(quantity: Quantity) -> Any:
         bounds["lt" if quantity.below else "le"] = quantity.most
     bare: Any = Annotated[float, Field(**bounds)]
     if quantity.exponents <= {"n"}:
-        number = rf"\s*[-+]?({_DIGITS}{'|inf' if quantity.infinite else ''})\s*"
+        infinity = r"|inf\b" if quantity.infinite else ""
+        number = rf"\s*[-+]?({_DIGITS}{infinity})\s*"
         # a number without a unit must not be a string
         pattern = rf"^(?!{number}$){number}[{_LETTERS}/1]"
         example = f"1 {'%' if quantity.unit == '1' else quantity.unit}"
