@@ -64,7 +64,8 @@ def read_text(path: Path, kind: str = "TOML", most: int = MAX_CONFIG_BYTES) -> s
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
-        raise ConfigError(f"{name}:{line}: not UTF-8: byte 0x{content[error.start]:02x}") from None
+        hint = "; save it as UTF-8" if kind == "CSV" else ""
+        raise ConfigError(f"{name}:{line}: not UTF-8: byte 0x{content[error.start]:02x}{hint}") from None
 
 
 def parse_document(text: str, name: str) -> Any:
@@ -108,7 +109,7 @@ def _syntax_error_line(text: str, language: str, message: str) -> str:
     return f"{line}: not {language}: {reason}" + (f": {shown}" if shown else "")
 
 
-def to_plain_data(value: object, path: KeyPath = ()) -> tuple[Any, list[ConfigProblem]]:
+def to_plain_data(value: Any, path: KeyPath = ()) -> tuple[Any, list[ConfigProblem]]:
     """Convert a value to dicts, lists and Python numbers; list invalid text and too many levels as problems.
 
     >>> to_plain_data({"e": np.linspace(0, 1, 3), "m2": (1, np.float64(2))})
@@ -118,6 +119,9 @@ def to_plain_data(value: object, path: KeyPath = ()) -> tuple[Any, list[ConfigPr
         return value, []
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
+    elif hasattr(value, "iloc"):
+        # a DataFrame or a Series of pandas
+        value = value.to_dict("list") if hasattr(value, "columns") else value.tolist()
     if isinstance(value, str) and not _is_storable(value):
         return value, [(path, f"got {as_text(value)}, expected text without NUL and lone surrogates")]
     if not isinstance(value, Mapping | list | tuple):
