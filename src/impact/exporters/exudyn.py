@@ -53,7 +53,7 @@ def notes(collision: Collision) -> list[str]:
         "contactStiffness is in N/m^n; unset, the exponent n is 1, impactModel 0 and restitutionCoefficient 1",
         "impactModel 0 takes no restitutionCoefficient and pulls at the end; 1 and 2 add contactDamping, if given",
         "1 and 2: begin with a gap; a contact in the first step has no impact velocity, no damping, and e is 1",
-        "steps are cut at the contact: the solver stops where minimumStepSize, by default 1e-8 s, is not below dt",
+        "steps are cut at the contact: the solver stops if minimumStepSize, by default 1e-8 s, is near dt",
         "1 and 2: impacts below minimumImpactVelocity (0) have the damping of that speed, and rebound faster",
     ]
 
