@@ -1,9 +1,10 @@
 """The exceptions of the program, all under one root.
 
     ImpactError
-    ├── ConfigError    the config of a sweep is invalid: all problems, one per line
+    ├── ConfigError    the config of a sweep is invalid: all problems, one per line; a ValueError
+    │   └── MissingFileError  a file that was named does not exist; a FileNotFoundError
     ├── ModelError     the definition of a contact force model is invalid
-    ├── UsageError     an argument does not fit the data or the file system
+    ├── UsageError     an argument does not fit the data or the file system; a ValueError
     ├── ResultError    a file is not a readable result
     ├── StoreError     the result could not be computed or stored; finished ranges are kept
     ├── InUseError     another process writes the output
@@ -51,15 +52,19 @@ def _shorten(problem: str) -> str:
     return problem if len(problem) <= MAX_PROBLEM else f"{problem[:half]}…{problem[1 - half :]}"
 
 
-class ConfigError(ImpactError):
+class ConfigError(ImpactError, ValueError):
     """The config of a sweep is invalid; `problems` holds one line for each problem."""
+
+
+class MissingFileError(ConfigError, FileNotFoundError):
+    """A file that was named does not exist."""
 
 
 class ModelError(ImpactError):
     """The definition of a contact force model is invalid, or a model is not in the catalogue."""
 
 
-class UsageError(ImpactError):
+class UsageError(ImpactError, ValueError):
     """An argument does not fit the data or the file system: an unknown coordinate, an output that exists."""
 
 

@@ -44,7 +44,7 @@ from ..results.schema import FIT_STATUSES, count_points, exponents_of
 from ..results.sensitivity import INDEX_HEADINGS, describe_design, describe_study, index_rows, iterate_studies
 from ..results.slabs import MAX_SUMMARY_POINTS, is_large
 from ..results.summary import Summary, extremes_of, summarize
-from ..results.xarray_backend import load
+from ..results.xarray_backend import result_of
 from .figures import at_text, coordinate_text, figures_of
 
 if TYPE_CHECKING:
@@ -87,7 +87,7 @@ def report(
         if output.suffix.lower() not in (".html", ".htm"):
             raise UsageError(f"{output}: expected a name that ends in .html")
         check_outputs([output], [dataset, *plugins], overwrite=overwrite)
-    text = page(load(dataset) if isinstance(dataset, str | Path) else dataset, plugins)
+    text = page(result_of(dataset), plugins)
     if output is not None:
         write_file(output, text.encode(), overwrite=overwrite)
     return text

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from functools import cache
 
-from ..catalogue import by_key, declared_laws, look_up
+from ..catalogue import by_key, declared_laws, look_up, pickle_by_key
 from ..model import ForceModel
 
 # families in the order of the paper; other families follow
@@ -46,3 +46,6 @@ def catalogue(plugins: Sequence[ForceModel] = ()) -> Mapping[str, ForceModel]:
 def find(key: str, plugins: Sequence[ForceModel] = ()) -> ForceModel:
     """Find the model of a key."""
     return look_up(catalogue(plugins), key, "model")
+
+
+pickle_by_key(ForceModel, find)
