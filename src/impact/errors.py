@@ -17,14 +17,18 @@ exceptions to exit codes.
 
 from __future__ import annotations
 
+import sys
+import warnings
 from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
+from pathlib import Path
 from types import MappingProxyType
 
 from .formatting import escape_controls, safe_text
 
 # characters of a problem; a longer one is cut in its middle, since its end says what was expected
 MAX_PROBLEM = 2000
+PACKAGE = str(Path(__file__).parent)
 
 
 class ImpactError(Exception):
@@ -82,6 +86,18 @@ class InUseError(ImpactError):
 
 class UnfinishedError(ImpactError):
     """A sweep was stopped; the message contains the finished work that is kept."""
+
+
+class ImpactWarning(UserWarning):
+    """An input or a result is probably not what was intended."""
+
+
+def warn(text: str) -> None:
+    """Warn at the line outside of this package that called it."""
+    frame, level = sys._getframe(1), 2
+    while frame.f_back is not None and frame.f_code.co_filename.startswith(PACKAGE):
+        frame, level = frame.f_back, level + 1
+    warnings.warn(escape_controls(text), ImpactWarning, stacklevel=level)
 
 
 class Interruption(BaseException):

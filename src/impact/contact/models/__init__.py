@@ -48,4 +48,14 @@ def find(key: str, plugins: Sequence[ForceModel] = ()) -> ForceModel:
     return look_up(catalogue(plugins), key, "model")
 
 
+def original_key(key: str) -> str:
+    """Return the key of the law that a key of the catalogue is another name for, else the key itself.
+
+    >>> original_key("liggghts-hertz"), original_key("hertz"), original_key("mine-2026")
+    ('tsuji-1992', 'hertz', 'mine-2026')
+    """
+    model = catalogue().get(key)
+    return model.same_as if model is not None and model.same_as else key
+
+
 pickle_by_key(ForceModel, find)
