@@ -111,6 +111,7 @@ class Draft:
     measurements: Measurements | None = None
     problems: tuple[ConfigProblem, ...] = ()
     lines: tuple[str, ...] = ()  # complete messages about settings and files
+    notes: tuple[str, ...] = ()  # on what is left out
 
     def table(self, name: str) -> dict[str, Any]:
         """Return a table of the config, or an empty one."""

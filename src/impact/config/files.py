@@ -67,7 +67,8 @@ def read_text(path: Path, kind: str = "TOML", most: int = MAX_CONFIG_BYTES) -> s
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
-        raise ConfigError(f"{name}:{line}: not UTF-8: byte 0x{content[error.start]:02x}") from None
+        hint = "; save it as UTF-8" if kind == "CSV" else ""
+        raise ConfigError(f"{name}:{line}: not UTF-8: byte 0x{content[error.start]:02x}{hint}") from None
 
 
 def parse_document(text: str, name: str) -> Any:
@@ -111,7 +112,7 @@ def _syntax_error_line(text: str, language: str, message: str) -> str:
     return f"{line}: not {language}: {reason}" + (f": {shown}" if shown else "")
 
 
-def to_plain_data(value: object, path: KeyPath = ()) -> tuple[Any, list[ConfigProblem]]:
+def to_plain_data(value: Any, path: KeyPath = ()) -> tuple[Any, list[ConfigProblem]]:
     """Convert a value to dicts, lists and Python numbers; list invalid text and too many levels as problems.
 
     >>> to_plain_data({"e": np.linspace(0, 1, 3), "m2": (1, np.float64(2))})
@@ -160,6 +161,8 @@ def _from_library(value: Any) -> object:
         if unit == "dimensionless":
             return number
         return [f"{each!r} {unit}" for each in number] if isinstance(number, list) else f"{number!r} {unit}"
+    if hasattr(value, "iloc") and hasattr(value, "columns"):
+        return value.to_dict("list")
     if not isinstance(value, str | Mapping) and hasattr(value, "values") and hasattr(value, "dtype"):
         # a series, an index or a data array
         value = value.values

@@ -57,6 +57,7 @@ class Config:
     distributions: Mapping[str, Distribution] = field(default_factory=dict)  # of the uncertain inputs
     files: tuple[Path, ...] = field(default=(), repr=False, compare=False)
     frictions: tuple[FrictionLaw, ...] = ()  # without one, impacts are central
+    notes: tuple[str, ...] = field(default=(), repr=False, compare=False)  # on what was left out of measurements
 
     @property
     def overrides(self) -> tuple[str, ...]:
@@ -163,6 +164,7 @@ def build(draft: Draft, max_points: int = MAX_POINTS, purpose: Purpose = "sweep"
         distributions=distributions,
         files=draft.files or (),
         frictions=tuple(draft.frictions),
+        notes=draft.notes,
     )
 
 
@@ -172,8 +174,8 @@ def inline_files(draft: Draft) -> Draft:
         return draft
     draft = replace(draft, files=tuple((draft.folder or Path()) / file for file in named_files(draft.data)))
     for read in (read_files, measurements.read_data_file):
-        values, lines = read(draft)
-        draft = replace(draft, lines=(*draft.lines, *lines))
+        values, lines, notes = read(draft)
+        draft = replace(draft, lines=(*draft.lines, *lines), notes=(*draft.notes, *notes))
         for path, value in values.items():
             setting = Setting(path, value, "", override_text(path, value))
             data, _ = set_value(draft.data, path, value)
