@@ -123,7 +123,7 @@ EXAMPLES = {
         "slips",
         "",
         "Slip after over slip before the impact in the units of Maw, Barber and Fawcett (1976), in which the "
-        "curves do not depend on mu and hardly on the materials. Below the line of sticking the slip is reversed.",
+        "curves do not depend on mu. Below the line of sticking the slip is reversed.",
     ),
     "friction-loop": (
         "oblique",

@@ -115,7 +115,6 @@ def test_commands_that_take_a_sweep_refuse_a_calibration_in_one_line(
         ("expand", "fit.h5", "-o", "full.h5"),
         ("bless", "fit.h5", "baseline.h5", "--reason", "first"),
         ("extend", "fit.h5", "--set", "sweep.m1=1"),
-        ("run", "fit.h5"),
     ):
         done = cli(*words, cwd=tmp_path)
         assert (done.returncode, done.stderr.count("\n")) == (2, 1), (words, done.stderr)

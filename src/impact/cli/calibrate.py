@@ -11,6 +11,7 @@ import impact
 
 from ..display import show
 from . import exits
+from .completion import complete_model
 from .options import JobsOption, JsonOption, OverwriteOption, PluginOption, SetOption
 
 
@@ -23,6 +24,15 @@ def calibrate(
     best: Annotated[
         Path | None,
         typer.Option("--best", metavar="FILE", help="Write the config of the best law with its parameters."),
+    ] = None,
+    model: Annotated[
+        str | None,
+        typer.Option(
+            "--model",
+            metavar="KEY",
+            autocompletion=complete_model,
+            help="The law of --best, in place of the one that fits best.",
+        ),
     ] = None,
     sets: SetOption = None,
     plugins: PluginOption = None,
@@ -38,6 +48,7 @@ def calibrate(
         config,
         output=output,
         best=best,
+        model=model,
         overwrite=overwrite,
         overrides=sets or (),
         plugins=plugins or (),

@@ -47,10 +47,12 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
     "bless": ("compare", "Replace a baseline by a result.", 'results.h5 baseline.h5 --reason "finer tolerance"'),
     "rerun": ("compare", "Repeat the sweep of a result, and compare.", "baseline.h5"),
     "models": ("models", "Show the catalogue of models.", "gharib-hurmuzlu-2012"),
+    "cite": ("cite", "Write BibTeX of laws.", "tsuji-1992 lammps-mindlin"),
     "materials": ("materials", "Show common materials.", "steel"),
     "info": ("info", "Show the contents of a file.", "results.h5"),
     "init": ("config", "Write a starter config.", "my_sweep.toml"),
     "schema": ("config", "Print the JSON Schema of a config.", "-o impact.schema.json"),
+    "doctor": ("doctor", "Show the versions of what is installed.", "--json"),
     "help": ("main", "Show the help of a command.", "sweep"),
 }
 

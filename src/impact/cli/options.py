@@ -19,7 +19,7 @@ from .parsing import (
 
 ResultArgument = Annotated[Path, typer.Argument(help="A result of `impact sweep`.")]
 SourceArgument = Annotated[
-    Path | None, typer.Argument(help="A TOML file or a result. \\[default: Table 1 of the paper]")
+    Path | None, typer.Argument(help="A TOML file, a result or a calibration. \\[default: Table 1 of the paper]")
 ]
 AtOption = Annotated[
     list[Setting] | None,

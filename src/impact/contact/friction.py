@@ -57,7 +57,7 @@ class FrictionLaw:
     Parameters
     ----------
     key : kebab-case name, unique in the catalogue
-    title, year, reference, doi : name, year and source of the law
+    title, year, reference, doi : name, year and sources of the law, separated by semicolons; the DOI of the first
     equation : the law in one line of Unicode
     kind : "coulomb", f = mu N; "spring", a spring and a dashpot limited by mu N; "dashpot", limited by mu N; or
         "regularized", f = mu(g) N

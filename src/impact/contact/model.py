@@ -140,7 +140,7 @@ class ForceModel:
     Parameters
     ----------
     key : kebab-case name, unique in the catalogue
-    title, year, reference, doi : name, year and source of the law
+    title, year, reference, doi : name, year and sources of the law, separated by semicolons; the DOI of the first
     equation : the law in one line of Unicode
     evidence : where the formula and the DOI were read or derived, or that they were not verified
     domain : closed intervals in which the law is reported to hold, by the name of an input or derived quantity

@@ -143,7 +143,8 @@ def export(
     ----------
     to : name of the code, see `export_codes`
     model : a law that the code has, by its key; by default the first one of the source, or without a source the
-        first one of `export_codes`, that the release of the code has
+        first one of `export_codes`, that the release of the code has. The laws of a calibration, with their fitted
+        parameters, begin with the best one
     source, overrides : see `solve`
     at : values of inputs by config name; an e for a law that takes none is reached by its damping parameter
     dt : time step [s]; by default the contact time of the continuous law over 50
@@ -242,6 +243,8 @@ def export_codes() -> list[dict[str, Any]]:
 def _warnings(problem: ExportProblem, collision: Collision, row: TimestepRow) -> list[str]:
     """List what a user has to know before using the lines."""
     warnings = list(problem.code.warnings(collision))
+    if problem.better_fit:
+        warnings.append(_better_fit(problem))
     if abs(problem.e_continuous - problem.requested_e) > ASKED_TOL:
         key, requested = problem.model.key, number(problem.requested_e)
         warnings.append(
@@ -251,6 +254,11 @@ def _warnings(problem: ExportProblem, collision: Collision, row: TimestepRow) ->
     if row.failed:
         warnings.append(f"dt = {quantity(row.dt, 's')}: {_failure(problem, row)}")
     return warnings
+
+
+def _better_fit(problem: ExportProblem) -> str:
+    """Name the law of a calibration that fits best."""
+    return f"the law that fits best, {problem.better_fit}, is none of {problem.code.title}"
 
 
 def _row(problem: ExportProblem, dt: float) -> TimestepRow:
@@ -277,6 +285,7 @@ def _header(problem: ExportProblem, collision: Collision, row: TimestepRow) -> l
     ]
     if problem.missing_law:
         header.append(f"release {problem.version} lacks the default law of {code.newest}, {problem.missing_law}")
+    header += [*([_better_fit(problem)] if problem.better_fit else []), *problem.fit_notes]
     if problem.defaulted_axes:
         header.append(f"first value of each axis of the source: {', '.join(problem.defaulted_axes)}")
     if problem.solved_parameter:

@@ -15,9 +15,10 @@ from ..errors import UsageError
 from ..formatting import number
 from ..inverse.solve import placeholder, solve_input, unknown_of
 from ..inverse.timestep import FixedStepLaw, fixed_step_law
-from ..results.single_impact import ConfigSource, open_source, single_point
+from ..results.calibration import position_of_law, unidentified_notes
+from ..results.single_impact import Calibration, ConfigSource, open_source, single_point
 from .code import Code, Collision
-from .releases import first_law, law_of_code
+from .releases import first_law, has_law, law_of_code
 
 # phases over which the mean, the least and the largest restitution are taken
 PHASES = 400
@@ -37,6 +38,8 @@ class ExportProblem:
     e_continuous, peak_indentation : [-] and [m], of the continuous law
     solved_parameter : what was solved for, with the requested e; "" for none
     defaulted_axes : names of axes of the source that are at their first value
+    fit_notes : of a calibration, the rank of the law and its weight, and other laws that were fitted
+    better_fit : the law of a calibration that fits best, where it is none of the code; else ""
     missing_law : the default law of the newest release, where this one lacks it and none was requested; else ""
     """
 
@@ -48,6 +51,8 @@ class ExportProblem:
     config: Config
     solved_parameter: str
     defaulted_axes: tuple[str, ...]
+    fit_notes: tuple[str, ...]
+    better_fit: str
     missing_law: str
 
     @property
@@ -101,7 +106,7 @@ def prepare_export(
     if model is not None:
         key = law_of_code(code, model, version)
     elif models := point_source.models:
-        key = first_law(code, models, version)
+        key = first_law(code, models, version, is_fitted=point_source.calibration is not None)
     else:
         key, newest = (first_law(code, tuple(code.laws), release) for release in (version, code.newest))
         missing = "" if key == newest else newest
@@ -124,6 +129,8 @@ def prepare_export(
     else:
         config, defaulted_axes = single_point(point_source, key, at)
     fixed, collision = fixed_step_law(config, PHASES, code.scheme)
+    calibration = point_source.calibration
+    better_fit, fit_notes = _fit_notes(code, version, key, calibration) if calibration else ("", ())
     return ExportProblem(
         code=code,
         version=version,
@@ -133,5 +140,22 @@ def prepare_export(
         config=config,
         solved_parameter=solved,
         defaulted_axes=defaulted_axes,
+        fit_notes=fit_notes,
+        better_fit=better_fit,
         missing_law=missing,
     )
+
+
+def _fit_notes(code: Code, version: str, key: str, calibration: Calibration) -> tuple[str, tuple[str, ...]]:
+    """Name the law that fits best if the code lacks it, and list how well a law fits and which others it has."""
+    laws = calibration.laws
+    chosen = position_of_law(laws, key, calibration.name)
+    weights = calibration.dataset["weight"].values.tolist()
+    named = [f"{law}, weight {number(weight, 3)}" for law, weight in zip(laws, weights, strict=True)]
+    is_in_code = [has_law(code, law.split(" with ")[0], version) for law in laws]
+    notes = [f"{calibration.name}: {named[chosen]}, law {chosen + 1} of {len(laws)} by AICc"]
+    others = [name for position, name in enumerate(named) if is_in_code[position] and position != chosen]
+    if others:
+        notes.append(f"--model exports another law that was fitted: {'; '.join(others)}")
+    notes += unidentified_notes(calibration.dataset.isel(model=[chosen]))
+    return "" if is_in_code[0] else named[0], tuple(notes)

@@ -6,7 +6,7 @@ import contextlib
 import re
 from collections.abc import Sequence
 
-from ..contact.models import find
+from ..contact.models import original_key
 from ..errors import UsageError, did_you_mean
 from .code import Code
 from .programs import find_program
@@ -68,32 +68,42 @@ def law_of_code(code: Code, model: str, version: str) -> str:
     'lammps-coeff-restitution-hertz'
     """
     if model not in code.laws:
-        aliases = [key for key in code.laws if _law(key) == _law(model)]
+        aliases = [key for key in code.laws if original_key(key) == original_key(model)]
         if not aliases:
             raise UsageError(f'{code.title} has no law "{model}"; {did_you_mean(model, list(code.laws))}')
         model = aliases[0]
     return code.law_for_version(model, version)
 
 
-def first_law(code: Code, models: Sequence[str], version: str) -> str:
-    """Find the law of a code for the first of some models that a version of it has.
+def has_law(code: Code, key: str, version: str) -> bool:
+    """Whether a version of a code has a law as it is: it may have another one under the same name.
+
+    >>> from impact.exporters.registry import find_code
+    >>> [has_law(find_code("lammps"), "lammps-tsuji", version) for version in ("20260901", "20250722")]
+    [True, False]
+    """
+    with contextlib.suppress(UsageError):
+        return original_key(law_of_code(code, key, version)) == original_key(key)
+    return False
+
+
+def first_law(code: Code, models: Sequence[str], version: str, *, is_fitted: bool = False) -> str:
+    """Find the law of a code for the first of some models that a version of it has; a fitted one only as it is.
 
     >>> from impact.exporters.registry import find_code
     >>> lammps = find_code("lammps")
     >>> [first_law(lammps, tuple(lammps.laws), version) for version in ("20250722", "20210929")]
     ['lammps-coeff-restitution-hertz', 'lammps-tsuji-without-root']
     """
-    laws = {_law(key) for key in code.laws}
-    common = [key for key in models if _law(key) in laws]
+    laws = {original_key(key) for key in code.laws}
+    common = [key for key in models if original_key(key) in laws]
     if not common:
         shown = ", ".join(models[:3]) + (f" and {len(models) - 3} more" if len(models) > 3 else "")
-        raise UsageError(f"{code.title} has none of the laws {shown}; --model names one of its own")
+        way = "fit one of its own" if is_fitted else "--model names one of its own"
+        raise UsageError(f"{code.title} has none of the laws {shown}; {way}, see impact export --list")
     for key in common:
         with contextlib.suppress(UsageError):
-            return law_of_code(code, key, version)
+            law = law_of_code(code, key, version)
+            if not is_fitted or has_law(code, key, version):
+                return law
     return law_of_code(code, common[0], version)
-
-
-def _law(key: str) -> str:
-    """Return the key of a law, or of the one that it is another name of."""
-    return find(key).same_as or key

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
@@ -14,12 +15,12 @@ import xarray as xr
 
 from ..array_types import Array
 from ..atomic import check_outputs, write_file
-from ..config.files import override_text, toml_document
+from ..config.files import override_text
 from ..config.grid import Axis
 from ..config.input_names import InputName
 from ..config.load import Config, parse_config, read_config
 from ..config.measurements import fitted_parameters
-from ..config.quantities import KeyPath, Quantity
+from ..config.quantities import Quantity
 from ..config.tables import Solver
 from ..contact.friction import Pair
 from ..contact.interpolant import InterpolatedCollisions, motion_key
@@ -33,8 +34,9 @@ from ..engine.executors import choose_executor
 from ..engine.inputs import Inputs
 from ..engine.plan import Plan
 from ..engine.plugins import Plugins, read_plugins
-from ..engine.trajectories import PlanLaw, keys_of, model_of
-from ..results.calibration import calibration_template
+from ..engine.trajectories import PlanLaw, model_of
+from ..errors import UsageError
+from ..results.calibration import calibration_template, fitted_config, position_of_law
 from ..results.schema import FIT_STATUSES
 from ..results.xarray_backend import save
 from .batched_solvers import VectorFunction
@@ -71,6 +73,7 @@ def calibrate(
     *,
     output: str | Path | None = None,
     best: str | Path | None = None,
+    model: str | None = None,
     overwrite: bool = False,
     overrides: Sequence[str] = (),
     plugins: Sequence[ForceModel | str | Path] = (),
@@ -83,6 +86,7 @@ def calibrate(
     source : a TOML file, or a mapping with the same keys, with `[data]` and values `{ fit = [least, most] }`
     output : result file to write
     best : TOML file to write, with the config of the best law and its parameters, for `sweep` and `export`
+    model : key of the law whose config is written there, in place of the best one
     overwrite : replace files that exist
     overrides, plugins : see `sweep`
     jobs : number of processes; the result has the same bits for any number
@@ -111,11 +115,19 @@ def calibrate(
     read = Path(source) if isinstance(source, str) else source
     config = read_config(read, overrides, plugin_set.models, purpose="calibrate")
     check_outputs([output, best], [source, *plugins, *config.files], overwrite=overwrite)
+    if model is not None:
+        if best is None:
+            raise UsageError("--model: set without --best FILE, which is written for that law")
+        position_of_law(list(laws_to_fit(config)), model, "--model")
+    for note in config.notes:
+        warnings.warn(note, stacklevel=2)
     result = calibrate_config(config, plugin_set.of(config.models), jobs)
     if output is not None:
         save(result, output, overwrite=overwrite)
     if best is not None:
-        write_file(Path(best), best_config(config, result).encode(), overwrite=overwrite)
+        position = 0 if model is None else position_of_law(result["model"].values.tolist(), model, "--model")
+        text = fitted_config(config, result.isel(model=position))
+        write_file(Path(best), text.encode(), overwrite=overwrite)
     return result
 
 
@@ -360,34 +372,6 @@ def _factors(powers: Sequence[tuple[str, Fraction]]) -> str:
         words.append(f"sqrt({' '.join(roots)})")
     text = " ".join(words)
     return f"({text})" if len(words) > 1 else text
-
-
-def best_config(config: Config, result: xr.Dataset) -> str:
-    """Write a config of its own in SI units with the best law; inputs that vary in the data are axes."""
-    assert config.data is not None
-    best = result.isel(model=0)
-    keys = keys_of(laws_to_fit(config)[str(best["model"].item())])
-    fitted = best.isel(parameter=best["identifiable"].values >= 0)
-    estimates = dict(zip(map(str, fitted["parameter"].values), fitted["estimate"].values.tolist(), strict=True))
-    columns = {name: sorted(set(column)) for name, column in config.data.inputs.items()}
-    laws = {name: [key] for name, key in zip(("models", "frictions"), keys, strict=False)}
-    tables: dict[KeyPath, dict[str, object]] = {(): {**laws, "title": config.title}, ("sweep",): {}}
-    for name, material in config.materials.items():
-        known = {field: value for field, value in asdict(material).items() if value is not None and value == value}
-        tables["materials", name] = known
-    values = {**config.scalars, **columns, **estimates}
-    for name, value in values.items():
-        parsed = InputName.parse(name)
-        if not parsed.applies_to(*keys) or (name in config.fits and name not in estimates):
-            continue
-        if name == "u2" and "speed" in values:
-            # it follows from the speed
-            continue
-        value = parsed.word(value) if isinstance(value, float) else value
-        if isinstance(value, list) and len(value) == 1:
-            (value,) = value
-        tables.setdefault(parsed.path[:-1], {})[parsed.key] = value
-    return toml_document(tables)
 
 
 def _calibration_dataset(config: Config, plugins: Plugins, laws: Mapping[str, FittedLaw]) -> xr.Dataset:

@@ -157,7 +157,7 @@ def solve(
         stiffness "K", or the coefficient of friction "mu"
     target : the value of one output, such as `{"e_out": 0.6}`, or with a friction law `{"beta": 0.4}`
     friction : key of the friction law; by default the first one of the source, if it has any
-    source : a TOML file, a mapping, or a result; by default the two balls of Table 1 of the paper
+    source : a TOML file, a mapping, a result, or a calibration; by default the two balls of Table 1 of the paper
     at : values of the other inputs by config name, such as `{"v1": 1.0}`
     over : values of one input, such as `{"v1": {"linspace": [0.1, 3, 30]}}`, for which one value is found, with
         the smallest largest distance from the target
@@ -187,7 +187,7 @@ def solve(
     law = find(model, plugin_set.models)
     point_source = open_source(source, overrides, plugin_set)
     friction_law = (
-        find_friction(friction) if friction is not None else next(iter(point_source.draft.frictions), None)
+        find_friction(friction) if friction is not None else next(iter(point_source.draft(model).frictions), None)
     )
     unknown = unknown_of(law, name, friction_law)
     inputs = {**placeholder(law, unknown), **(at or {})}

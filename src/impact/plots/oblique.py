@@ -80,7 +80,7 @@ def psi_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     """Read the slip after over the slip before the impact, in the units of Maw, Barber and Fawcett (1976)."""
     line, pairs = _pairs_along(dataset, choice, "psi1", "psi2")
     slips = [tuple(np.asarray(pair.data[name].values, float) for name in ("psi1", "psi2")) for pair in pairs]
-    # far beyond the slips that are stopped or reversed, all curves are lines beside that of no friction
+    # far beyond the slips that are stopped or reversed the curves are lines, which would hide the rest
     stopped = [np.abs(before[before * after <= 0.0]).max(initial=0.0) for before, after in slips]
     most = SHOWN_PSI * max(stopped) or np.inf
     curves = []
@@ -89,7 +89,7 @@ def psi_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
         order = order[np.abs(before[order]) <= most]
         curves.append(_curve(pair, before[order], after[order], "psi2"))
     if any((np.abs(before) > most).any() for before, _ in slips):
-        beyond = f"slips beyond psi1 = {number(float(most), 3)}, where the contact slides throughout"
+        beyond = f"slips beyond psi1 = {number(float(most), 3)}, {SHOWN_PSI} times the largest that is stopped"
         line = line._replace(not_drawn=(*line.not_drawn, beyond))
     shown = [end for curve in curves for end in curve.x]
     along = np.array([min(shown), max(shown)])

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..config.grid import SAMPLE
 from ..config.input_names import InputName, is_input
+from ..config.tables import OBLIQUE_DEFAULTS
 from ..contact.units import with_numbers
 from ..errors import UsageError, did_you_mean
 from ..formatting import NO_BREAK, degrees, quantity, safe_text
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
 
 # values in a picture, which are held as Python objects
 MAX_DRAWN = 2**24
+# values that go without saying: no spin, no tangential velocity, the inertia of solid spheres
+UNSAID = {**OBLIQUE_DEFAULTS, "u1": 0.0, "u2": 0.0}
 NO_SWEEP = "this is a time history, not the result of a sweep; draw it with --kind loop, or history"
 
 
@@ -240,10 +243,13 @@ def scalars_of(dataset: xr.Dataset) -> dict[str, object]:
 
 
 def described_inputs(inputs: Mapping[str, object], units: Mapping[str, str], exponent: str | None = None) -> str:
-    """Write inputs with their units; `exponent` is the text for n if the laws shown fix their exponent."""
+    """Write inputs with their units; `exponent` is the text for n if the laws shown fix their exponent.
+
+    Values of `UNSAID` are left out.
+    """
     parts = []
     for name, value in inputs.items():
-        if InputName.parse(name).table in ("sweep", "materials"):
+        if InputName.parse(name).table in ("sweep", "materials") and value != UNSAID.get(name):
             n = inputs.get("n")
             unit = with_numbers(units[name], {"n": n}) if isinstance(n, float) else units[name]
             text = exponent if name == "n" and exponent else quantity(value, unit)

@@ -4,20 +4,24 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from ..array_types import Array
+from ..config.files import toml_document
 from ..config.input_names import InputName
 from ..config.load import Config
+from ..config.quantities import KeyPath
 from ..config.tables import DEFAULT_TITLE
+from ..contact.models import original_key
 from ..contact.variables import OUTPUTS
 from ..engine.plan import Plan
 from ..engine.plugins import Plugins
 from ..engine.trajectories import PlanLaw, keys_of, model_of
+from ..errors import UsageError, did_you_mean
 from ..formatting import decimals, number, safe_text
 from . import schema
 
@@ -225,3 +229,46 @@ def calibration_template(
     }
     coords = xr.Coordinates(coordinates)
     return xr.Dataset(schema.template(schema.CALIBRATION.values(), coords.sizes, ()), coords, attributes)
+
+
+def position_of_law(laws: Sequence[str], wanted: str, origin: str) -> int:
+    """Find the first of some laws, each MODEL or MODEL with FRICTION, that is the wanted one, by whatever name.
+
+    >>> position_of_law(["hertz", "tsuji-1992 with coulomb-1785"], "liggghts-hertz", "--model")
+    1
+    """
+    model, _, friction = wanted.partition(" with ")
+    for position, law in enumerate(laws):
+        key, _, other = law.partition(" with ")
+        if original_key(key) == original_key(model) and friction in ("", other):
+            return position
+    raise UsageError(f'{origin}: no fit of "{wanted}"; {did_you_mean(wanted, list(laws))}')
+
+
+def fitted_config(config: Config, law: xr.Dataset) -> str:
+    """Write a config of its own in SI units with one fitted law; inputs that vary in the data are axes."""
+    assert config.data is not None
+    keys = tuple(str(law["model"].item()).split(" with "))
+    fitted = law.isel(parameter=law["identifiable"].values >= 0)
+    estimates = dict(zip(map(str, fitted["parameter"].values), fitted["estimate"].values.tolist(), strict=True))
+    if any(value != value for value in estimates.values()):
+        raise UsageError(f"{' with '.join(keys)}: the fit has no estimate, its status is {fit_status(law)}")
+    columns = {name: sorted(set(column)) for name, column in config.data.inputs.items()}
+    laws = {name: [key] for name, key in zip(("models", "frictions"), keys, strict=False)}
+    tables: dict[KeyPath, dict[str, object]] = {(): {**laws, "title": config.title}, ("sweep",): {}}
+    for name, material in config.materials.items():
+        known = {field: value for field, value in asdict(material).items() if value is not None and value == value}
+        tables["materials", name] = known
+    values = {**config.scalars, **columns, **estimates}
+    for name, value in values.items():
+        parsed = InputName.parse(name)
+        if not parsed.applies_to(*keys) or (name in config.fits and name not in estimates):
+            continue
+        if name == "u2" and "speed" in values:
+            # it follows from the speed
+            continue
+        value = parsed.word(value) if isinstance(value, float) else value
+        if isinstance(value, list) and len(value) == 1:
+            (value,) = value
+        tables.setdefault(parsed.path[:-1], {})[parsed.key] = value
+    return toml_document(tables)

@@ -16,7 +16,7 @@ import xarray as xr
 
 from .._version import __version__
 from ..config.design import distribution_paths
-from ..config.draft import Draft, Setting, listed_names, open_config, open_text
+from ..config.draft import Draft, Setting, listed_names, open_config, open_text, settings_of
 from ..config.files import as_table
 from ..config.grid import Axis
 from ..config.input_names import SWEEP_INPUTS, InputName, input_values
@@ -44,8 +44,9 @@ from ..engine.plan import Plan
 from ..engine.plugins import Plugins, read_plugins
 from ..errors import ConfigError, UsageError, did_you_mean
 from ..formatting import number, quantity, safe_text
-from .kinds import require_sweep
-from .provenance import changed_plugins, stored_draft, unknown_plugins
+from .calibration import fitted_config, position_of_law
+from .kinds import is_calibration, require_sweep
+from .provenance import changed_plugins, stored_config, stored_draft, unknown_plugins
 from .schema import SCHEMA_VERSION, attributes_of, is_case, plain_unit
 from .seal import is_result
 from .xarray_backend import open_result
@@ -244,7 +245,8 @@ def run(
 
     Parameters
     ----------
-    source : a TOML file, a mapping, or a result; by default the two balls of Table 1 of the paper, at e = 0.5
+    source : a TOML file, a mapping, a result, or a calibration; by default the two balls of Table 1 of the paper,
+        at e = 0.5
     model : key of the model; by default the first one of the source
     friction : key of the friction law; by default the first one of the source, if it has any
     at : values by config name, such as `{"e": 0.05}`; the default of an axis is its first value
@@ -456,21 +458,61 @@ def _chosen_keys(dataset: xr.Dataset, dim: str, chosen: Sequence[str] | None) ->
 
 
 @dataclass(frozen=True)
+class Calibration:
+    """A calibration of which the config of one law with its fitted parameters is taken."""
+
+    dataset: xr.Dataset
+    config: Config
+    overrides: tuple[Setting, ...]
+    name: str
+
+    @property
+    def laws(self) -> list[str]:
+        """MODEL, or MODEL with FRICTION, the best law first."""
+        return [str(law) for law in self.dataset["model"].values]
+
+    def law(self, model: str, friction: str = "") -> xr.Dataset:
+        """Find the fit of a law, by whatever name."""
+        key = f"{model} with {friction}" if friction else model
+        return self.dataset.isel(model=position_of_law(self.laws, key, self.name))
+
+    def draft(self, law: xr.Dataset, model: str, plugins: Plugins) -> Draft:
+        """Open the config of a fitted law, under the name of a model."""
+        draft = open_text(fitted_config(self.config, law), self.name, plugins.models)
+        fitted = draft.models[0].key
+        table = draft.table("model").get(fitted)
+        is_renamed = table is not None and model != fitted
+        renamed = [Setting(("model", model), table, f"--model {model}")] if is_renamed else []
+        return draft.with_settings([*renamed, *self.overrides])
+
+
+@dataclass(frozen=True)
 class PointSource:
     """A config of which single impacts are taken, with the settings of the user."""
 
-    draft: Draft
+    config_draft: Draft
     plugins: Plugins
     labels: Mapping[str, float | str] = field(default_factory=dict)  # at which a part of a result was selected
     has_selection: bool = True  # selects models, unlike the starter config
+    calibration: Calibration | None = None
 
     @property
     def models(self) -> tuple[str, ...]:
         """Keys of the selected models, or none; other values of the config need not be valid yet."""
-        if not self.has_selection or "models" not in self.draft.data:
+        if self.calibration is not None:
+            return tuple(dict.fromkeys(law.split(" with ")[0] for law in self.calibration.laws))
+        draft = self.config_draft
+        if not self.has_selection or "models" not in draft.data:
             return ()
-        _, problems = expand_models(self.draft.data["models"], self.draft.known_models)
-        return tuple(model.key for model in (build(self.draft).models if problems else self.draft.models))
+        _, problems = expand_models(draft.data["models"], draft.known_models)
+        return tuple(model.key for model in (build(draft).models if problems else draft.models))
+
+    def draft(self, model: str | None = None, friction: str | None = None) -> Draft:
+        """The config; of a calibration that of a law, by default the best one."""
+        if self.calibration is None:
+            return self.config_draft
+        model = self.models[0] if model is None else model
+        return self.calibration.draft(self.calibration.law(model, friction or ""), model, self.plugins)
 
 
 def open_source(source: ConfigSource, overrides: Sequence[str], plugins: Plugins) -> PointSource:
@@ -486,19 +528,25 @@ def open_source(source: ConfigSource, overrides: Sequence[str], plugins: Plugins
         return _open_stored(source, overrides, plugins, "the result")
     if source is None:
         draft = open_text(STARTER_CONFIG.read_text(encoding="utf-8"), "starter", plugins.models)
-        draft = draft.with_settings([STARTER_E, *map(Setting.parse, overrides)])
+        draft = draft.with_settings([STARTER_E, *settings_of(overrides)])
         return PointSource(draft, plugins, has_selection=("models",) in draft.origins)
     draft = open_config(Path(source) if isinstance(source, str) else source, plugins.models)
-    return PointSource(draft.with_settings(map(Setting.parse, overrides)), plugins)
+    return PointSource(draft.with_settings(settings_of(overrides)), plugins)
 
 
 def _open_stored(dataset: xr.Dataset, overrides: Sequence[str], plugins: Plugins, name: str) -> PointSource:
-    require_sweep(dataset, name)
-    draft = stored_draft(dataset.attrs, plugins, name).with_settings(map(Setting.parse, overrides))
+    calibration, settings = None, tuple(settings_of(overrides))
+    if is_calibration(dataset):
+        config = stored_config(dataset.attrs, (), plugins, name, allow_changed_plugins=True, purpose="calibrate")
+        calibration = Calibration(dataset.load(), config, settings, name)
+    else:
+        require_sweep(dataset, name)
+    draft = stored_draft(dataset.attrs, plugins, name).with_settings(settings)
     for note in (*changed_plugins(dataset.attrs, plugins, name), *unknown_plugins(dataset.attrs, plugins, name)):
         warnings.warn(note, stacklevel=4)
     labels = {str(key): label.values.item() for key, label in dataset.coords.items() if label.ndim == 0}
-    return PointSource(draft, plugins, {k: value for k, value in labels.items() if k not in LAW_DIMS})
+    labels = {} if calibration else {k: value for k, value in labels.items() if k not in LAW_DIMS}
+    return PointSource(draft, plugins, labels, calibration=calibration)
 
 
 def single_point(
@@ -520,7 +568,10 @@ def single_point(
     over : values of an input, as in a config, that stay an axis
     friction : key of the friction law; by default the config's first, if it has any
     """
-    draft, fixed = source.draft, {str(InputName.parse(name)): value for name, value in (at or {}).items()}
+    draft, fixed = (
+        source.draft(model, friction),
+        {str(InputName.parse(name)): value for name, value in (at or {}).items()},
+    )
     for name, value in fixed.items():
         if isinstance(value, Mapping) or np.ndim(value):
             raise UsageError(f"--at {name}={value}: got several values, expected one")

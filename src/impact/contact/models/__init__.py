@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from functools import cache
 
-from ..catalogue import by_key, declared_laws, look_up
+from ..catalogue import by_key, declared_laws, look_up, pickle_by_key
 from ..model import ForceModel
 
 # families in the order of the paper; other families follow
@@ -46,3 +46,16 @@ def catalogue(plugins: Sequence[ForceModel] = ()) -> Mapping[str, ForceModel]:
 def find(key: str, plugins: Sequence[ForceModel] = ()) -> ForceModel:
     """Find the model of a key."""
     return look_up(catalogue(plugins), key, "model")
+
+
+def original_key(key: str) -> str:
+    """Return the key of the law that a key of the catalogue is another name for, else the key itself.
+
+    >>> original_key("liggghts-hertz"), original_key("hertz"), original_key("mine-2026")
+    ('tsuji-1992', 'hertz', 'mine-2026')
+    """
+    model = catalogue().get(key)
+    return model.same_as if model is not None and model.same_as else key
+
+
+pickle_by_key(ForceModel, find)

@@ -19,15 +19,15 @@ JKR_1971 = ForceModel(
     equation="F = 4E* a³/(3R*) − √(8π Γ E* a³),  δ = a²/R* − √(2π Γ a/E*), from δ = 0 to the pull-off at δ = "
     "−(3/4)"
     "(π² Γ² R*/E*²)^(1/3)",
-    reference="Johnson KL, Kendall K, Roberts AD (1971); Thornton C, Ning Z (1998) A theoretical model for the "
-    "stick/bounce behaviour of adhesive, elastic-plastic spheres. Powder Technol. 99, 154",
+    reference="Thornton C, Ning Z (1998) A theoretical model for the stick/bounce behaviour of adhesive, "
+    "elastic-plastic spheres. Powder Technol. 99, 154; Johnson KL, Kendall K, Roberts AD (1971)",
     doi="10.1016/S0032-5910(98)00099-0",
     evidence=Evidence(
         "seen",
         "lammps/lammps, doc/src/pair_granular.rst @02dde6e35f (2019), whose γ is Γ/2; the restitution in a public "
         "digest (2026) of Thornton and Ning (1998), equations (49) to (57)",
         doi="the same digest",
-        note="the DOI is that of Thornton and Ning; elastic: all that is lost is the work of the neck",
+        note="elastic: all that is lost is the work of the neck",
     ),
     parameters=(Parameter("gamma", "N/m", "work of adhesion Γ", least=0.0, typical=0.01),),
     coefficients={

@@ -32,9 +32,9 @@ JANKOWSKI_2006 = approach_dashpot(
     title="Jankowski",
     year=2006,
     equation="F = K δ^(3/2) + 2 ξ √(m K) δ^(1/4) δ̇, then F = K δ^(3/2),  ξ = (9√5/2)(1 − e²)/(e(e(9π − 16) + 16))",
-    reference="Jankowski R (2005) Non-linear viscoelastic modelling of earthquake-induced structural pounding. "
-    "EESD 34, 595; Jankowski R (2006) Analytical expression between the impact damping ratio and the coefficient "
-    "of restitution in the non-linear viscoelastic model of structural pounding. EESD 35, 517",
+    reference="Jankowski R (2006) Analytical expression between the impact damping ratio and the coefficient of "
+    "restitution in the non-linear viscoelastic model of structural pounding. EESD 35, 517; Jankowski R (2005) "
+    "Non-linear viscoelastic modelling of earthquake-induced structural pounding. EESD 34, 595",
     doi="10.1002/eqe.537",
     evidence=Evidence("seen", OPENSEES_JANKOWSKI, doi=OPENSEES_JANKOWSKI),
     zeta=lambda e: 9 * np.divide(1 - e * e, e * (e * (9 * np.pi - 16) + 16)),

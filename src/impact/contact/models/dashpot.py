@@ -84,8 +84,8 @@ THORNTON_EQUATION = (
     "F = K δ^(3/2) + 2 β √(m S) δ̇,  S = (3/2) K δ^(1/2),  β = √(1/(1 − (1 + e)² exp(e p(e))) − 1), to F = 0"
 )
 KELVIN_VOIGT_REFERENCE = (
-    "Goldsmith W (1960) Impact. Arnold, London; "
-    "Cundall PA, Strack ODL (1979) A discrete numerical model for granular assemblies. Géotechnique 29, 47"
+    "Cundall PA, Strack ODL (1979) A discrete numerical model for granular assemblies. Géotechnique 29, 47; "
+    "Goldsmith W (1960) Impact. Arnold, London"
 )
 
 KELVIN_VOIGT = dashpot(

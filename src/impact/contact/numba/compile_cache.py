@@ -81,6 +81,14 @@ class CheckedCache(FunctionCache):
             _warn_once(f"compiled code is not kept in {self._cache_path}: {getattr(error, 'strerror', 'damaged')}")
 
 
+def cache_folder() -> str | None:
+    """Find the folder of the compiled code of this package, None where no folder can be written to."""
+    try:
+        return str(CheckedCache(cache_folder).cache_path)
+    except (RuntimeError, OSError):
+        return None
+
+
 def compiled(**options):
     """As `numba.njit`, with the machine code in a cache on disk where possible."""
 

@@ -1,0 +1,157 @@
+"""How laws are cited: BibTeX from their references, with the evidence for their formulas."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import xarray as xr
+
+from ..contact.catalogue import look_up
+from ..contact.friction import FrictionLaw
+from ..contact.frictions import frictions
+from ..contact.model import ForceModel
+from ..display import Block, Displayed
+from ..engine.model_catalogue import models
+from ..errors import UsageError
+from .xarray_backend import load
+
+# "Tsuji Y, Tanaka T (1992) Title. Journal 71, 239"; the title may be missing, and something may follow
+AUTHOR = r"[^\W\d_][^(),;]* [A-Z]+"
+PAPER = re.compile(rf"(?P<author>{AUTHOR}(?:, {AUTHOR})*(?: and others)?) \((?P<year>\d{{4}})\),? ?(?P<rest>.*)")
+# the words of a journal are capitalised, those of a title are not
+JOURNAL = r"(?P<journal>[A-Z][^, ]*(?: [A-Z][^, ]*)*)"
+PLACE = r" (?P<volume>[\d-]+), (?P<pages>\w+)(?:, .*)?"
+ARTICLES = (
+    re.compile(JOURNAL + PLACE),
+    re.compile(r"(?P<title>.+?)\. (?P<journal>[^,]+)" + PLACE),
+    re.compile(r"(?P<title>.+?)\. (?P<howpublished>.+)"),
+    re.compile(r"(?P<howpublished>.*)"),
+)
+SPECIAL = re.compile(r"[&%$#_{}]")
+
+
+@dataclass(frozen=True)
+class Citation:
+    """How a law is cited.
+
+    Parameters
+    ----------
+    model : key of the model or friction law
+    bibtex : an entry for each reference of the law; its DOI is that of the first
+    evidence : how well the formula and the DOI are verified
+    """
+
+    model: str
+    bibtex: str
+    evidence: dict[str, str]
+
+
+class Citations(tuple[Citation, ...], Displayed):
+    """Citations of laws, whose text is BibTeX."""
+
+    def as_list(self) -> list[dict[str, Any]]:
+        """The JSON of the command: an object for each law."""
+        return [dict(vars(citation)) for citation in self]
+
+    def as_dict(self) -> dict[str, Any]:
+        """The BibTeX of each law by its key."""
+        return {citation.model: citation.bibtex for citation in self}
+
+    def records(self) -> Sequence[dict[str, Any]]:
+        """A row for each law."""
+        return self.as_list()
+
+    def sections(self, width: int) -> Iterator[Block]:
+        """The entries."""
+        yield from "\n\n".join(citation.bibtex for citation in self).splitlines()
+
+
+def cite(*laws: str | Path | xr.Dataset | ForceModel | FrictionLaw, plugins: Sequence[Any] = ()) -> Citations:
+    """Cite laws: BibTeX from their references, with the evidence for their formulas.
+
+    Parameters
+    ----------
+    laws : keys of models and friction laws, laws, or results, of which every law is cited
+    plugins : Python files with user-defined models, or their models
+
+    Raises
+    ------
+    ModelError : a law is not in the catalogue; the message names the nearest key
+    UsageError : no law is given
+
+    >>> import impact
+    >>> print(impact.cite("hertz"))  # doctest: +ELLIPSIS
+    @article{hertz,
+      author = {Hertz, H.},
+      year = {1882},
+      title = {{Über die Berührung fester elastischer Körper}},
+      journal = {J. reine angew. Math.},
+      volume = {92},
+      pages = {156},
+      doi = {10.1515/crll.1882.92.156},
+      note = {formula seen in Gharib and Hurmuzlu (2012), equation (10); DOI seen in ...},
+    }
+    """
+    if not laws:
+        raise UsageError("laws: got none, expected keys of laws, or results")
+    known: dict[str, ForceModel | FrictionLaw] = {**models(plugins), **frictions()}
+    chosen: dict[str, ForceModel | FrictionLaw] = {}
+    for item in laws:
+        if isinstance(item, ForceModel | FrictionLaw):
+            chosen[item.key] = item
+            continue
+        if not isinstance(item, xr.Dataset) and (isinstance(item, Path) or Path(item).suffix):
+            item = load(item)
+        if isinstance(item, xr.Dataset):
+            coordinates = (item.coords[name] for name in ("model", "friction") if name in item.coords)
+            keys = [str(key) for coordinate in coordinates for key in coordinate.values.flat]
+        else:
+            keys = [item]
+        chosen |= {key: look_up(known, key, "law") for key in keys}
+    return Citations(Citation(key, bibtex(law), dict(vars(law.evidence))) for key, law in chosen.items())
+
+
+def bibtex(law: ForceModel | FrictionLaw) -> str:
+    """Write an entry for each reference of a law."""
+    entries = []
+    for index, reference in enumerate(law.reference.split("; "), 1):
+        kind, fields = _parse_reference(reference or law.title)
+        if index == 1:
+            fields |= {"doi": law.doi, "note": _escape(f"formula {law.evidence}")}
+        key = law.key if index == 1 else f"{law.key}-{index}"
+        lines = (f"  {name} = {{{text}}}," for name, text in fields.items() if text)
+        entries.append("\n".join((f"@{kind}{{{key},", *lines, "}")))
+    return "\n\n".join(entries)
+
+
+def _parse_reference(reference: str) -> tuple[str, dict[str, str]]:
+    """Find the kind of an entry, and its fields; what is no paper is a title."""
+    paper = PAPER.fullmatch(reference)
+    if paper is None:
+        return "misc", {"title": f"{{{_escape(reference)}}}"}
+    rest = next(found for pattern in ARTICLES if (found := pattern.fullmatch(paper["rest"]))).groupdict()
+    fields = {"author": _authors(paper["author"]), "year": paper["year"], **rest}
+    fields = {name: _escape(text) for name, text in fields.items()}
+    if "title" in fields:
+        fields["title"] = f"{{{fields['title']}}}"
+    return "article" if "journal" in fields else "misc", fields
+
+
+def _authors(text: str) -> str:
+    """Write authors as BibTeX does.
+
+    >>> _authors("Hunt KH, Crossley FRE and others")
+    'Hunt, K. H. and Crossley, F. R. E. and others'
+    """
+    people, *others = text.split(" and others")
+    names = [name.rsplit(" ", 1) for name in people.split(", ")]
+    shown = [f"{family}, {'. '.join(initials)}." for family, initials in names]
+    return " and ".join([*shown, *("others" for _ in others)])
+
+
+def _escape(text: str) -> str:
+    return SPECIAL.sub(r"\\\g<0>", text)

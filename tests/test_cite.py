@@ -1,0 +1,60 @@
+"""`impact cite`: BibTeX of laws and of results."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+import impact
+
+from .conftest import Run
+
+ENTRY = re.compile(r"@(article|misc)\{([\w.-]+),\n((?:  [a-z]+ = \{.*\},\n)+)\}")
+
+
+def test_the_bibtex_of_the_catalogue_has_each_law_once_and_balanced_braces() -> None:
+    laws = [*impact.models(), *impact.frictions()]
+    text = "\n\n".join(citation.bibtex for citation in impact.cite(*laws))
+    entries = ENTRY.findall(text)
+    assert "\n\n".join(f"@{kind}{{{key},\n{fields}}}" for kind, key, fields in entries) == text
+    keys = [key for _, key, _ in entries]
+    assert len(set(keys)) == len(keys)
+    assert set(laws) <= set(keys)
+    for _, key, fields in entries:
+        shown = re.sub(r"\\[{}&%$#_]", "", fields)
+        assert shown.count("{") == shown.count("}"), key
+        assert not re.search(r"[&%$#_]", shown), key
+
+
+def test_a_doi_stands_in_the_entry_of_its_paper() -> None:
+    (goldsmith,) = impact.cite("kelvin-voigt")
+    first, second = goldsmith.bibtex.split("\n\n")
+    assert "Cundall" in first
+    assert "geot.1979" in first
+    assert "doi" not in second
+
+
+def test_a_result_cites_all_of_its_laws(tmp_path: Path, cli: Run) -> None:
+    config = {
+        "models": ["tsuji-1992", "hertz"],
+        "frictions": ["coulomb-1785"],
+        "sweep": {"e": 0.5, "v1": 1.0, "angle": "30 deg", "mu": 0.1, "m1": 1.0, "m2": 1.0, "K": 1e6, "R1": 0.01},
+    }
+    result = impact.sweep(config)
+    impact.save(result, tmp_path / "r.h5")
+    done = cli("cite", str(tmp_path / "r.h5"), "jkr-1971", "--json")
+    cited = json.loads(done.stdout)
+    assert [citation["model"] for citation in cited] == ["tsuji-1992", "hertz", "coulomb-1785", "jkr-1971"]
+    assert cited[0]["evidence"]["state"] == "seen"
+    assert cited[:3] == impact.cite(result).as_list()
+
+
+def test_an_unknown_law_is_named(cli: Run) -> None:
+    done = cli("cite", "hertx")
+    assert done.returncode == 2
+    assert done.stderr == 'no law "hertx"; did you mean "hertz"?\n'
+    with pytest.raises(impact.ImpactError, match="got none"):
+        impact.cite()
