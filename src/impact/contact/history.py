@@ -257,18 +257,15 @@ def _fractions_at(steps: tuple[Step, ...], times: Array, time_row: int = 2) -> l
     """Compute the fractions of each step at which the interpolated time equals one of the increasing times."""
     ends = np.array([step.at(step.end)[time_row, 0] for step in steps])
     step_of_time = np.minimum(np.searchsorted(ends, times), len(steps) - 1)
-    fractions = []
-    for index, step in enumerate(steps):
-        step_times = times[step_of_time == index]
-        count = step_times.size
-        low, high = np.zeros(count), np.full(count, step.end[0])
-        repeated_step = Step(
-            np.repeat(step.start, count, 1), np.repeat(step.length, count), np.repeat(step.stages, count, 2), high
-        )
-        # the time grows with the fraction: bisect to the last bit
-        for _ in range(BISECTIONS if count else 0):
-            middle = 0.5 * (low + high)
-            is_early = repeated_step.at(middle)[time_row] < step_times
-            low, high = np.where(is_early, middle, low), np.where(is_early, high, middle)
-        fractions.append(high)
-    return fractions
+    # the row of the time of all steps at once, one column for each time
+    start = np.array([step.start[time_row, 0] for step in steps])[step_of_time]
+    length = np.array([step.length[0] for step in steps])[step_of_time]
+    stages = np.array([step.stages[:, time_row, 0] for step in steps])[step_of_time].T
+    low, high = np.zeros(len(times)), np.array([step.end[0] for step in steps])[step_of_time]
+    time_of = Step(start, length, stages, high).at
+    # the time grows with the fraction: bisect to the last bit
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        is_early = time_of(middle) < times
+        low, high = np.where(is_early, middle, low), np.where(is_early, high, middle)
+    return np.split(high, np.searchsorted(step_of_time, np.arange(1, len(steps))))

@@ -15,6 +15,7 @@ A slip begins where the trial force reaches the limit, and ends where it would g
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
@@ -25,21 +26,21 @@ from ..array_types import Array, Mask
 from ..ode.problem import Margins, Params, Problem
 from . import motion
 from .formula_calls import Formula, call_by_name
+from .piecewise import Breakpoint
 from .velocity_coordinates import signed_power
 
 FrictionKind = Literal["coulomb", "spring", "dashpot", "regularized"]
 
-# rows of the joint state and its rates: s and v, Gamma and z; memory work while sticking, time, work against the
-# limit while slipping, damping work, and memory work while slipping; the rates also have the normal force
-SLIP_ROW, SPRING_ROW, STICK_MEMORY_ROW, TIME_ROW, SLIP_WORK_ROW, DAMPING_ROW, SLIP_MEMORY_ROW, FORCE_ROW = range(
+# rows of the joint state and its rates: s and v, Gamma and z; time, work on the spring while sticking and while
+# slipping, damping work, and memory work at the limit; the rates also have the normal force
+SLIP_ROW, SPRING_ROW, TIME_ROW, STICK_WORK_ROW, SLIP_WORK_ROW, DAMPING_ROW, LIMIT_MEMORY_ROW, FORCE_ROW = range(
     2, 10
 )
 N_COMPONENTS = 4
 # those rows of the joint rates that a normal problem has; it does not use its work, the fourth
 NORMAL_ROWS = [0, 1, TIME_ROW, TIME_ROW, FORCE_ROW]
-# errors of Gamma, z and the memory work while sticking are judged against 1; the latter may grow fast where the
-# contact area vanishes
-JOINT_FLOOR = (*motion.ERROR_FLOOR, 1.0, 1.0, 1.0)
+# errors of Gamma and z are judged against 1
+JOINT_FLOOR = (*motion.ERROR_FLOOR, 1.0, 1.0)
 # numbers of the margins: of the mode, and of the sign of the normal force
 MODE_MARGIN, SIGN_MARGIN = 0, 1
 # a margin counts as positive down to this part of the largest normal force, which is of the order of 1
@@ -57,6 +58,8 @@ RATE_OF_LIMIT_STEP, RATE_OF_SLIP_STEP = 1e-5, 1e-3
 START_S, RATE_S, LEAST_S = 1e-7, 1e-4, 1e-10
 # s below which a mode does not change any more
 END_S = 1e-6
+# x below which the slip in the modes -2 and 2 is the same
+HELD_X = 1e-7
 # step of the central difference quotient there, relative to s; it sees the rate of N beside a force that jumps
 RATE_STEP = 1e-2
 
@@ -129,9 +132,10 @@ class Track:
 
     `force` and `energy` are phi_e and its energy at the end of the last part, `v` the velocity to which the
     impulse of N is complete: `impulse`, and `signed` in the direction of the slip. `slip_work` and `damping_work`
-    complete the quadratures by what happens where a mode begins and ends. `order` is the leading power of x in N
-    at first contact, and `touches` tells that a slip began or ended at x = 0. `modes` has a bit for sticking,
-    slipping forwards and backwards.
+    complete the quadratures by what happens where a mode begins and ends; `stick_energy` is what the spring gains
+    while sticking, `held_memory` the memory work in the modes -2 and 2. `order` is the leading power of x in N
+    at first contact, and `touches` tells that the spring was at its limit at x = 0. `modes` has a bit for
+    sticking, slipping forwards and backwards.
     """
 
     mode: Array
@@ -143,6 +147,8 @@ class Track:
     signed: Array
     slip_work: Array
     damping_work: Array
+    stick_energy: Array
+    held_memory: Array
     order: Array
     touches: Mask
     modes: NDArray[np.int8]
@@ -171,17 +177,16 @@ class Track:
         self, index: NDArray[np.intp], old: Array, new: Array, y: Array, before: Array, after: Array
     ) -> None:
         """Change modes, with the energies of the spring before and after."""
-        memory = y[SLIP_MEMORY_ROW]
-        entered, left = before + memory, after + memory
         was_slip, is_slip = np.abs(old) == 1.0, np.abs(new) == 1.0
         self.slip_work[index] += np.where(
-            is_slip, np.where(was_slip, 0.0, entered), np.where(was_slip, -left, before - after)
+            is_slip, np.where(was_slip, 0.0, before), np.where(was_slip, -after, before - after)
         )
+        self.stick_energy[index] += np.where(old == 0.0, before, 0.0) - np.where(new == 0.0, after, 0.0)
         was_held, is_held = np.abs(old) == 2.0, np.abs(new) == 2.0
-        kinetic = 0.5 * y[SLIP_ROW] * y[SLIP_ROW]
-        self.damping_work[index] += np.where(is_held & ~was_held, kinetic + left, 0.0) - np.where(
-            was_held & ~is_held, kinetic + entered, 0.0
-        )
+        begins, ends, memory = is_held & ~was_held, was_held & ~is_held, y[LIMIT_MEMORY_ROW]
+        self.held_memory[index] += np.where(ends, memory, 0.0) - np.where(begins, memory, 0.0)
+        rest = memory + 0.5 * y[SLIP_ROW] * y[SLIP_ROW]
+        self.damping_work[index] += np.where(begins, rest + after, 0.0) - np.where(ends, rest + before, 0.0)
         self.mode[index] = new
         self.changes[index] += old != new
         self.see(index, new)
@@ -221,6 +226,7 @@ class SlipPhase:
     track : of all trajectories
     arguments : names of the params after the columns, besides y over Gamma: those of `TangentialForm.coefficient`
     has_drag : whether any trajectory has a dashpot
+    breakpoints : of the normal force, whose sides are the last params
     """
 
     form: TangentialForm
@@ -231,6 +237,7 @@ class SlipPhase:
     track: Track
     arguments: tuple[str, ...] = ()
     has_drag: bool = True
+    breakpoints: Sequence[Breakpoint] = ()
 
     @property
     def stiffness_power(self) -> float:
@@ -311,14 +318,14 @@ class SlipPhase:
             slip_force, slip_spring = slip_force - slip_drag, slip_spring - slip_drag
             out[DAMPING_ROW] = power * working_drag
         out[SLIP_WORK_ROW] = power * slip_force
+        out[STICK_WORK_ROW] = power * spring_force if self.has_spring else 0.0
         if self.has_spring and self.stiffness_power and self.memory != 0.5:
-            safe = np.where(np.abs(s) < END_S, END_S, s)
+            safe = _away_from_zero(s)
             fading = (0.5 - self.memory) * self.stiffness_power * columns.compliance * v
             fading /= self._power(safe, self.stiffness_power + 1.0)
-            np.multiply(fading, spring_force * spring_force, out[STICK_MEMORY_ROW])
-            np.multiply(fading, slip_spring * slip_spring, out[SLIP_MEMORY_ROW])
+            np.multiply(fading, slip_spring * slip_spring, out[LIMIT_MEMORY_ROW])
         else:
-            out[STICK_MEMORY_ROW] = out[SLIP_MEMORY_ROW] = 0.0
+            out[LIMIT_MEMORY_ROW] = 0.0
         if len(out) > FORCE_ROW:
             out[FORCE_ROW] = force
         return out
@@ -363,11 +370,21 @@ class SlipPhase:
         reach = np.clip(np.abs(y[0]), MIN_REACH, 1.0)
         if self.form.cap == "total":
             small = motion.RELEASE_STEP * reach
+            small = np.where(self._crosses(y[:2] + small * k[:2], params), -small, small)
             return np.asarray((self.normal.rates(y[:2] + small * k[:2], params)[4] - k[FORCE_ROW]) / small)
         # the friction force jumps where a slip ends, which makes the time of it matter
         small = RATE_OF_LIMIT_STEP * reach
-        ahead, behind = (self.normal.rates(y[:2] + step * k[:2], params)[4] for step in (small, -small))
-        return np.asarray((ahead - behind) / (2.0 * small))
+        is_end, is_start = (self._crosses(y[:2] + step * k[:2], params) for step in (small, -small))
+        first, last = np.where(is_start & ~is_end, 0.0, -small), np.where(is_end, 0.0, small)
+        behind, ahead = (self.normal.rates(y[:2] + step * k[:2], params)[4] for step in (first, last))
+        return np.asarray((ahead - behind) / (last - first))
+
+    def _crosses(self, y: Array, params: Params) -> Mask:
+        """Find where components are beyond a breakpoint of the normal force, at which its rate jumps."""
+        crosses = np.zeros(y.shape[1], bool)
+        for breakpoint, side in zip(self.breakpoints, params[-len(self.breakpoints) :], strict=False):
+            crosses |= side * breakpoint(y[:2], params) < 0.0
+        return crosses
 
     def trial_rate(
         self, y: Array, k: Array, columns: Columns, local: Local, spring_force: Array, phi: Array
@@ -421,7 +438,8 @@ class SlipPhase:
         rise = self.margins(ahead, self.rates(ahead, params), params)[0]
         rise = rise - self.margins(behind, self.rates(behind, params), params)[0]
         # at first contact and at the release the formulas are smooth on one side only
-        return np.where(y[0] > 2.0 * small, rise / (2.0 * small), np.nan)
+        is_smooth = (y[0] > 2.0 * small) & ~self._crosses(ahead, params) & ~self._crosses(behind, params)
+        return np.where(is_smooth, rise / (2.0 * small), np.nan)
 
     def change(self, which: NDArray[np.intp], y: Array, k: Array, params: Params) -> tuple[Array, Params]:
         """Change the modes and signs of trajectories where margins vanish, see `Switch`."""
@@ -496,6 +514,9 @@ class SlipPhase:
 
     def _held_slip(self, y: Array, params: Params, direction: Array) -> tuple[Array, Array]:
         """Compute Gamma for which the trial force of the spring grows as its limit does, and N."""
+        # at s = 0 the slip is 0/0; a force that vanishes there is known relative to s
+        least = HELD_X ** (1.0 / self.law.model.coordinate_power)
+        y = np.array([np.where(np.abs(y[0]) < least, least, y[0]), *y[1:]])
         k, columns = self.rates(y, params), self.columns(params)
         share = columns.press / columns.G0
         N, dN = share * k[FORCE_ROW], share * self._rate_of_force(y, k, params)
@@ -601,10 +622,7 @@ class SlipPhase:
     def _at_contact(self, y: Array, params: Params, index: NDArray[np.intp]) -> tuple[Array, Params]:
         """Find the modes at first contact, where leading powers of x decide whether the trial force is below N."""
         form, columns, n = self.form, self.columns(params), y.shape[1]
-        near, twice = (
-            self._rows_near_contact(y, params, START_S),
-            self._rows_near_contact(y, params, 2.0 * START_S),
-        )
+        near, twice = (self._rows_near_contact(y, params, s) for s in (START_S, 2.0 * START_S))
         k = self.rates(near[:N_COMPONENTS], params)
         force, twice_force = k[FORCE_ROW], self.rates(twice[:N_COMPONENTS], params)[FORCE_ROW]
         self.track.order[index] = np.log2(twice_force / force) / self.law.model.coordinate_power
@@ -637,10 +655,10 @@ class SlipPhase:
             if self.is_total and self.memory == 1.0 and form.damping_power < kp:
                 self.track.is_slow[index] = is_slow = local.drag > local.N
                 new = np.where(is_slow, -1.0, new)
-        self.track.touches[index] = new != 0.0
+        self.track.touches[index] = (new != 0.0) | ~below
         near, params = self._enter(index, new, new, sign, np.zeros(n), spring_force, near, params)
-        y[SPRING_ROW] = near[SPRING_ROW]
-        return y, params
+        # at s = 0 itself the share of the spring in the limit is 0/0
+        return near, params
 
     def _rows_near_contact(self, y: Array, params: Params, s: float) -> Array:
         """Make rows at an indentation so small that the velocities are those at first contact."""
@@ -673,7 +691,7 @@ class SlipPhase:
         self.track.force[index] = force
         # an energy that grows without bound towards x = 0 counts as slip work
         is_finite = 2.0 * self.track.order[index] > self.form.stiffness_power - ORDER_TOLERANCE
-        is_finite |= np.abs(columns.mode) != 1.0
+        is_finite |= (np.abs(columns.mode) != 1.0) | (y[0] > END_S)
         self.track.energy[index] = np.where(is_finite, self._energy(near[0], force, columns), 0.0)
         self.track.add_impulse(index, columns, k[0])
 

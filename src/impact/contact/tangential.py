@@ -34,11 +34,11 @@ from .simulate import (
 )
 from .slip_motion import (
     DAMPING_ROW,
+    LIMIT_MEMORY_ROW,
     ORDER_TOLERANCE,
-    SLIP_MEMORY_ROW,
     SLIP_ROW,
     SLIP_WORK_ROW,
-    STICK_MEMORY_ROW,
+    STICK_WORK_ROW,
     TIME_ROW,
     Columns,
     FrictionKind,
@@ -229,9 +229,8 @@ def _integrate(
             rows = np.vstack([start, states[0][2:, recovery.rows]])
         residual = None if recovery is None else recovery.residual
         params, breakpoints = motion.breakpoints(law, params, rows, residual)
-        phase = SlipPhase(
-            form, law, problem, len(params), form.memory[recovery is not None], track, names, bool(damping.any())
-        )
+        memory, has_drag = form.memory[recovery is not None], bool(damping.any())
+        phase = SlipPhase(form, law, problem, len(params), memory, track, names, has_drag, breakpoints)
 
         def run(problem: Problem, start: Array, params: Params) -> Solution:
             y, params = phase.begin(start, params)
@@ -271,15 +270,16 @@ def _integrate(
 def _result(form: TangentialForm, n: float, base: Columns, track: Track, state: Array) -> TangentialResult:
     """Compute what trajectories come to from their last rows, NaN where they have not ended."""
     scale, G0 = base.G0 * base.G0, base.G0
-    mode, kinetic = np.abs(track.mode), 0.5 * state[SLIP_ROW] ** 2
-    slip_memory = state[SLIP_MEMORY_ROW]
-    left = track.energy + slip_memory
+    mode, left, at_limit = np.abs(track.mode), track.energy, state[LIMIT_MEMORY_ROW]
+    held_memory = track.held_memory + np.where(mode == 2.0, at_limit, 0.0)
+    stick_memory = state[STICK_WORK_ROW] - track.stick_energy - np.where(mode == 0.0, left, 0.0)
     slip_work = state[SLIP_WORK_ROW] + track.slip_work - np.where(mode == 1.0, left, 0.0)
-    # where N vanishes so slowly with x that both works of a slip at x = 0 are infinite, their sum is the slip work
-    moved = np.where(
-        track.touches & (2.0 * track.order < form.stiffness_power + ORDER_TOLERANCE), slip_memory, 0.0
-    )
-    damping_work = state[DAMPING_ROW] + track.damping_work - np.where(mode == 2.0, kinetic + left, 0.0)
+    rest = 0.5 * state[SLIP_ROW] ** 2 + left + at_limit
+    damping_work = state[DAMPING_ROW] + track.damping_work - np.where(mode == 2.0, rest, 0.0)
+    # where N vanishes so slowly with x that slip and memory work are infinite at x = 0, the slip work is their sum
+    is_infinite = track.touches & (2.0 * track.order < form.stiffness_power + ORDER_TOLERANCE)
+    slip_work = slip_work + np.where(is_infinite, stick_memory + held_memory, held_memory - at_limit)
+    memory_work = np.where(is_infinite, 0.0, stick_memory + at_limit) if form.stiffness_power else 0.0 * slip_work
     ended = np.isfinite(state[SLIP_ROW])
     nan = np.full(ended.size, np.nan)
     result = replace(TangentialResult.blank(ended.size), sliding_impulse=np.where(ended, track.impulse, np.nan))
@@ -296,9 +296,9 @@ def _result(form: TangentialForm, n: float, base: Columns, track: Track, state: 
     return replace(
         result,
         slip=G0 * state[SLIP_ROW],
-        slip_work=scale * (slip_work + moved),
+        slip_work=scale * slip_work,
         damping_work=scale * damping_work,
-        memory_work=scale * (state[STICK_MEMORY_ROW] + slip_memory - moved),
+        memory_work=scale * memory_work,
         elastic_left=scale * np.where(ended, track.energy, np.nan),
         regime=np.where(ended, regime, 0).astype(np.int8),
         slip_changes=np.where(ended, track.changes, 0).astype(np.int32),

@@ -326,6 +326,11 @@ def _header(
     header += [*([_better_fit(problem)] if problem.better_fit else []), *problem.fit_notes]
     if problem.point.defaulted_axes:
         header.append(f"first value of each axis of the source: {', '.join(problem.point.defaulted_axes)}")
+    if problem.has_wall:
+        radius = float(law.impact.R_eff[0])
+        known = "" if math.isnan(radius) else f", R* = {quantity(radius, 'm')}"
+        moving = "; in a script it is at rest, and ball 1 has v1 - v2" if collision["v2"] else ""
+        header.append(f"ball 2 is a plane wall: m = m1{known}{moving}")
     for name, value in (problem.point.solved or {}).items():
         header.append(f"{name} = {value!r} gives the e that is wanted")
     asked = f"e = {number(law.e)} is asked for; " if law.has_e else ""

@@ -6,9 +6,12 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from ..config.load import Config
 from ..contact.impacts import INPUTS, Impacts
 from ..contact.model import ForceModel
 from ..contact.models import find
+from ..engine.build_impacts import build_impacts
+from ..engine.plan import Plan
 from ..engine.plugins import Plugins
 from ..formatting import number
 from ..inverse.solve import PointWithE, point_with_e
@@ -54,6 +57,11 @@ class ExportProblem:
         return self.law.model
 
     @property
+    def has_wall(self) -> bool:
+        """Whether ball 2 is a plane wall."""
+        return self.point.replaced is not None
+
+    @property
     def e_continuous(self) -> float:
         return self.outputs["e_out"]
 
@@ -67,7 +75,8 @@ class ExportProblem:
         values = input_values(self.law.impact)
         for name in ("R1", "R2"):
             if math.isnan(values[name]):
-                values[name] = RADIUS_PER_PEAK * self.outputs["peak_indentation"]
+                is_wall = name == "R2" and self.has_wall
+                values[name] = math.inf if is_wall else RADIUS_PER_PEAK * self.outputs["peak_indentation"]
         names = self.point.config.scalars
         material1, material2 = (
             str(names.get(f"material{ball}", names.get("material", ""))) for ball in ("1", "2")
@@ -78,6 +87,7 @@ class ExportProblem:
             values=values,
             materials=(material1, material2),
             has_user_stiffness="K" in names or f"{self.model.key}.K" in names,
+            has_wall=self.has_wall,
             dt=dt,
             gap=(STEPS_BEFORE - phase) * dt * values["v0"],
             steps=STEPS_BEFORE + math.ceil(CONTACTS_RUN * self.law.contact_time / dt),
@@ -88,6 +98,14 @@ def input_values(impact: Impacts) -> dict[str, float]:
     """Return all inputs and derived quantities of one impact, by name, in SI."""
     names = [*INPUTS, "m", "R_eff", "E_eff", "v0", *impact.parameters]
     return {name: float(impact.quantity(name)[0]) for name in names}
+
+
+def wall_inputs(config: Config, code: Code, version: str) -> Mapping[str, float] | None:
+    """Find the inputs that a plane wall acts with in a code; None if ball 2 is no such wall."""
+    values = input_values(build_impacts(Plan(config).inputs, config.models[0], ()))
+    if math.isfinite(values["m2"]) or math.isfinite(values["R2"]):
+        return None
+    return code.wall_inputs(config.models[0].key, version, values)
 
 
 def prepare_export(
@@ -107,7 +125,7 @@ def prepare_export(
     else:
         key, newest = (first_law(code, tuple(code.laws), release) for release in (version, code.newest))
         missing = "" if key == newest else newest
-    point = point_with_e(point_source, find(key), at)
+    point = point_with_e(point_source, find(key), at, lambda config: wall_inputs(config, code, version))
     fixed, outputs = fixed_step_law(point.config, PHASES, code.scheme)
     calibration = point_source.calibration
     better_fit, fit_notes = _fit_notes(code, version, key, calibration) if calibration else ("", ())

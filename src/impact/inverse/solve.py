@@ -10,7 +10,7 @@ a range of conditions the largest distance from the target is minimized instead,
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Literal, NoReturn, TypeAlias
@@ -237,25 +237,36 @@ def placeholder(model: ForceModel, unknown: Parameter) -> dict[str, float]:
 
 @dataclass(frozen=True)
 class PointWithE:
-    """A config without axes, and the value of the damping parameter that gives an e to a law without one."""
+    """A config without axes, the damping that gives an e to a law without one, and inputs that were replaced."""
 
     config: Config
     defaulted_axes: tuple[str, ...]
     solved: Mapping[str, float] | None
+    replaced: Mapping[str, float] | None
 
 
-def point_with_e(source: PointSource, law: ForceModel, at: Mapping[str, float | str]) -> PointWithE:
-    """Reduce a source to one impact; an e for a law without one is reached by its damping parameter."""
-    if "e" not in at or "e" in law.quantities:
-        return PointWithE(*single_point(source, law.key, at), None)
-    if not law.damping:
-        raise UsageError(f"--at e: {law.key} has no e, and no parameter that sets it")
-    if not {law.damping, f"{law.key}.{law.damping}"}.isdisjoint(at):
-        raise UsageError(f"--at: got e and {law.damping}, expected one of the two")
-    unknown = unknown_of(law, law.damping)
-    config, defaulted_axes = single_point(source, law.key, {**at, **placeholder(law, unknown)})
+def point_with_e(
+    source: PointSource,
+    law: ForceModel,
+    at: Mapping[str, float | str],
+    replacing: Callable[[Config], Mapping[str, float] | None] = lambda config: None,
+) -> PointWithE:
+    """Reduce a source to one impact, and replace inputs; an e for a law without one is reached by its damping."""
+    is_solved = "e" in at and "e" not in law.quantities
+    if is_solved:
+        if not law.damping:
+            raise UsageError(f"--at e: {law.key} has no e, and no parameter that sets it")
+        if not {law.damping, f"{law.key}.{law.damping}"}.isdisjoint(at):
+            raise UsageError(f"--at: got e and {law.damping}, expected one of the two")
+        at = {**at, **placeholder(law, unknown_of(law, law.damping))}
+    config, defaulted_axes = single_point(source, law.key, at)
+    replaced = replacing(config)
+    config = replace(config, scalars={**config.scalars, **(replaced or {})})
+    if not is_solved:
+        return PointWithE(config, defaulted_axes, None, replaced)
     config = solve_damping(config, source.plugins, float(config.scalars["e"]))
-    return PointWithE(config, defaulted_axes, {law.damping: float(config.scalars[config_name(law, unknown)])})
+    solved = {law.damping: float(config.scalars[f"{law.key}.{law.damping}"])}
+    return PointWithE(config, defaulted_axes, solved, replaced)
 
 
 def solve_damping(config: Config, plugins: Plugins, e: float) -> Config:
