@@ -39,12 +39,8 @@ def parameters(collision: Collision) -> dict[str, float | str]:
 
 
 def lines(collision: Collision, parameters: Parameters) -> list[str]:
-    return [
-        "contact = dict(",
-        *(f"    {name}={value!r}," for name, value in parameters.items()),
-        ")",
-        f"dt = {collision.dt!r}",
-    ]
+    values = ", ".join(f"{name}={value!r}" for name, value in parameters.items())
+    return [f"contact = dict({values})", f"dt = {collision.dt!r}"]
 
 
 def notes(collision: Collision) -> list[str]:
