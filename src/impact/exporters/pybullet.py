@@ -67,6 +67,15 @@ CODE = Code(
     lines=lines,
     notes=notes,
     template=TWO_BALLS,
+    wall={
+        " ({m2}, {R2}, {x2}, {v2})": "",
+        "for _ in": (
+            "plane = bullet.createCollisionShape(bullet.GEOM_PLANE, planeNormal=[-1, 0, 0])\n"
+            "balls.append(bullet.createMultiBody(0, plane))\n"
+            "bullet.changeDynamics(balls[-1], -1, **contact)\n"
+            "for _ in"
+        ),
+    },
     program="python",
     install="pip install pybullet",
     version_of=python_package_version("pybullet"),
