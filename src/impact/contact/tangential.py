@@ -33,13 +33,8 @@ from .simulate import (
     solve_phases,
 )
 from .slip_motion import (
-    DAMPING_ROW,
     ORDER_TOLERANCE,
-    SLIP_MEMORY_ROW,
     SLIP_ROW,
-    SLIP_WORK_ROW,
-    STICK_MEMORY_ROW,
-    TIME_ROW,
     Columns,
     FrictionKind,
     SlipPhase,
@@ -212,7 +207,7 @@ def _integrate(
     law = problems.law
     slip, stiffness, damping, is_positive, *coefficient = (np.array(column, float) for column in problems.columns)
     n, names = slip.size, _coefficient_arguments(form)
-    track = Track.of(n)
+    track, form = Track.of(n), replace(form, has_dashpot=bool(damping.any()))
     unset, compliance = np.zeros(n), np.where(stiffness > 0.0, 1.0 / stiffness, 0.0)
     base = Columns(
         *(unset,) * 7, np.arange(n, dtype=float), np.sqrt(stiffness), compliance, damping, slip, is_positive
@@ -229,9 +224,7 @@ def _integrate(
             rows = np.vstack([start, states[0][2:, recovery.rows]])
         residual = None if recovery is None else recovery.residual
         params, breakpoints = motion.breakpoints(law, params, rows, residual)
-        phase = SlipPhase(
-            form, law, problem, len(params), form.memory[recovery is not None], track, names, bool(damping.any())
-        )
+        phase = SlipPhase(form, law, problem, len(params), form.memory[recovery is not None], track, names)
 
         def run(problem: Problem, start: Array, params: Params) -> Solution:
             y, params = phase.begin(start, params)
@@ -256,7 +249,7 @@ def _integrate(
     status = phases.status.copy()
     # at a limit the balls stop, sooner or later
     stopped = status == LIMIT
-    press = base.changed(track.mode, track.sign).press
+    press = np.sign(base.changed(track.mode, track.sign).share)
     result.sliding_impulse[stopped] = (track.impulse + press * track.v)[stopped]
     if form.kind == "coulomb":
         status[stopped] = LIMIT
@@ -272,14 +265,14 @@ def _result(form: TangentialForm, n: float, base: Columns, track: Track, state: 
     """Compute what trajectories come to from their last rows, NaN where they have not ended."""
     scale, G0 = base.G0 * base.G0, base.G0
     mode, kinetic = np.abs(track.mode), 0.5 * state[SLIP_ROW] ** 2
-    slip_memory = state[SLIP_MEMORY_ROW]
-    left = track.energy + slip_memory
-    slip_work = state[SLIP_WORK_ROW] + track.slip_work - np.where(mode == 1.0, left, 0.0)
+    slip_memory, work = form.integral("slip_memory", state), form.integral("work", state)
+    left = track.energy + slip_memory + work
+    slip_work = track.slip_work - np.where(mode == 1.0, left, 0.0)
     # where N vanishes so slowly with x that both works of a slip at x = 0 are infinite, their sum is the slip work
     moved = np.where(
         track.touches & (2.0 * track.order < form.stiffness_power + ORDER_TOLERANCE), slip_memory, 0.0
     )
-    damping_work = state[DAMPING_ROW] + track.damping_work - np.where(mode == 2.0, kinetic + left, 0.0)
+    damping_work = work + track.damping_work - np.where(mode == 2.0, kinetic + left, 0.0)
     ended = np.isfinite(state[SLIP_ROW])
     nan = np.full(ended.size, np.nan)
     result = replace(TangentialResult.blank(ended.size), sliding_impulse=np.where(ended, track.impulse, np.nan))
@@ -288,17 +281,17 @@ def _result(form: TangentialForm, n: float, base: Columns, track: Track, state: 
         return replace(result, exact=np.where(ended & (track.sign > 0.0), 1.0, np.nan))
     regime = np.where(track.modes == 1, STICKS, np.where(track.modes & 1, BOTH, SLIDES))
     if form.kind == "regularized":
-        regime = np.zeros_like(regime)
+        regime, slip_work, damping_work = np.zeros_like(regime), work, 0.0 * work
     exact = np.where(regime == SLIDES, G0 - track.signed, nan)
     if form.kind == "spring" and form.stiffness_power == 0.0:
-        swing = G0 * np.cos(base.root * state[TIME_ROW])
+        swing = G0 * np.cos(base.root * form.integral("time", state))
         exact = np.where((regime == STICKS) & (base.damping == 0.0), swing, exact)
     return replace(
         result,
         slip=G0 * state[SLIP_ROW],
         slip_work=scale * (slip_work + moved),
         damping_work=scale * damping_work,
-        memory_work=scale * (state[STICK_MEMORY_ROW] + slip_memory - moved),
+        memory_work=scale * (form.integral("stick_memory", state) + slip_memory - moved),
         elastic_left=scale * np.where(ended, track.energy, np.nan),
         regime=np.where(ended, regime, 0).astype(np.int8),
         slip_changes=np.where(ended, track.changes, 0).astype(np.int32),
