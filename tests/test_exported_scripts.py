@@ -32,8 +32,8 @@ PROGRAMS = {"python": PYTHON, "lmp": str(Path(PYTHON).with_name("lmp"))}
 # steps per contact of the three collisions of an entry, for codes whose scheme is known
 COARSE_STEPS = (12.0, 20.0, 31.0)
 # the largest difference from the map of the scheme, by law; 1e-9 for the others. Kratos finds the damping ratio of
-# its linear law by bisection to 1e-4
-TOLERANCES = {"kratos-linear": 1e-4}
+# its linear law by bisection to 1e-4, and Newton has single precision
+TOLERANCES = {"kratos-linear": 1e-4, "newton-semi-implicit": 1e-3}
 
 # one entry for each law of a code that has scripts
 EXPORTED = {
@@ -103,6 +103,13 @@ PLANTED = (
     ("drake", "drake-point-contact", "kTamsi", "kSap"),
     ("drake", "drake-point-contact", "(v2 - v1)", "(v1 - v2)"),
     ("drake", "drake-point-contact-mixed", ", material2)", ", material1)"),
+    ("pybullet", "kelvin-voigt-no-tension", "contactStiffness=2000000.0", "contactStiffness=1000000.0"),
+    ("pybullet", "kelvin-voigt-no-tension", "contactDamping=150.0", "contactDamping=300.0"),
+    ("pybullet", "kelvin-voigt-no-tension", "contactSlop=0", "contactSlop=1e-5"),
+    ("pybullet", "kelvin-voigt-no-tension", "restitution=0", "restitution=0.5"),
+    ("exudyn", "exudyn-carvalho-gonthier", "impactModel=2", "impactModel=1"),
+    ("exudyn", "kelvin-voigt", "contactDamping=300.0", "contactDamping=600.0"),
+    ("newton", "newton-semi-implicit", "kd=60.0", "kd=30.0"),
     ("kratos", "kratos-hertz", '"POISSON_RATIO": 0.3', '"POISSON_RATIO": 0.2'),
     ("kratos", "kratos-hertz", "1 0 0.05", "1 0 0.1"),
     ("kratos", "kratos-hertz", "DEM_D_Hertz_viscous_Coulomb", "DEM_D_Linear_viscous_Coulomb"),

@@ -11,8 +11,8 @@ from .conftest import ROOT
 sys.path.insert(0, str(ROOT / "scripts"))
 from make_docs import PAGES
 
-# this page integrates laws without a closed form, which takes seconds
-SLOW = {"models.md"}
+# these pages integrate laws without a closed form, and slips, which takes seconds
+SLOW = {"models.md", "frictions.md"}
 
 
 @pytest.mark.parametrize(

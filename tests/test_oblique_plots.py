@@ -171,8 +171,14 @@ def test_the_spins_of_both_balls_are_drawn_where_both_turn(beads: xr.Dataset) ->
         curves_of(without_radius, "spin")
 
 
-@pytest.mark.parametrize("width", ["84mm", "double"])
-@pytest.mark.parametrize("kind", SHOWN)
+@pytest.mark.parametrize(
+    ("kind", "width"),
+    [
+        pytest.param(kind, width, marks=() if (index + shift) % 2 else pytest.mark.slow)
+        for shift, width in enumerate(("84mm", "double"))
+        for index, kind in enumerate(SHOWN)
+    ],
+)
 def test_angles_are_in_degrees_and_texts_do_not_overlap(beads: xr.Dataset, kind: str, width: str) -> None:
     figure = draw(curves_of(beads, kind), Look(width=width))
     check_layout(figure)
@@ -257,11 +263,14 @@ def test_slips_are_those_of_maw_barber_and_fawcett() -> None:
 
 
 def test_the_area_of_a_friction_loop_is_the_energy_lost(beads: xr.Dataset, cli: Run, tmp_path: Path) -> None:
-    data = curves_of(beads, "friction-loop", sel={"angle": "15 deg", "mu": 0.3})
+    two = [COULOMB, FORCE]
+    data = curves_of(beads, "friction-loop", sel={"angle": "15 deg", "mu": 0.3}, frictions=two)
     (panel,) = data.panels
     assert (panel.x_name, panel.y_name, panel.x_unit, panel.y_unit) == ("xi", "f", "m", "N")
     # a pair that cannot be combined has no motion
-    assert [curve.law for curve in panel.curves] == [curve.law for curve in of_pairs(curves_of(beads, "beta"))]
+    pairs = of_pairs(curves_of(beads, "beta", frictions=two))
+    assert [curve.law for curve in panel.curves] == [curve.law for curve in pairs]
+    assert len(pairs) == 3
     for curve in panel.curves:
         lost = beads["friction_loss"].sel(model=curve.model, friction=curve.friction, mu=0.3).isel(angle=2)
         assert np.trapezoid(curve.y, curve.x) == pytest.approx(float(lost), rel=1e-3)
@@ -342,6 +351,7 @@ def test_bands_of_uncertain_friction_are_of_pairs() -> None:
         assert curve.y == pytest.approx(median.values)
 
 
+@pytest.mark.slow
 def test_a_report_has_a_section_on_friction(beads: xr.Dataset, central: xr.Dataset) -> None:
     text = impact.report(beads)
     section = text.partition("<h2>Friction</h2>")[2].partition("</section>")[0]

@@ -47,6 +47,8 @@ xt = 0.5
 kt_over_kn = 0.8
 """
 LAYOUTS = ("full", "factored")
+# both write the same trajectories; the layout of all values takes longer
+EACH_LAYOUT = pytest.mark.parametrize("layout", [pytest.param("full", marks=pytest.mark.slow), "factored"])
 BLOCKS = 8
 SPRING_VALUES, DAMPED_VALUES = ("{ xt = 0.0, kt_over_kn = 0.8 }", "{ xt = 0.5, kt_over_kn = 0.8 }")
 
@@ -157,7 +159,7 @@ def test_both_layouts_have_the_bits_of_the_sweep(folder: Path, whole: xr.Dataset
     assert_same_bits(impact.load(folder / f"{layout}.h5"), whole)
 
 
-@pytest.mark.parametrize("layout", LAYOUTS)
+@EACH_LAYOUT
 def test_merged_shards_have_the_bytes_of_the_whole_sweep(folder: Path, layout: str, tmp_path: Path) -> None:
     output = tmp_path / "results.h5"
     shards = [
@@ -169,7 +171,7 @@ def test_merged_shards_have_the_bytes_of_the_whole_sweep(folder: Path, layout: s
     assert output.read_bytes() == (folder / f"{layout}.h5").read_bytes()
 
 
-@pytest.mark.parametrize("layout", LAYOUTS)
+@EACH_LAYOUT
 def test_a_resumed_sweep_has_the_bytes_of_the_whole_sweep(
     folder: Path, layout: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -191,29 +193,30 @@ def test_two_processes_write_the_bytes_of_one(folder: Path, layout: str, tmp_pat
     assert (tmp_path / "results.h5").read_bytes() == (folder / f"{layout}.h5").read_bytes()
 
 
-@pytest.mark.parametrize("layout", LAYOUTS)
+EXTENSIONS = {
+    "angle": (['sweep.angle=["0 deg", "50 deg"]'], ['sweep.angle=["0 deg", "20 deg", "50 deg", "80 deg"]']),
+    "mu": (["sweep.mu=[0.3]"], ["sweep.mu=[0.0, 0.3]"]),
+    "model": (["models=['lankarani-nikravesh-1994']"], ["models=['tsuji-1992', 'lankarani-nikravesh-1994']"]),
+    "friction": (
+        [f"frictions=['{SLIDING}', '{DAMPED}']", f"friction={{ {DAMPED} = {DAMPED_VALUES} }}"],
+        [f"frictions=['{SLIDING}', '{SPRING}', '{DAMPED}']", f"friction.{SPRING}={SPRING_VALUES}"],
+    ),
+}
+
+
 @pytest.mark.parametrize(
-    ("of_base", "added"),
+    ("layout", "extension"),
     [
-        (['sweep.angle=["0 deg", "50 deg"]'], ['sweep.angle=["0 deg", "20 deg", "50 deg", "80 deg"]']),
-        (["sweep.mu=[0.3]"], ["sweep.mu=[0.0, 0.3]"]),
-        (["models=['lankarani-nikravesh-1994']"], ["models=['tsuji-1992', 'lankarani-nikravesh-1994']"]),
-        (
-            [
-                f"frictions=['{SLIDING}', '{DAMPED}']",
-                f"friction={{ {DAMPED} = {DAMPED_VALUES} }}",
-            ],
-            [
-                f"frictions=['{SLIDING}', '{SPRING}', '{DAMPED}']",
-                f"friction.{SPRING}={SPRING_VALUES}",
-            ],
-        ),
+        # each extension is quick in one layout
+        pytest.param(layout, name, marks=() if (index + shift) % 2 else pytest.mark.slow)
+        for shift, layout in enumerate(LAYOUTS)
+        for index, name in enumerate(EXTENSIONS)
     ],
-    ids=["angle", "mu", "model", "friction"],
 )
 def test_an_extended_result_has_the_bits_of_the_whole_sweep(
-    folder: Path, whole: xr.Dataset, layout: str, of_base: list[str], added: list[str], tmp_path: Path
+    folder: Path, whole: xr.Dataset, layout: str, extension: str, tmp_path: Path
 ) -> None:
+    of_base, added = EXTENSIONS[extension]
     path = tmp_path / "results.h5"
     impact.sweep_to_file(folder / "c.toml", path, overrides=[*of_base, *with_layout(layout)])
     extended = impact.extend(path, added, overwrite=True)
@@ -293,7 +296,7 @@ def test_pairs_that_cannot_be_combined_are_marked_and_named(folder: Path, whole:
         impact.sweep(folder / "c.toml", overrides=alone)
 
 
-@pytest.mark.parametrize("layout", LAYOUTS)
+@EACH_LAYOUT
 def test_compare_reports_a_changed_restitution(cli: Run, folder: Path, layout: str, tmp_path: Path) -> None:
     same = cli("compare", folder / "full.h5", folder / f"{layout}.h5")
     assert same.returncode == 0, same.stdout

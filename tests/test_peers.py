@@ -50,6 +50,7 @@ PHASES = (np.arange(4) + 0.5) / 4
 TIMEOUT_S = 300
 # between a code and the map of its scheme
 MAP_TOLERANCE = 1e-11
+SINGLE_PRECISION = 1e-4
 
 Values = dict[str, Any]
 
@@ -404,6 +405,58 @@ ENTRIES += [
     Entry("kratos-linear", KRATOS, kratos("DEM_D_Linear_viscous_Coulomb"), E_SOFT, slack=1e-4),
 ]
 
+# ---- PyBullet, whose spheres have springs in series and dashpots whose constants add
+
+PYBULLET = Code("PyBullet", "run_pybullet.py", steps_per_contact=250)
+
+ENTRIES += [
+    Entry(
+        "kelvin-voigt-no-tension", PYBULLET,
+        lambda c: {"k": (c["K"] / 0.7, c["K"] / 0.3), "c": (0.2 * c["C"], 0.8 * c["C"])},
+        collisions(C=(300.0, 900.0, 50.0), K=1e6, n=1.0), variant="pybullet",
+    ),
+]  # fmt: skip
+
+# ---- EXUDYN
+
+EXUDYN = Code("EXUDYN", "run_exudyn.py")
+
+
+def exudyn(solver: str, number: int) -> Callable[[Values], Values]:
+    """Arguments of the contact, for an impactModel."""
+
+    def parameters(c: Values) -> Values:
+        law = {"restitutionCoefficient": c["e"]} if number else {"contactDamping": c["C"]}
+        contact = {"impactModel": number, "contactStiffness": c["K"], "contactStiffnessExponent": c["n"]}
+        return {"solver": solver, "contact": contact | law}
+
+    return parameters
+
+
+for solver in ("GeneralizedAlpha", "RK44"):
+    ENTRIES += [
+        Entry(
+            "kelvin-voigt", EXUDYN, exudyn(solver, 0),
+            collisions(C=(300.0, 900.0, 50.0), K=1e6, n=1.0), variant=f"exudyn-{solver}",
+            # its steps begin anew at the contact, so that the phases do not sample the pull at the end evenly
+            slack=1e-4,
+        ),
+        Entry("hunt-crossley-1975", EXUDYN, exudyn(solver, 1), E_HERTZ, variant=f"exudyn-{solver}"),
+        Entry("exudyn-carvalho-gonthier", EXUDYN, exudyn(solver, 2), E_HERTZ, variant=solver),
+    ]  # fmt: skip
+
+# ---- Newton, of single precision; its kd acts on approach only, and those of two shapes have a mean
+
+NEWTON = Code("Newton", "run_newton.py", steps_per_contact=60)
+
+ENTRIES += [
+    Entry(
+        "newton-semi-implicit", NEWTON,
+        lambda c: {"ke": (1.4 * c["K"], 0.6 * c["K"]), "kd": (0.2 * c["kd"], 1.8 * c["kd"])},
+        collisions(kd=(60.0, 150.0, 20.0), K=1e5, n=1.0),
+    ),
+]  # fmt: skip
+
 # ---- the comparison
 
 # what goes into the sweep; anything else is a parameter of the law
@@ -515,7 +568,7 @@ OF_A_SCHEME = [
     for entry in ENTRIES
     if not entry.slack
     and (
-        entry.code.name in ("LAMMPS", "LIGGGHTS", "YADE", "Drake", "Kratos DEM")
+        entry.code.name in ("LAMMPS", "LIGGGHTS", "YADE", "Drake", "Kratos DEM", "PyBullet", "Newton")
         or (entry.code is MUJOCO and entry.variant != "RK4")
     )
 ]
@@ -523,6 +576,8 @@ COARSE_STEPS = (12.0, 31.0)
 # by variant. Drake ends the iterations of LAGGED and SIMILAR before they come to rounding, and its Python package
 # has no setting for that; those of TAMSI come to rounding, as does SAP, whose equation is linear
 MAP_TOLERANCES = {"lagged": 2e-9, "similar": 2e-9}
+# the scheme of codes whose scheme has no variants; "kick-drift" for the others
+SCHEMES = {"PyBullet": "drake-sap"}
 WRONG_FORCE = 1e-6
 
 
@@ -536,8 +591,8 @@ def test_a_code_delivers_the_restitution_of_the_map_of_its_scheme_at_coarse_step
     version, theirs = by_code(entry, contact_times, tmp_path, COARSE_STEPS)
     if not entry.holds(version):
         pytest.skip(f"{entry.key}: {entry.code.name} {version} has another law: {entry.holds.__doc__}")
-    scheme = DRAKE_SCHEMES[entry.variant] if entry.code is DRAKE else "kick-drift"
-    tolerance = MAP_TOLERANCES.get(entry.variant, MAP_TOLERANCE)
+    scheme = DRAKE_SCHEMES[entry.variant] if entry.code is DRAKE else SCHEMES.get(entry.code.name, "kick-drift")
+    tolerance = SINGLE_PRECISION if entry.code is NEWTON else MAP_TOLERANCES.get(entry.variant, MAP_TOLERANCE)
 
     def by_maps(changes: Values) -> np.ndarray:
         return np.array(
@@ -563,6 +618,7 @@ WITHOUT_PEER = {
     "adams": "commercial",
     "chrono": "not on PyPI, where pychrono is another program, nor in Debian",
     "demlab": "needs MATLAB",
+    "lethe": "neither on PyPI nor in Debian",
     "maplesim": "commercial",
     "mbdyn": "neither on PyPI nor in Debian",
     "mercurydpm": "neither on PyPI nor in Debian",

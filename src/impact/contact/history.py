@@ -22,7 +22,7 @@ from .impacts import Impacts
 from .model import ForceModel
 from .rigid import ObliqueImpacts
 from .simulate import integrate_phases
-from .slip_motion import LEAST_S, N_COMPONENTS, SLIP_ROW, SlipPhase
+from .slip_motion import LEAST_S, SLIP_ROW, TIME_ROW, SlipPhase
 from .status import Status
 from .tangential import LIMIT_POSITIVE, record_friction, simulate_friction
 from .velocity_coordinates import is_strong
@@ -150,7 +150,7 @@ def integrate_slip(
     values = {name: np.broadcast_to(value, 1) for name, value in values.items()}
     recorded = record_friction(pair, float(impacts.n[0]), values, rtol=rtol, max_steps=max_steps)
     steps = [(part.phase, step) for part in recorded for step in part.steps]
-    grid = times if times is not None or not steps else _slip_times(steps)
+    grid = times if times is not None or not steps else _slip_times([step for _, step in steps])
     history = integrate_history(model, impacts, rtol=rtol, max_steps=max_steps, times=grid)
     if history is None:
         return None, None
@@ -163,11 +163,10 @@ def integrate_slip(
     return history, _coulomb_history(history, oblique, bool(values[LIMIT_POSITIVE][0]), impulse)
 
 
-def _slip_times(steps: Sequence[tuple[SlipPhase, Step]]) -> Array:
+def _slip_times(steps: Sequence[Step]) -> Array:
     """Sample the times of joint steps in the contact's own unit."""
-    row, joint = steps[0][0].form.row("time"), tuple(step for _, step in steps)
-    samples = zip(joint, _fractions(joint), strict=True)
-    times: Array = np.array([step.at(theta)[row, 0] for step, within in samples for theta in within])
+    samples = zip(steps, _fractions(tuple(steps)), strict=True)
+    times: Array = np.array([step.at(theta)[TIME_ROW, 0] for step, within in samples for theta in within])
     return np.maximum.accumulate(times)
 
 
@@ -178,8 +177,7 @@ def _slip_history(
     impacts, g0 = oblique.impacts, oblique.slip.item()
     unit_t = (impacts.length / impacts.v0).item()
     times = history.t / unit_t
-    time_row = steps[0][0].form.row("time")
-    fractions = _fractions_at(tuple(step for _, step in steps), times, time_row)
+    fractions = _fractions_at(tuple(step for _, step in steps), times, TIME_ROW)
     rows: list[tuple[float, float, float]] = []
     with np.errstate(all="ignore"):
         for (phase, step), within in zip(steps, fractions, strict=True):
@@ -188,9 +186,9 @@ def _slip_history(
                 y = step.at(theta)
                 # at first contact smooth time stands still
                 y[0] = np.where(np.abs(y[0]) < LEAST_S, LEAST_S, y[0])
-                k = phase.rates(y[:N_COMPONENTS], step.params)
+                k = phase.rates(y[:TIME_ROW], step.params)
                 slip = y[SLIP_ROW].item()
-                rows.append((slip, -(k[SLIP_ROW] / k[time_row]).item(), mode if mode else 0.0))
+                rows.append((slip, -(k[SLIP_ROW] / k[TIME_ROW]).item(), mode if mode else 0.0))
     slip, force, mode = np.array(rows).T
     if pair.friction.kind == "regularized":
         mode = np.sign(slip)
@@ -259,18 +257,15 @@ def _fractions_at(steps: tuple[Step, ...], times: Array, time_row: int = 2) -> l
     """Compute the fractions of each step at which the interpolated time equals one of the increasing times."""
     ends = np.array([step.at(step.end)[time_row, 0] for step in steps])
     step_of_time = np.minimum(np.searchsorted(ends, times), len(steps) - 1)
-    fractions = []
-    for index, step in enumerate(steps):
-        step_times = times[step_of_time == index]
-        count = step_times.size
-        low, high = np.zeros(count), np.full(count, step.end[0])
-        repeated_step = Step(
-            np.repeat(step.start, count, 1), np.repeat(step.length, count), np.repeat(step.stages, count, 2), high
-        )
-        # the time grows with the fraction: bisect to the last bit
-        for _ in range(BISECTIONS if count else 0):
-            middle = 0.5 * (low + high)
-            is_early = repeated_step.at(middle)[time_row] < step_times
-            low, high = np.where(is_early, middle, low), np.where(is_early, high, middle)
-        fractions.append(high)
-    return fractions
+    # the row of the time of all steps at once, one column for each time
+    start = np.array([step.start[time_row, 0] for step in steps])[step_of_time]
+    length = np.array([step.length[0] for step in steps])[step_of_time]
+    stages = np.array([step.stages[:, time_row, 0] for step in steps])[step_of_time].T
+    low, high = np.zeros(len(times)), np.array([step.end[0] for step in steps])[step_of_time]
+    time_of = Step(start, length, stages, high).at
+    # the time grows with the fraction: bisect to the last bit
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        is_early = time_of(middle) < times
+        low, high = np.where(is_early, middle, low), np.where(is_early, high, middle)
+    return np.split(high, np.searchsorted(step_of_time, np.arange(1, len(steps))))

@@ -43,6 +43,8 @@ UNLOADING_PARAMS = ("peak", "force_at_peak", "residual", "recovered")
 MAX_FORCE_EXPONENT = 16.0
 # strength of a coordinate without a coefficient
 NO_COEFFICIENT = np.empty(0)
+# a breakpoint above the end of the phase by less than this part of its indentation is at that end
+BREAKPOINT_ROUNDING = 1e-14
 # factor on the square of a damping that is compared with its critical value: rounding may have made it smaller
 CRITICAL_MARGIN = 1.0 + 1e-12
 # a speed relative to v0 that counts as zero
@@ -159,8 +161,9 @@ def breakpoints(
             phase_breakpoints.append(_breakpoint_of_motion(law, formula, extra))
             continue
         x = np.broadcast_to(law.call(formula, params[:n_law_params], unloading_values), start.shape[1])
-        x = x - (0.0 if residual is None else residual)
-        s = power(np.where(x > 0.0, x, np.nan), 1.0 / model.coordinate_power)
+        # one at the residual indentation, where s = 0, is known up to rounding
+        above = x - (0.0 if residual is None else residual)
+        s = power(np.where(above > BREAKPOINT_ROUNDING * x, above, np.nan), 1.0 / model.coordinate_power)
         phase_breakpoints.append(_breakpoint_at_column(len(params)))
         # a breakpoint at the start of the phase is not crossed
         params = (*params, np.where(np.abs(s - start[0]) > BREAKPOINT_TOLERANCE * s, s, np.nan))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -25,11 +27,12 @@ def power(base: Array, exponent: float) -> Array:
     >>> power(np.array([16.0]), 0.25)
     array([2.])
     """
-    if not is_reproducible(exponent):
+    quarters = _quarters(exponent)
+    if quarters is None:
         return np.power(base, exponent)
     if exponent < 0:
         return 1.0 / power(base, -exponent)
-    whole, rest = divmod(int(4.0 * exponent), 4)
+    whole, rest = divmod(quarters, 4)
     result = integer_power(base, whole)
     if rest:
         root = np.sqrt(base)
@@ -38,6 +41,12 @@ def power(base: Array, exponent: float) -> Array:
         if rest % 2:
             result = result * np.sqrt(root)
     return result
+
+
+@cache
+def _quarters(exponent: float) -> int | None:
+    """Four times an exponent where that makes it reproducible; the integrator asks at each stage."""
+    return int(4.0 * exponent) if is_reproducible(exponent) else None
 
 
 def is_reproducible(exponent: Array | float) -> NDArray[np.bool_]:

@@ -15,6 +15,7 @@ A slip begins where the trial force reaches the limit, and ends where it would g
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
@@ -25,14 +26,19 @@ from ..array_types import Array, Mask
 from ..ode.problem import Margins, Params, Problem
 from . import motion
 from .formula_calls import Formula, call_by_name
+from .piecewise import Breakpoint
 from .velocity_coordinates import signed_power
 
 FrictionKind = Literal["coulomb", "spring", "dashpot", "regularized"]
 
-# rows of the joint state after s and v, and the number of components; quadratures follow, see
-# `TangentialForm.quadratures`, and in rates the normal force
-SLIP_ROW, SPRING_ROW, N_COMPONENTS = 2, 3, 4
-Quadrature = Literal["stick_memory", "time", "slip_memory", "work"]
+# rows of the joint state and its rates after s and v; the first four rows are components, those from time on the
+# quadratures of `TangentialForm.quadratures`; the last row of rates is the normal force
+SLIP_ROW, SPRING_ROW, TIME_ROW = range(2, 5)
+N_COMPONENTS = 4
+# those rows of the joint rates that a normal problem has; it does not use its work, the fourth
+NORMAL_ROWS = [0, 1, TIME_ROW, TIME_ROW, -1]
+# errors of Gamma and z are judged against 1
+JOINT_FLOOR = (*motion.ERROR_FLOOR, 1.0, 1.0)
 # the force of a dashpot that is not there
 NO_FORCE = np.zeros(1)
 # numbers of the margins: of the mode, and of the sign of the normal force
@@ -52,6 +58,8 @@ RATE_OF_LIMIT_STEP, RATE_OF_SLIP_STEP = 1e-5, 1e-3
 START_S, RATE_S, LEAST_S = 1e-7, 1e-4, 1e-10
 # s below which a mode does not change any more
 END_S = 1e-6
+# x below which the slip in the modes -2 and 2 is the same
+HELD_X = 1e-7
 # step of the central difference quotient there, relative to s; it sees the rate of N beside a force that jumps
 RATE_STEP = 1e-2
 
@@ -91,26 +99,24 @@ class TangentialForm:
         return self.cap == "total" and self.kind == "spring"
 
     @property
-    def quadratures(self) -> tuple[Quadrature, ...]:
-        """What is integrated, in the order of the rows after the components.
+    def quadratures(self) -> dict[str, int]:
+        """What is integrated besides the components, with the numbers of its rows.
 
-        The memory works, of a stiffness that varies, while sticking and while slipping; time; the work of the
-        dashpot, or all work of a regularized friction. Work against the limit needs none, see `Track.add_impulse`.
+        Time; with a spring whose stiffness varies, the work on it while sticking and its memory work at the limit;
+        "work", that of the dashpot, or all work of a regularized friction. The work against the limit follows from
+        impulses, see `Track.add_impulse`.
         """
+        names = ["time"]
         if self.kind == "spring" and self.stiffness_power:
-            names: tuple[Quadrature, ...] = ("stick_memory", "time", "slip_memory")
-        else:
-            names = ("time",)
-        return (*names, "work") if self.has_dashpot or self.kind == "regularized" else names
+            names += ["stick_work", "limit_memory"]
+        if self.has_dashpot or self.kind == "regularized":
+            names += ["work"]
+        return {name: TIME_ROW + number for number, name in enumerate(names)}
 
-    def row(self, name: Quadrature) -> int:
-        """Find the number of the row of a quadrature; -1 without it."""
-        return N_COMPONENTS + self.quadratures.index(name) if name in self.quadratures else -1
-
-    def integral(self, name: Quadrature, y: Array) -> Array:
-        """Find a quadrature among the rows of a state; zero without it."""
-        row = self.row(name)
-        return y[row] if row > 0 else np.zeros(y.shape[1])
+    def integral(self, name: str, y: Array) -> Array:
+        """Find a quadrature among the rows of a state; zero if it vanishes."""
+        row = self.quadratures.get(name)
+        return np.zeros(y.shape[1]) if row is None else y[row]
 
 
 class Columns(NamedTuple):
@@ -156,11 +162,12 @@ class Columns(NamedTuple):
 class Track:
     """What is known of each trajectory besides its integrated rows, in arrays of shape (n,) that are written to.
 
-    `force` and `energy` are phi_e and its energy at the end of the last part. `v` and `slip` are v and Gamma to
-    which the impulse of N is complete: `impulse`, and `signed` in the direction of the slip. `slip_work` and
-    `damping_work` complete the quadratures by what happens between the ends of a mode. `order` is the leading
-    power of x in N at first contact, and `touches` tells that a slip began or ended at x = 0. `modes` has a bit
-    for sticking, slipping forwards and backwards.
+    `force` and `energy` are phi_e and its energy at the end of the last part, `v` and `slip` are v and Gamma to
+    which the impulse of N is complete: `impulse`, and `signed` in the direction of the slip. `slip_work` has the
+    work against the limit, and it and `damping_work` what happens where a mode begins and ends; `stick_energy`
+    is what the spring gains while sticking, `held_memory` the memory work in the modes -2 and 2. `order` is the
+    leading power of x in N at first contact, and `touches` tells that the spring was at its limit at x = 0.
+    `modes` has a bit for sticking, slipping forwards and backwards.
     """
 
     mode: Array
@@ -173,6 +180,8 @@ class Track:
     signed: Array
     slip_work: Array
     damping_work: Array
+    stick_energy: Array
+    held_memory: Array
     order: Array
     touches: Mask
     modes: NDArray[np.int8]
@@ -195,36 +204,35 @@ class Track:
 
         While the contact slips Gamma changes by the impulse of N: times the mean Gamma it is the work.
         """
-        impulse = np.sign(columns.share) * (self.v[index] - v)
-        work = columns.limit * (self.v[index] - v) * (0.5 * (self.slip[index] + slip))
+        change = self.v[index] - v
+        impulse = np.sign(columns.share) * change
         self.impulse[index] += impulse
         self.signed[index] += np.sign(columns.mode) * impulse
-        self.slip_work[index] += work
+        self.slip_work[index] += columns.limit * change * (0.5 * (self.slip[index] + slip))
         self.v[index], self.slip[index] = v, slip
 
     def set_mode(
         self,
+        form: TangentialForm,
         index: NDArray[np.intp],
         old: Array,
         new: Array,
         y: Array,
         before: Array,
         after: Array,
-        form: TangentialForm,
     ) -> None:
         """Change modes, with the energies of the spring before and after."""
-        # while slipping, these works are parts of that against the limit
-        works = form.integral("slip_memory", y) + form.integral("work", y)
-        entered, left = before + works, after + works
         was_slip, is_slip = np.abs(old) == 1.0, np.abs(new) == 1.0
-        self.slip_work[index] += np.where(
-            is_slip, np.where(was_slip, 0.0, entered), np.where(was_slip, -left, before - after)
-        )
+        # the work of a dashpot while slipping is a part of that against the limit
+        work = form.integral("work", y)
+        entered = np.where(was_slip, 0.0, before + work)
+        self.slip_work[index] += np.where(is_slip, entered, np.where(was_slip, -after - work, before - after))
+        self.stick_energy[index] += np.where(old == 0.0, before, 0.0) - np.where(new == 0.0, after, 0.0)
         was_held, is_held = np.abs(old) == 2.0, np.abs(new) == 2.0
-        kinetic = 0.5 * y[SLIP_ROW] * y[SLIP_ROW]
-        self.damping_work[index] += np.where(is_held & ~was_held, kinetic + left, 0.0) - np.where(
-            was_held & ~is_held, kinetic + entered, 0.0
-        )
+        begins, ends, memory = is_held & ~was_held, was_held & ~is_held, form.integral("limit_memory", y)
+        self.held_memory[index] += np.where(ends, memory, 0.0) - np.where(begins, memory, 0.0)
+        rest = memory + 0.5 * y[SLIP_ROW] * y[SLIP_ROW]
+        self.damping_work[index] += np.where(begins, rest + after, 0.0) - np.where(ends, rest + before, 0.0)
         self.mode[index] = new
         self.changes[index] += old != new
         self.see(index, new)
@@ -263,6 +271,7 @@ class SlipPhase:
     memory : r in this phase
     track : of all trajectories
     arguments : names of the params after the columns, besides y over Gamma: those of `TangentialForm.coefficient`
+    breakpoints : of the normal force, whose sides are the last params
     """
 
     form: TangentialForm
@@ -272,6 +281,7 @@ class SlipPhase:
     memory: float
     track: Track
     arguments: tuple[str, ...] = ()
+    breakpoints: Sequence[Breakpoint] = ()
 
     @property
     def stiffness_power(self) -> float:
@@ -294,30 +304,27 @@ class SlipPhase:
 
     def problem(self) -> Problem:
         """Pose the joint problem."""
-        normal, quadratures = self.normal, self.form.quadratures
-        # the memory work while sticking may grow fast where the contact area vanishes
-        judged = 2 + ("stick_memory" in quadratures)
+        normal = self.normal
         return Problem(
             rates=self.rates,
             event=lambda y, k, params: normal.event(y[:2], self._normal_rates(k), params),
             unreachable=lambda y, k, params: normal.unreachable(y[:2], self._normal_rates(k), params),
-            floor=(*motion.ERROR_FLOOR, *(1.0,) * judged),
+            floor=JOINT_FLOOR,
             step_at_unit_error=normal.step_at_unit_error,
             n_components=N_COMPONENTS,
-            n_quadratures=len(quadratures),
+            n_quadratures=len(self.form.quadratures),
             switch=self,
         )
 
     def _normal_rates(self, k: Array) -> Array:
-        """Choose the rates of a normal problem: where those of its quadratures are not used, the joint ones do."""
-        time = self.form.row("time")
-        return k[[0, 1, time, time, -1]] if self.law.coordinate.strength else k
+        """Choose the rates that a normal problem uses; a coordinate for strong damping uses that of time."""
+        return k[NORMAL_ROWS] if self.law.coordinate.strength else k
 
     def rates(self, y: Array, params: Params, out: Array | None = None) -> Array:
         """Compute the rates of the joint problem, see `Problem`."""
         form, columns, n = self.form, self.columns(params), y.shape[1]
-        n_integrated = N_COMPONENTS + len(form.quadratures)
-        out = np.empty((n_integrated + 1, n)) if out is None else out
+        rows = form.quadratures
+        out = np.empty((TIME_ROW + len(rows) + 1, n)) if out is None else out
         v, out[1], weight, _, force = self.normal.rates(y[:2], params, np.empty((5, n)))
         s, slip = y[0], y[SLIP_ROW]
         out[0] = v
@@ -339,24 +346,23 @@ class SlipPhase:
         np.negative(out[SLIP_ROW], out[SLIP_ROW])
         if len(out) == N_COMPONENTS:
             return out
-        out[form.row("time")] = weight
-        if len(out) > n_integrated:
-            out[n_integrated] = force
+        out[TIME_ROW] = weight
         if form.cap == "spring":
             slip_spring = columns.memory_limit * force
         if form.has_dashpot:
             # it works on while a cap of the total force slips, and takes from what the spring does
             working_drag = columns.damping * drag if form.is_total else stick_drag
             slip_spring = slip_spring - (working_drag - stick_drag)
-            np.multiply(weight * slip, working_drag, out[form.row("work")])
-        elif form.kind == "regularized":
-            np.multiply(weight * slip, phi, out[form.row("work")])
-        if "slip_memory" in form.quadratures:
-            safe = np.where(np.abs(s) < END_S, END_S, s)
+            np.multiply(weight * slip, working_drag, out[rows["work"]])
+        elif "work" in rows:
+            np.multiply(weight * slip, phi, out[rows["work"]])
+        if "limit_memory" in rows:
+            np.multiply(weight * slip, spring_force, out[rows["stick_work"]])
             fading = (0.5 - self.memory) * self.stiffness_power * columns.compliance * v
-            fading /= signed_power(safe, self.stiffness_power + 1.0)
-            np.multiply(fading, spring_force * spring_force, out[form.row("stick_memory")])
-            np.multiply(fading, slip_spring * slip_spring, out[form.row("slip_memory")])
+            fading /= signed_power(_away_from_zero(s), self.stiffness_power + 1.0)
+            np.multiply(fading, slip_spring * slip_spring, out[rows["limit_memory"]])
+        if len(out) > TIME_ROW + len(rows):
+            out[-1] = force
         return out
 
     def _coefficient(self, slip: Array, params: Params) -> Array:
@@ -388,8 +394,7 @@ class SlipPhase:
         """Compute the state of friction at components y with rates k."""
         form, columns, s = self.form, self.columns(params), y[0]
         d_force = self._rate_of_force(y, k, params)
-        N = columns.share * k[-1]
-        drag = NO_FORCE
+        N, drag = columns.share * k[-1], NO_FORCE
         if form.has_dashpot:
             drag = self._times(columns.damping * y[SLIP_ROW], s, self.drag_power)
         capped_drag = drag if form.is_total else NO_FORCE
@@ -399,7 +404,7 @@ class SlipPhase:
             np.sign(columns.mode) * N - capped_drag,
         )
         trial = drag if form.kind == "dashpot" else spring_force + capped_drag
-        return Local(N, columns.share * d_force, d_force, k[form.row("time")], spring_force, drag, trial)
+        return Local(N, columns.share * d_force, d_force, k[TIME_ROW], spring_force, drag, trial)
 
     def _rate_of_force(self, y: Array, k: Array, params: Params) -> Array:
         """Compute the rate of the normal force by a difference quotient."""
@@ -407,17 +412,28 @@ class SlipPhase:
         reach = np.clip(np.abs(y[0]), MIN_REACH, 1.0)
         if self.form.cap == "total":
             small = motion.RELEASE_STEP * reach
+            if self.breakpoints:
+                small = np.where(self._crosses(y[:2] + small * k[:2], params), -small, small)
             return np.asarray((self.normal.rates(y[:2] + small * k[:2], params)[4] - k[-1]) / small)
         # the friction force jumps where a slip ends, which makes the time of it matter
         small = RATE_OF_LIMIT_STEP * reach
-        ahead, behind = (self.normal.rates(y[:2] + step * k[:2], params)[4] for step in (small, -small))
-        return np.asarray((ahead - behind) / (2.0 * small))
+        is_end, is_start = (self._crosses(y[:2] + step * k[:2], params) for step in (small, -small))
+        first, last = np.where(is_start & ~is_end, 0.0, -small), np.where(is_end, 0.0, small)
+        behind, ahead = (self.normal.rates(y[:2] + step * k[:2], params)[4] for step in (first, last))
+        return np.asarray((ahead - behind) / (last - first))
+
+    def _crosses(self, y: Array, params: Params) -> Mask:
+        """Find where components are beyond a breakpoint of the normal force, at which its rate jumps."""
+        crosses = np.zeros(y.shape[1], bool)
+        for breakpoint, side in zip(self.breakpoints, params[-len(self.breakpoints) :], strict=False):
+            crosses |= side * breakpoint(y[:2], params) < 0.0
+        return crosses
 
     def trial_rate(
         self, y: Array, k: Array, columns: Columns, local: Local, spring_force: Array, phi: Array
     ) -> Array:
         """Compute the rate of the trial force if the contact sticks, at a force phi and one of the spring."""
-        s, slip, form, rate = y[0], y[SLIP_ROW], self.form, NO_FORCE
+        form, s, slip, rate = self.form, y[0], y[SLIP_ROW], NO_FORCE
         if self.has_spring:
             rate = self._times(columns.root * columns.root * local.weight * slip, s, self.stiffness_power)
             if self.memory and self.stiffness_power:
@@ -455,10 +471,10 @@ class SlipPhase:
         if held.size:
             margin[held], margin_rate[held] = self._held_margin(y[:, held], _taken(params, held))[0], np.nan
         # without a limit the mode does not matter, nor without a force; and where the contact ends growth vanishes
-        free = (columns.share == 0.0) | self._without_force(columns)
-        ends = np.flatnonzero((k[0] < 0.0) & (y[0] < END_S))
-        free[ends] |= y[0, ends] < np.where(sticks[ends], -END_S, END_S)
-        free = np.flatnonzero(free)
+        is_free = (columns.share == 0.0) | self._without_force(columns)
+        ends = np.flatnonzero((y[0] < END_S) & (k[0] < 0.0))
+        is_free[ends] |= y[0, ends] < np.where(sticks[ends], -END_S, END_S)
+        free = np.flatnonzero(is_free)
         margin[free], margin_rate[free] = 1.0, 0.0
         return np.array([margin, sign_margin]), np.array([margin_rate, sign_rate])
 
@@ -469,7 +485,8 @@ class SlipPhase:
         rise = self.margins(ahead, self.rates(ahead, params), params)[0]
         rise = rise - self.margins(behind, self.rates(behind, params), params)[0]
         # at first contact and at the release the formulas are smooth on one side only
-        return np.where(y[0] > 2.0 * small, rise / (2.0 * small), np.nan)
+        is_smooth = (y[0] > 2.0 * small) & ~self._crosses(ahead, params) & ~self._crosses(behind, params)
+        return np.where(is_smooth, rise / (2.0 * small), np.nan)
 
     def change(self, which: NDArray[np.intp], y: Array, k: Array, params: Params) -> tuple[Array, Params]:
         """Change the modes and signs of trajectories where margins vanish, see `Switch`."""
@@ -531,7 +548,7 @@ class SlipPhase:
         """Go on in other modes, with a force of the spring if the contact sticks."""
         columns = self.columns(params)
         before, after = self._energy(y[0], force_before, columns), self._energy(y[0], force, columns)
-        self.track.set_mode(index, old, new, y, before, after, self.form)
+        self.track.set_mode(self.form, index, old, new, y, before, after)
         scale = self._times(columns.root, _away_from_zero(y[0]), self.memory * self.stiffness_power)
         z = np.where(columns.root > 0.0, force / scale, 0.0)
         y = y.copy()
@@ -544,10 +561,12 @@ class SlipPhase:
 
     def _held_slip(self, y: Array, params: Params, direction: Array) -> tuple[Array, Array]:
         """Compute Gamma for which the trial force of the spring grows as its limit does, and N."""
+        # at s = 0 the slip is 0/0; a force that vanishes there is known relative to s
+        least = HELD_X ** (1.0 / self.law.model.coordinate_power)
+        y = np.array([np.where(np.abs(y[0]) < least, least, y[0]), *y[1:]])
         k, columns = self.rates(y, params), self.columns(params)
         N, dN = columns.share * k[-1], columns.share * self._rate_of_force(y, k, params)
-        weight = k[self.form.row("time")]
-        stiffness = self._times(columns.root * columns.root * weight, y[0], self.stiffness_power)
+        stiffness = self._times(columns.root * columns.root * k[TIME_ROW], y[0], self.stiffness_power)
         fading = self.memory * self.stiffness_power * k[0] / _away_from_zero(y[0]) * N
         return direction * (dN - fading) / stiffness, N
 
@@ -557,14 +576,14 @@ class SlipPhase:
         k = self.rates(y, params)
         step = small * k[:N_COMPONENTS]
         ahead, behind = (self._held_slip(y + sign * step, params, direction)[0] for sign in (1.0, -1.0))
-        return np.asarray((behind - ahead) / (2.0 * small * k[self.form.row("time")]))
+        return np.asarray((behind - ahead) / (2.0 * small * k[TIME_ROW]))
 
     def friction_at(self, y: Array, params: Params) -> tuple[Array, Array, Array]:
         """Compute Gamma, the friction force phi and its part phi_e in the spring, over G0, from rows of a step."""
         near = np.array([_away_from_zero(y[0]), *y[1:N_COMPONENTS]])
         near = self._released(near, params)
         k = self.rates(near, params)
-        mode, force = self.columns(params).mode, -k[SLIP_ROW] / k[self.form.row("time")]
+        mode, force = self.columns(params).mode, -k[SLIP_ROW] / k[TIME_ROW]
         if (np.abs(mode) == 2.0).any():
             force = np.where(np.abs(mode) == 2.0, self._held_force(near, params, np.sign(mode)), force)
         return near[SLIP_ROW], force, self.local(near, k, params).spring_force
@@ -649,10 +668,7 @@ class SlipPhase:
     def _at_contact(self, y: Array, params: Params, index: NDArray[np.intp]) -> tuple[Array, Params]:
         """Find the modes at first contact, where leading powers of x decide whether the trial force is below N."""
         form, columns, n = self.form, self.columns(params), y.shape[1]
-        near, twice = (
-            self._rows_near_contact(y, params, START_S),
-            self._rows_near_contact(y, params, 2.0 * START_S),
-        )
+        near, twice = (self._rows_near_contact(y, params, s) for s in (START_S, 2.0 * START_S))
         k = self.rates(near[:N_COMPONENTS], params)
         force, twice_force = k[-1], self.rates(twice[:N_COMPONENTS], params)[-1]
         self.track.order[index] = np.log2(twice_force / force) / self.law.model.coordinate_power
@@ -685,10 +701,10 @@ class SlipPhase:
             if self.form.is_total and self.memory == 1.0 and form.damping_power < kp:
                 self.track.is_slow[index] = is_slow = local.drag > local.N
                 new = np.where(is_slow, -1.0, new)
-        self.track.touches[index] = new != 0.0
+        self.track.touches[index] = (new != 0.0) | ~below
         near, params = self._enter(index, new, new, sign, np.zeros(n), spring_force, near, params)
-        y[SPRING_ROW] = near[SPRING_ROW]
-        return y, params
+        # at s = 0 itself the share of the spring in the limit is 0/0
+        return near, params
 
     def _rows_near_contact(self, y: Array, params: Params, s: float) -> Array:
         """Make rows at an indentation so small that the velocities are those at first contact."""
@@ -721,7 +737,7 @@ class SlipPhase:
         self.track.force[index] = force
         # an energy that grows without bound towards x = 0 counts as slip work
         is_finite = 2.0 * self.track.order[index] > self.form.stiffness_power - ORDER_TOLERANCE
-        is_finite |= np.abs(columns.mode) != 1.0
+        is_finite |= (np.abs(columns.mode) != 1.0) | (y[0] > END_S)
         self.track.energy[index] = np.where(is_finite, self._energy(near[0], force, columns), 0.0)
         self.track.add_impulse(index, columns, k[0], y[SLIP_ROW])
 

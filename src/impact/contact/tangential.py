@@ -35,6 +35,7 @@ from .simulate import (
 from .slip_motion import (
     ORDER_TOLERANCE,
     SLIP_ROW,
+    TIME_ROW,
     Columns,
     FrictionKind,
     SlipPhase,
@@ -224,7 +225,8 @@ def _integrate(
             rows = np.vstack([start, states[0][2:, recovery.rows]])
         residual = None if recovery is None else recovery.residual
         params, breakpoints = motion.breakpoints(law, params, rows, residual)
-        phase = SlipPhase(form, law, problem, len(params), form.memory[recovery is not None], track, names)
+        memory = form.memory[recovery is not None]
+        phase = SlipPhase(form, law, problem, len(params), memory, track, names, breakpoints)
 
         def run(problem: Problem, start: Array, params: Params) -> Solution:
             y, params = phase.begin(start, params)
@@ -264,15 +266,22 @@ def _integrate(
 def _result(form: TangentialForm, n: float, base: Columns, track: Track, state: Array) -> TangentialResult:
     """Compute what trajectories come to from their last rows, NaN where they have not ended."""
     scale, G0 = base.G0 * base.G0, base.G0
-    mode, kinetic = np.abs(track.mode), 0.5 * state[SLIP_ROW] ** 2
-    slip_memory, work = form.integral("slip_memory", state), form.integral("work", state)
-    left = track.energy + slip_memory + work
-    slip_work = track.slip_work - np.where(mode == 1.0, left, 0.0)
-    # where N vanishes so slowly with x that both works of a slip at x = 0 are infinite, their sum is the slip work
-    moved = np.where(
-        track.touches & (2.0 * track.order < form.stiffness_power + ORDER_TOLERANCE), slip_memory, 0.0
-    )
-    damping_work = work + track.damping_work - np.where(mode == 2.0, kinetic + left, 0.0)
+    mode, left = np.abs(track.mode), track.energy
+    at_limit, work = form.integral("limit_memory", state), form.integral("work", state)
+    held_memory = track.held_memory + np.where(mode == 2.0, at_limit, 0.0)
+    slip_work = track.slip_work - np.where(mode == 1.0, left + work, 0.0) + held_memory - at_limit
+    rest = 0.5 * state[SLIP_ROW] ** 2 + left + at_limit
+    damping_work = work + track.damping_work - np.where(mode == 2.0, rest, 0.0)
+    memory_work = np.zeros_like(slip_work)
+    if form.stiffness_power:
+        stick_work = form.integral("stick_work", state)
+        memory_work = stick_work - track.stick_energy - np.where(mode == 0.0, left, 0.0) + at_limit
+        # where N vanishes so slowly with x that both works are infinite at x = 0, the slip work is their sum
+        is_infinite = track.touches & (2.0 * track.order < form.stiffness_power + ORDER_TOLERANCE)
+        slip_work += np.where(is_infinite, memory_work, 0.0)
+        memory_work = np.where(is_infinite, 0.0, memory_work)
+    if form.kind == "regularized":
+        slip_work, damping_work = work, memory_work
     ended = np.isfinite(state[SLIP_ROW])
     nan = np.full(ended.size, np.nan)
     result = replace(TangentialResult.blank(ended.size), sliding_impulse=np.where(ended, track.impulse, np.nan))
@@ -281,17 +290,17 @@ def _result(form: TangentialForm, n: float, base: Columns, track: Track, state: 
         return replace(result, exact=np.where(ended & (track.sign > 0.0), 1.0, np.nan))
     regime = np.where(track.modes == 1, STICKS, np.where(track.modes & 1, BOTH, SLIDES))
     if form.kind == "regularized":
-        regime, slip_work, damping_work = np.zeros_like(regime), work, 0.0 * work
+        regime = np.zeros_like(regime)
     exact = np.where(regime == SLIDES, G0 - track.signed, nan)
     if form.kind == "spring" and form.stiffness_power == 0.0:
-        swing = G0 * np.cos(base.root * form.integral("time", state))
+        swing = G0 * np.cos(base.root * state[TIME_ROW])
         exact = np.where((regime == STICKS) & (base.damping == 0.0), swing, exact)
     return replace(
         result,
         slip=G0 * state[SLIP_ROW],
-        slip_work=scale * (slip_work + moved),
+        slip_work=scale * slip_work,
         damping_work=scale * damping_work,
-        memory_work=scale * (form.integral("stick_memory", state) + slip_memory - moved),
+        memory_work=scale * memory_work,
         elastic_left=scale * np.where(ended, track.energy, np.nan),
         regime=np.where(ended, regime, 0).astype(np.int8),
         slip_changes=np.where(ended, track.changes, 0).astype(np.int32),

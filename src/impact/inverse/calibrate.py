@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -115,6 +116,8 @@ def calibrate(
         if best is None:
             raise UsageError("--model: set without --best FILE, which is written for that law")
         position_of_law(list(laws_to_fit(config)), model, "--model")
+    for note in config.notes:
+        warnings.warn(note, stacklevel=2)
     result = calibrate_config(config, plugin_set.of(config.models), jobs)
     if output is not None:
         save(result, output, overwrite=overwrite)

@@ -11,12 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..array_types import Array, Mask
-from .events import event_offset, is_event_ahead
+from .events import event_offset, is_event_ahead, step_of_order_two
 from .problem import Problem, Switch, Termination
 from .state import RUNNING, State, TrialStep
 
-# a mode changes at the end of a step within this part of the last two steps, or within this time, of the zero
-SWITCH_RTOL, SWITCH_ATOL = 1e-8, 3e-10
+# a mode changes at the end of a step within this part of the last two steps, or within this time, of the zero; or
+# within the larger part, if the rate of the margin is known: a step of order two bridges it
+SWITCH_RTOL, SWITCH_ATOL, NEAR_SWITCH = 1e-8, 3e-10, 1e-4
 # a step ends at the least value of a margin in its inside if that is less than this part of those at its ends, and
 # not as near to the start as the second number, in steps
 LOW_MARGIN, NEAR_START = 0.05, 0.01
@@ -27,10 +28,11 @@ LARGE_CHANGE = 0.5
 FAR_BELOW, FAR_ABOVE = 0.75, 2.0
 
 
-def locate_switches(problem: Problem, switch: Switch, state: State, trial: TrialStep, accepted: Mask) -> None:
+def locate_switches(problem: Problem, switch: Switch, state: State, trial: TrialStep, accepted: Mask) -> Array:
     """Change the modes of trajectories whose step ends where a margin vanishes; shorten steps to such an end.
 
     A step across the zero of a margin, or across a low minimum, is rejected and tried again with the length to it.
+    Returns the offsets of the changes from the ends of the steps, as fractions of them.
     """
     assert state.margins is not None
     # the end of a trajectory is not the end of the step
@@ -47,19 +49,23 @@ def locate_switches(problem: Problem, switch: Switch, state: State, trial: Trial
     may_vanish |= np.isnan(rates) & ((margins < FAR_BELOW * before) | (margins > FAR_ABOVE * before))
     positions = (may_vanish.any(axis=0) & accepted).nonzero()[0]
     reached = which = positions[:0]
+    offset = np.zeros(0)
     if positions.size:
-        reached, which = _locate(switch, state, trial, positions, margins[:, positions], rates[:, positions])
+        reached, which, offset = _locate(
+            switch, state, trial, positions, margins[:, positions], rates[:, positions]
+        )
     stay = (~trial.is_accurate).nonzero()[0]
     margins[:, stay], rates[:, stay] = before[:, stay], rates_before[:, stay]
     state.margins = margins, rates
     if reached.size:
-        _change_modes(problem, switch, state, trial, reached, which)
+        _change_modes(problem, switch, state, trial, reached, which, offset)
+    return offset / state.h[reached]
 
 
 def _locate(
     switch: Switch, state: State, trial: TrialStep, positions: NDArray[np.intp], margins: Array, rates: Array
-) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Shorten steps to zeros of margins; returns the positions where a zero is reached, and of which margin."""
+) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
+    """Shorten steps to zeros of margins; returns where a zero is reached, of which margin, and its offset."""
     assert state.margins is not None
     assert state.h_free is not None
     before, rates_before = (values[:, positions] for values in state.margins)
@@ -87,12 +93,14 @@ def _locate(
     height = np.where(state.h_free[positions] > 0.0, 0.5, 1.0) * before
     height = np.where(unknown, height, np.nan)
     which, offset = _first_zero(margins, slopes, before, slopes_before, h, height)
-    near = SWITCH_RTOL * (h + state.h_last[positions]) + SWITCH_ATOL
+    picked = which, np.arange(which.size)
+    rtol = np.where(unknown[picked] | turns[picked], SWITCH_RTOL, NEAR_SWITCH)
+    near = rtol * (h + state.h_last[positions]) + SWITCH_ATOL
     reached = falls & (np.abs(offset) <= near) & goes_on
     crossed = falls & (offset < -near) & ~reached
     is_ahead = falls & (offset > near) & (offset < h_ahead)
     _shorten(state, trial, positions, offset, crossed, crossed | is_ahead)
-    return positions[reached], which[reached]
+    return positions[reached], which[reached], offset[reached]
 
 
 def _first_zero(
@@ -148,12 +156,14 @@ def _change_modes(
     trial: TrialStep,
     positions: NDArray[np.intp],
     which: NDArray[np.intp],
+    offset: Array,
 ) -> None:
-    """Change the modes of trajectories at the ends of their steps; they go on with the step of before."""
+    """Change the modes of trajectories next to the ends of their steps; they go on with the step of before."""
     assert state.h_free is not None
     assert state.margins is not None
     params = tuple(column[positions] for column in state.params)
-    y, params = switch.change(which, trial.y[:, positions], trial.k[:, positions], params)
+    y, k = step_of_order_two(problem, trial.y[:, positions], trial.k[:, positions], offset, params)
+    y, params = switch.change(which, y, k, params)
     for column, values in zip(state.params, params, strict=True):
         column[positions] = values
     k = problem.rates(y[: problem.n_components], params)

@@ -10,7 +10,7 @@ from ..evidence import Evidence
 from ..model import ForceModel, Parameter
 from ..powers import power
 from .aliases import same_law
-from .cited_sources import CHRONO, DEMLAB_VISCOELASTIC, LIGGGHTS, YADE_2025
+from .cited_sources import CHRONO, DEMLAB_VISCOELASTIC, LETHE, LIGGGHTS, YADE_2025
 from .dashpot import (
     ANAGNOSTOPOULOS_1988,
     HERTZIAN_DASHPOT,
@@ -106,6 +106,19 @@ LIGGGHTS_HOOKE_LIMIT = in_code(
     f"{LIGGGHTS_REFERENCE} hooke, without the option viscous",
     f"{LIGGGHTS}normal_model_hooke.h",
 )
+
+# ---- Lethe
+
+LETHE_LAWS = tuple(
+    in_code(
+        law, key, f"Lethe, {method} (2026)", 2020, "Lethe, particle particle contact force method", LETHE,
+        f"its year is that of the licence; {note}",
+    )
+    for law, key, method, note in (
+        (TSUJI_1992, "lethe-hertz", "hertz and hertz_mindlin_limit_overlap, _force", "its K is 3e-5 smaller"),
+        (LIGGGHTS_HOOKE, "lethe-linear", "linear", "its v_c is always 1 m/s, its K 3e-5 larger"),
+    )
+)  # fmt: skip
 
 # ---- Chrono
 

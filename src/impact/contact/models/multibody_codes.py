@@ -16,9 +16,17 @@ from ..formula_calls import Formula
 from ..model import ForceModel, Parameter
 from ..powers import power, powers
 from .aliases import same_law
-from .cited_sources import CHRONO_MULTICORE, DRAKE, MAPLESIM_HELP, MBDYN, MODIA3D, MUJOCO, SIMBODY
+from .asymmetric import approach_dashpot
+from .cited_sources import CHRONO_MULTICORE, DRAKE, EXUDYN, MAPLESIM_HELP, MBDYN, MODIA3D, MUJOCO, SIMBODY
 from .dashpot import KELVIN_VOIGT_NO_TENSION
-from .hysteresis import FLORES_2011, HUNT_CROSSLEY_1975, LANKARANI_NIKRAVESH_1990, hysteresis
+from .hysteresis import (
+    CARVALHO_MARTINS_2019,
+    FLORES_2011,
+    GONTHIER_2004,
+    HUNT_CROSSLEY_1975,
+    LANKARANI_NIKRAVESH_1990,
+    hysteresis,
+)
 
 LINEAR_DAMPING = "F = K δⁿ (1 + χ δ̇/v₀)"
 
@@ -428,3 +436,37 @@ def in_mbdyn(law: ForceModel, key: str, formulation: str) -> ForceModel:
 MBDYN_FLORES = in_mbdyn(FLORES_2011, "mbdyn-flores", "flores")
 MBDYN_HUNT_CROSSLEY = in_mbdyn(HUNT_CROSSLEY_1975, "mbdyn-hunt-crossley", "hunt crossley")
 MBDYN_LANKARANI_NIKRAVESH = in_mbdyn(LANKARANI_NIKRAVESH_1990, "mbdyn-lankarani-nikravesh", "lankarani nikravesh")
+
+CARVALHO_CHI, GONTHIER_CHI = (law.coefficients["chi"] for law in (CARVALHO_MARTINS_2019, GONTHIER_2004))
+
+EXUDYN_CARVALHO_GONTHIER = of_code(
+    hysteresis(
+        "exudyn-carvalho-gonthier",
+        title="EXUDYN ObjectContactSphereSphere, impactModel 2 (1.13.6)",
+        year=2025,
+        equation="F = K δⁿ (1 + χ δ̇/v₀),  χ = (3/2)(1 − e)(11 − e)/(1 + 9e) for e > 1/3, else (1 − e²)/e",
+        reference="EXUDYN, ObjectContactSphereSphere, which has carvalho-martins-2019 and gonthier-2004; v₀ is at "
+        "least minimumImpactVelocity",
+        evidence=Evidence("seen", EXUDYN, note="its first year was not seen"),
+        # both have 8/3 at e = 1/3
+        chi=lambda e: np.where(e > 1 / 3, np.asarray(CARVALHO_CHI(e)), np.asarray(GONTHIER_CHI(e))),
+    )
+)
+
+NEWTON_SEMI_IMPLICIT = of_code(
+    approach_dashpot(
+        "newton-semi-implicit",
+        title="Newton SolverSemiImplicit and SolverFeatherstone (1.8.0); warp.sim",
+        year=2025,
+        equation="F = K δ + k_d δ̇, then F = K δ;  e = exp(−ζ acos(ζ)/√(1 − ζ²)),  ζ = k_d/(2 √(K m))",
+        reference="Newton, eval_body_contact; K and k_d are the means of ke and kd of both shapes",
+        evidence=Evidence(
+            "seen",
+            "newton 1.8.0, newton/_src/solvers/semi_implicit/kernels_contact.py",
+            note="its year is that of the licence; of warp.sim a copy of its kernel was seen",
+        ),
+        parameters=(Parameter("kd", "N s/m", "damping on approach, the mean of kd of both shapes", least=0.0),),
+        zeta=lambda kd, m, K: kd / (2 * np.sqrt(m * K)),
+        exponent=1.0,
+    )
+)

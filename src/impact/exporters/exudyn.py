@@ -1,0 +1,75 @@
+"""EXUDYN, contacts of CreateSphereSphereContact."""
+
+from __future__ import annotations
+
+from .code import Code, Collision, Parameters
+from .programs import python_package_version
+
+# impactModel of each law; linear damping is added to the other two where it is not 0
+IMPACT_MODELS = {"exudyn-carvalho-gonthier": 2, "hunt-crossley-1975": 1, "kelvin-voigt": 0}
+TWO_BALLS = """\
+import exudyn
+
+system = exudyn.SystemContainer()
+mbs = system.AddSystem()
+{lines}
+balls = [
+    mbs.CreateMassPoint(referencePosition=[x, 0, 0], initialVelocity=[v, 0, 0], mass=m)
+    for m, x, v in (({m1}, {x1}, {v1}), ({m2}, {x2}, {v2}))
+]
+mbs.CreateSphereSphereContact(itemNumbers=balls, spheresRadii=[{R1}, {R2}], **contact)
+mbs.Assemble()
+settings = exudyn.SimulationSettings()
+settings.solution.file.write = False
+# steps are cut where the contact begins and ends
+settings.timeIntegration.minimumStepSize = 1e-6 * dt
+settings.timeIntegration.numberOfSteps = {steps}
+settings.timeIntegration.endTime = {steps} * dt
+mbs.SolveDynamic(settings)
+v1, v2 = (mbs.GetObjectOutputBody(ball, exudyn.OutputVariableType.Velocity)[0] for ball in balls)
+print("e_out =", (v2 - v1) / {v0})
+"""
+
+
+def parameters(collision: Collision) -> dict[str, float | str]:
+    """Write the arguments of CreateSphereSphereContact."""
+    c, number = collision, IMPACT_MODELS[collision.model.key]
+    loss = {"restitutionCoefficient": c["e"]} if number else {"contactDamping": c["C"]}
+    return {"impactModel": number, "contactStiffness": c["K"], "contactStiffnessExponent": c["n"], **loss}
+
+
+def lines(collision: Collision, parameters: Parameters) -> list[str]:
+    return [
+        "contact = dict(",
+        *(f"    {name}={value!r}," for name, value in parameters.items()),
+        ")",
+        f"dt = {collision.dt!r}",
+    ]
+
+
+def notes(collision: Collision) -> list[str]:
+    return [
+        "in SI, of the pair: each contact of CreateSphereSphereContact has its own values, without any mixing",
+        "contactStiffness is in N/m^n; unset, the exponent n is 1, impactModel 0 and restitutionCoefficient 1",
+        "impactModel 0 takes no restitutionCoefficient and pulls at the end; 1 and 2 add contactDamping, if given",
+        "1 and 2: begin with a gap; a contact in the first step has no impact velocity, no damping, and e is 1",
+        "steps are cut at the contact: the solver stops if minimumStepSize, by default 1e-8 s, is near dt",
+        "1 and 2: impacts below minimumImpactVelocity (0) have the damping of that speed, and rebound faster",
+    ]
+
+
+CODE = Code(
+    name="exudyn",
+    title="EXUDYN",
+    laws={key: f"impactModel {number}" for key, number in IMPACT_MODELS.items()},
+    damping={"kelvin-voigt": "C"},
+    newest="1.13.6",
+    tested="scripts were run in EXUDYN 1.13.6, generalized alpha; read in jgerstmayr/EXUDYN @e44aca1b (2026)",
+    parameters=parameters,
+    lines=lines,
+    notes=notes,
+    template=TWO_BALLS,
+    program="python",
+    install="pip install exudyn",
+    version_of=python_package_version("exudyn"),
+)

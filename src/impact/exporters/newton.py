@@ -1,0 +1,83 @@
+"""Newton, SolverSemiImplicit."""
+
+from __future__ import annotations
+
+import math
+
+from ..formatting import number
+from .code import Code, Collision, Parameters
+from .programs import python_package_version
+
+TWO_BALLS = """\
+import newton
+import warp as wp
+
+wp.set_device("cpu")
+{lines}
+# the masses are those of the bodies
+contact.density = 0
+builder = newton.ModelBuilder(gravity=(0, 0, 0))
+for m, R, x in (({m1}, {R1}, {x1}), ({m2}, {R2}, {x2})):
+    moment = 0.4 * m * R**2
+    inertia = wp.mat33(moment, 0, 0, 0, moment, 0, 0, 0, moment)
+    body = builder.add_body(xform=wp.transform((x, 0, 0), wp.quat_identity()), mass=m, inertia=inertia)
+    builder.add_shape_sphere(body, radius=R, cfg=contact)
+model = builder.finalize()
+solver = newton.solvers.SolverSemiImplicit(model)
+state, following, control = model.state(), model.state(), model.control()
+state.body_qd.assign([({v1}, 0, 0, 0, 0, 0), ({v2}, 0, 0, 0, 0, 0)])
+pipeline = newton.CollisionPipeline(model)
+contacts = pipeline.contacts()
+for _ in range({steps}):
+    state.clear_forces()
+    pipeline.collide(state, contacts)
+    solver.step(state, following, control, contacts, dt)
+    state, following = following, state
+v1, v2 = (float(speed[0]) for speed in state.body_qd.numpy())
+print("e_out =", (v2 - v1) / {v0})
+"""
+
+
+def parameters(collision: Collision) -> dict[str, float | str]:
+    """Write the attributes of ShapeConfig, the same for both shapes."""
+    return {"ke": collision["K"], "kd": collision["kd"]}
+
+
+def lines(collision: Collision, parameters: Parameters) -> list[str]:
+    values = ", ".join(f"{name}={value!r}" for name, value in parameters.items())
+    return [f"contact = newton.ModelBuilder.ShapeConfig({values}, mu=0)", f"dt = {collision.dt!r}"]
+
+
+def notes(collision: Collision) -> list[str]:
+    c = collision
+    # the spacing of coordinates near a radius, over the peak indentation of the undamped spring
+    share = 2.0**-23 * max(c["R1"], c["R2"]) / (c["v0"] * math.sqrt(c["m"] / c["K"]))
+    return [
+        "in SI, the same for both shapes: ke and kd of a contact are the means, not those of springs in series",
+        "kd acts on approach only; the restitution depends on kd/(2 sqrt(ke m)), thus on the masses, not on speed",
+        "unset, ke is 2500 N/m, kd 100 N s/m and mu 1; a margin above 0 begins the contact earlier",
+        "restitution is ignored here; SolverXPBD has it with enable_restitution=True, which is not its default",
+        "SolverFeatherstone has the same contact force; other solvers make other forces of ke and kd",
+        f"single precision: the indentation is resolved to {number(share, 2)} of its peak, and e about as well",
+        "no friction: replace mu by yours",
+    ]
+
+
+CODE = Code(
+    name="newton",
+    title="Newton, SolverSemiImplicit",
+    laws={"newton-semi-implicit": "ke and kd of ShapeConfig"},
+    damping={"newton-semi-implicit": "kd"},
+    newest="1.8.0",
+    tested="scripts were run in Newton 1.8.0 on a CPU; warp.sim has the same force and was not run",
+    scheme="kick-drift",
+    # single precision: a ball is a hundred times as large as its indentation, or more
+    uncertainty=1e-3,
+    parameters=parameters,
+    lines=lines,
+    notes=notes,
+    template=TWO_BALLS,
+    program="python",
+    install="pip install newton",
+    version_of=python_package_version("newton"),
+)
