@@ -105,6 +105,19 @@ CODE = Code(
     lines=lines,
     notes=notes,
     template=TWO_BALLS,
+    wall={
+        "import AddContactMaterial, ": "import AddContactMaterial, HalfSpace, ",
+        ", (2, {m2}, {R2}, {material2})": ",",
+        "plant.Finalize()": (
+            "pose = HalfSpace.MakePose([-1, 0, 0], [0, 0, 0])\n"
+            'plant.RegisterCollisionGeometry(plant.world_body(), pose, HalfSpace(), "wall", {material2})\n'
+            "plant.Finalize()"
+        ),
+        "({x1}, {x2}), ({v1}, {v2})": "({x1},), ({v1},)",
+        "v1, v2 = (joint.get_translation_rate(context) for joint in joints)": (
+            "v1, v2 = joint.get_translation_rate(context), {v2}"
+        ),
+    },
     program="python",
     install="pip install drake",
     version_of=python_package_version("drake"),

@@ -79,6 +79,13 @@ CODE = Code(
     comment=("<!-- ", " -->"),
     notes=notes,
     template=TWO_BALLS,
+    wall={
+        '<body pos="{x2} 0 0"><joint type="slide" axis="1 0 0"/><geom size="{R2}" mass="{m2}"/></body>': (
+            '<geom type="plane" size="1 1 1" zaxis="-1 0 0"/>'
+        ),
+        "data.qvel[:] = {v1}, {v2}": "data.qvel[:] = {v1}",
+        "v1, v2 = map(float, data.qvel)": "v1, v2 = float(data.qvel[0]), {v2}",
+    },
     program="python",
     install="pip install mujoco",
     version_of=python_package_version("mujoco"),
