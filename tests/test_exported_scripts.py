@@ -157,6 +157,9 @@ PLANTED_WALLS = (
     ("yade", "yade-betan", "hertzian=True", "hertzian=False"),
     ("mujoco", "mujoco-solref", 'zaxis="-1 0 0"', 'zaxis="-1 1 0"'),
     ("drake", "drake-point-contact", "world_body(), pose", "world_body(), RigidTransform()"),
+    ("pybullet", "kelvin-voigt-no-tension", "contactProcessingThreshold=0", "contactProcessingThreshold=1"),
+    ("exudyn", "exudyn-carvalho-gonthier", "sphereRadius=0.05", "sphereRadius=0.0499"),
+    ("newton", "newton-semi-implicit", "-1.0, 0.0, 0.0", "-1.0, 0.3, 0.0"),
     ("kratos", "kratos-hertz", '"search_tolerance_against_walls": 0.01', '"search_tolerance_against_walls": 0.0'),
     (
         "simbody",
