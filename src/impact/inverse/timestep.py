@@ -19,13 +19,12 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic_core import PydanticCustomError
 from scipy.optimize import elementwise
 
 from ..array_types import Array
 from ..config.input_names import InputName
 from ..config.load import Config
-from ..config.tables import SWEEP_QUANTITIES
+from ..config.tables import read_sweep_value
 from ..contact.dimensionless import dimensionless_values
 from ..contact.fixed_step import (
     KICK_DRIFT,
@@ -541,10 +540,7 @@ def read_step(dt: float | str) -> float:
     """
     with contextlib.suppress(ValueError):
         dt = float(dt)
-    try:
-        return float(SWEEP_QUANTITIES["dt"].read(dt))
-    except PydanticCustomError as error:
-        raise UsageError(f"--dt: {error.message()}") from None
+    return read_sweep_value("dt", dt, "--dt")
 
 
 def time_steps(contact_time: float, steps_per_contact: Sequence[float], dt: Sequence[float]) -> list[float]:
