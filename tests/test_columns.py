@@ -375,11 +375,12 @@ def test_fit_true_is_the_natural_range_of_what_the_laws_lack() -> None:
     """A parameter that the config has keeps its value or its bounds."""
     laws = ["hunt-crossley-1975", "kuwabara-kono-1987", "lammps-viscoelastic-hertz"]
     data = {"fit": True, "columns": {"v1": [0.1, 0.3, 1.0], "e_out": [0.9, 0.8, 0.7]}}
-    source = {"models": laws, "sweep": SWEEP, "data": data, "model": {"lammps-viscoelastic-hertz": {"eta": 1e6}}}
+    balls = {**SWEEP, "R1": 0.01, "R2": math.inf, "material": "steel"}
+    source = {"models": laws, "sweep": balls, "data": data, "model": {"lammps-viscoelastic-hertz": {"eta": 1e6}}}
     config = read_config(source, purpose="calibrate")
     assert list(config.fits) == ["e", "kuwabara-kono-1987.A"]
     assert config.fits["e"] == (0.0, 1.0)
-    (line,) = problems_of(read_config, {**source, "sweep": {**SWEEP, "m1": {"fit": True}}}, purpose="calibrate")
+    (line,) = problems_of(read_config, {**source, "sweep": {**balls, "m1": {"fit": True}}}, purpose="calibrate")
     assert line == "config: sweep.m1: got fit = true, expected fit = [least, most]: it has no natural range"
 
 

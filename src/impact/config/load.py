@@ -20,7 +20,7 @@ from ..contact.variables import OUTPUTS, default_variables
 from . import measurements, quantities, tables
 from .columns import expand_cases, named_files, read_files
 from .design import design_problems, distribution_paths, draw_columns, unit_samples
-from .draft import Draft, Measurements, Setting, add_library_materials, open_config, open_text
+from .draft import Draft, Measurements, Setting, add_library_materials, open_config, open_text, settings_of
 from .files import as_table, override_text, set_value
 from .grid import MAX_POINTS, Axis, build_grid, chunk_problems
 from .input_names import InputName
@@ -82,7 +82,7 @@ def read_config(
     >>> read_config({"models": "hertz", "sweep": sweep, "materials": {"steel": steel}}).axes
     (Axis(columns={'e': (0.5, 1.0)}, numbered='', numbers=()),)
     """
-    draft = open_config(source, plugins).with_settings(map(Setting.parse, overrides))
+    draft = open_config(source, plugins).with_settings(settings_of(overrides))
     return build(draft, max_points, purpose)
 
 
@@ -98,7 +98,7 @@ def parse_config(
 
     No file is read, because the text may come from a result of unknown origin.
     """
-    draft = open_text(text, name, plugins).with_settings(map(Setting.parse, overrides))
+    draft = open_text(text, name, plugins).with_settings(settings_of(overrides))
     return build(draft, max_points, purpose)
 
 
