@@ -216,8 +216,8 @@ def derive_impacts(
     -------
     v1, e_out and sigma_e_out, as far as they follow, and the position of the row to which each value belongs
 
-    >>> derive_impacts({"flight_time": [0.5, 0.4, 0.32]}, [0, 1, 2], ["", "", ""], 10.0)
-    ({'v1': [2.5, 2.0], 'e_out': [0.8, 0.8]}, [0, 1])
+    >>> derive_impacts({"flight_time": [0.5, 0.4, 0.2]}, [0, 1, 2], ["", "", ""], 10.0)
+    ({'v1': [2.5, 2.0], 'e_out': [0.8, 0.5]}, [0, 1])
     """
     before = after = list(range(len(rows)))
     first, second, power = "drop_height", "rebound_height", 0.5
