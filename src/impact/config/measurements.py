@@ -371,6 +371,28 @@ def _mapped(columns: Columns, headers: Mapping[str, str]) -> Columns:
     )
 
 
+def add_fits(draft: Draft) -> Draft:
+    """Fit what the laws need and the config does not have, if [data] says so."""
+    if draft.table("data").get("fit") is not True:
+        return draft
+    uses_e = any("e" in with_base_quantities(model.quantities) for model in draft.models)
+    uses_e |= any(law.may_use_e for law in draft.frictions)
+    has_e = not {"e", "alpha"}.isdisjoint({*draft.table("sweep"), *as_table(draft.table("data").get("columns"))})
+    paths: list[KeyPath] = [("sweep", "e")] if uses_e and not has_e else []
+    for laws, table in ((draft.models, "model"), (draft.frictions, "friction")):
+        paths += [
+            (table, law.key, parameter.name)
+            for law in laws
+            for parameter in law.parameters
+            if parameter.default is None and not parameter.optional
+        ]
+    data = draft.data
+    for path in paths:
+        if not contains_path(data, path):
+            data, _ = set_value(data, path, {"fit": True})
+    return replace(draft, data=data)
+
+
 def read_measurements(draft: Draft) -> Draft:
     """Read the measurements of a config in which their values replace the file."""
     table = draft.table("data")
