@@ -104,8 +104,15 @@ EXTENSIONS = {
 }
 
 
-@BOTH_LAYOUTS
-@pytest.mark.parametrize("extension", EXTENSIONS)
+# each extension is quick in one layout
+@pytest.mark.parametrize(
+    ("extension", "layout"),
+    [
+        pytest.param(name, layout, marks=() if (index + shift) % 2 else pytest.mark.slow)
+        for shift, layout in enumerate((FULL, FACTORED))
+        for index, name in enumerate(EXTENSIONS)
+    ],
+)
 def test_an_extended_result_equals_a_single_sweep(
     stored_sweep: StoredSweep, tmp_path: Path, layout: str, extension: str
 ) -> None:

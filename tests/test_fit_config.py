@@ -80,15 +80,15 @@ def test_a_stored_config_needs_no_file(folder: Path) -> None:
     [
         ("v1, e_out\n1, 0.5\n", 'drops.csv:1: v1: got no unit, expected one in brackets, such as "v1 [m/s]"'),
         ("v1 [s], e_out\n1, 0.5\n", "drops.csv:1: v1: got [s], expected"),
-        ("v1 [m/s], e_out [%]\n1, 50\n", "drops.csv:1: e_out: got [%], expected a fraction"),
-        ("v1 [m/s], e_out\n1, 60%\n", "drops.csv:2: e_out: got"),
+        ("v1 [m/s], e_out [kg]\n1, 50\n", "drops.csv:1: e_out: got [kg], expected a bare number"),
+        ("v1 [m/s], e_out\n1, 160%\n", 'drops.csv:2: e_out: got "160%", expected a number from -0.5 to 1.5'),
         (
             "v1 [m/s], e_out\n1, 0.5\n2, 60\n3, 55\n",
-            'drops.csv:3: e_out: got "60", expected a fraction, such as 0.6',
+            'drops.csv:3: e_out: got "60", expected a fraction: percent? name the unit, as in "e_out [%]"',
         ),
         ("v1 [m/s], e_out\n1, -0.6\n", "drops.csv:2: e_out: got -0.6, expected a number from -0.5 to 1.5"),
-        ("v1 [m/s], e_out\n1, nan\n", "drops.csv:2: e_out: got nan, expected a number from -0.5 to 1.5"),
-        ("v1 [m/s], e_out\n1,\n", "drops.csv:2: e_out:"),
+        ("v1 [m/s], e_out\n1, nan\n", "drops.csv:2: e_out: got nothing, expected a value in each column"),
+        ("v1 [m/s], e_out\n1,\n", "drops.csv:2: e_out: got nothing, expected a value in each column"),
         ("v1 [m/s], eout\n1, 0.5\n", 'drops.csv:1: eout: no such input or output; did you mean "e_out"?'),
         (
             "v1 [m/s], e_out, sigma\n1, 0.5, 0\n",
@@ -105,8 +105,8 @@ def test_a_stored_config_needs_no_file(folder: Path) -> None:
         ),
         ("v1 [m/s]\n1\n", "no column of an output"),
         (
-            "e_out, sigma, specimen\n0.5, 0.1, a\n0.4, 0.1,\n",
-            "drops.csv:3: specimen: got nothing, expected the name",
+            "e_out, sigma, specimen\n0.5, 0.1,\n0.4, 0.1,\n",
+            "drops.csv:2: specimen: got nothing, expected a value in each column",
         ),
         ("e_out, sigma, specimen\n0.5, 0.1, a\n0.4, 0.1, a\n", "data: got one specimen, expected at least two"),
         ("e_out, specimen\n0.5, a\n0.4, b\n", "standard deviations, expected a column sigma or the key sigma"),

@@ -203,8 +203,15 @@ def swept(tmp_path_factory: pytest.TempPathFactory) -> dict[str, xr.Dataset]:
     }
 
 
-@pytest.mark.parametrize("layout", ["full", "factored"])
-@pytest.mark.parametrize(("output", "target"), [("beta", 0.1), ("e_t", 0.7), ("impulse_ratio", 0.1)])
+@pytest.mark.parametrize(
+    ("layout", "output", "target"),
+    [
+        ("full", "beta", 0.1),
+        ("factored", "beta", 0.1),
+        ("factored", "e_t", 0.7),
+        ("full", "impulse_ratio", 0.1),
+    ],
+)
 def test_pairs_are_ranked_by_their_distance_from_the_target(
     swept: dict[str, xr.Dataset], layout: str, output: str, target: float
 ) -> None:

@@ -47,6 +47,8 @@ xt = 0.5
 kt_over_kn = 0.8
 """
 LAYOUTS = ("full", "factored")
+# both write the same trajectories; the layout of all values takes longer
+EACH_LAYOUT = pytest.mark.parametrize("layout", [pytest.param("full", marks=pytest.mark.slow), "factored"])
 BLOCKS = 8
 SPRING_VALUES, DAMPED_VALUES = ("{ xt = 0.0, kt_over_kn = 0.8 }", "{ xt = 0.5, kt_over_kn = 0.8 }")
 
@@ -157,7 +159,7 @@ def test_both_layouts_have_the_bits_of_the_sweep(folder: Path, whole: xr.Dataset
     assert_same_bits(impact.load(folder / f"{layout}.h5"), whole)
 
 
-@pytest.mark.parametrize("layout", LAYOUTS)
+@EACH_LAYOUT
 def test_merged_shards_have_the_bytes_of_the_whole_sweep(folder: Path, layout: str, tmp_path: Path) -> None:
     output = tmp_path / "results.h5"
     shards = [
@@ -169,7 +171,7 @@ def test_merged_shards_have_the_bytes_of_the_whole_sweep(folder: Path, layout: s
     assert output.read_bytes() == (folder / f"{layout}.h5").read_bytes()
 
 
-@pytest.mark.parametrize("layout", LAYOUTS)
+@EACH_LAYOUT
 def test_a_resumed_sweep_has_the_bytes_of_the_whole_sweep(
     folder: Path, layout: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -294,7 +296,7 @@ def test_pairs_that_cannot_be_combined_are_marked_and_named(folder: Path, whole:
         impact.sweep(folder / "c.toml", overrides=alone)
 
 
-@pytest.mark.parametrize("layout", LAYOUTS)
+@EACH_LAYOUT
 def test_compare_reports_a_changed_restitution(cli: Run, folder: Path, layout: str, tmp_path: Path) -> None:
     same = cli("compare", folder / "full.h5", folder / f"{layout}.h5")
     assert same.returncode == 0, same.stdout

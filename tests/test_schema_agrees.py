@@ -205,6 +205,9 @@ BEYOND_DATA = (
     "values, expected",
     "no column of an output",
     "not read",
+    "got headers, expected a file",
+    "got nothing, expected a value",
+    "percent?",
 )
 BEYOND_DATA += (
     "without standard deviations",

@@ -17,40 +17,66 @@ if TYPE_CHECKING:
     from .config.tables import schema as schema
     from .contact.checks import check_model as check_model
     from .contact.evidence import Evidence as Evidence
+    from .contact.friction import FrictionLaw as FrictionLaw
     from .contact.model import ForceModel as ForceModel, Parameter as Parameter
     from .contact.models.hysteresis import hysteresis as hysteresis
     from .contact.powers import power as power
-    from .engine.friction_catalogue import frictions as frictions
-    from .engine.model_catalogue import models as models
-    from .errors import ImpactError as ImpactError
-    from .exporters.environment import doctor as doctor
-    from .exporters.export import export as export, export_codes as export_codes
+    from .engine.friction_catalogue import Frictions as Frictions, frictions as frictions
+    from .engine.model_catalogue import Models as Models, models as models
+    from .errors import (
+        ConfigError as ConfigError,
+        ImpactError as ImpactError,
+        ImpactWarning as ImpactWarning,
+        ModelError as ModelError,
+        ResultError as ResultError,
+        StoreError as StoreError,
+        UsageError as UsageError,
+    )
+    from .exporters.environment import Environment as Environment, doctor as doctor
+    from .exporters.export import Export as Export, export as export, export_codes as export_codes
     from .inverse.calibrate import calibrate as calibrate
-    from .inverse.solve import solve as solve
-    from .inverse.timestep import timestep as timestep
+    from .inverse.solve import SolveResult as SolveResult, solve as solve
+    from .inverse.timestep import TimestepResult as TimestepResult, timestep as timestep
     from .plots.draw import plot as plot
     from .plots.explore import explore as explore
     from .plots.files import plot_to_files as plot_to_files
     from .progress_display import progress_bar as progress_bar
     from .reporting.page import report as report
-    from .results.citations import cite as cite
+    from .results.citations import Citations as Citations, cite as cite
     from .results.describe import describe as describe
-    from .results.estimate import estimate as estimate
+    from .results.estimate import Estimate as Estimate, estimate as estimate
     from .results.extend import extend as extend, extend_to_file as extend_to_file
     from .results.info import info as info
-    from .results.ranking import recommend as recommend
+    from .results.ranking import Ranking as Ranking, recommend as recommend
     from .results.shards import merge as merge, sweep_shard as sweep_shard
-    from .results.single_impact import run as run
+    from .results.single_impact import Impact as Impact, run as run
     from .results.sweep import sweep as sweep, sweep_to_file as sweep_to_file
     from .results.xarray_backend import expand as expand, load as load, save as save
     from .uncertainty.sensitivity import sensitivities as sensitivities, sensitivity as sensitivity
 
 # the module of each public name, which is imported on first use: `import impact` and `impact --help` need no numpy
 _MODULES = {
+    "Citations": "results.citations",
+    "ConfigError": "errors",
+    "Environment": "exporters.environment",
+    "Estimate": "results.estimate",
     "Evidence": "contact.evidence",
+    "Export": "exporters.export",
     "ForceModel": "contact.model",
+    "FrictionLaw": "contact.friction",
+    "Frictions": "engine.friction_catalogue",
+    "Impact": "results.single_impact",
     "ImpactError": "errors",
+    "ImpactWarning": "errors",
+    "ModelError": "errors",
+    "Models": "engine.model_catalogue",
     "Parameter": "contact.model",
+    "Ranking": "results.ranking",
+    "ResultError": "errors",
+    "SolveResult": "inverse.solve",
+    "StoreError": "errors",
+    "TimestepResult": "inverse.timestep",
+    "UsageError": "errors",
     "Verdict": "comparison.verdict",
     "bless": "comparison.bless",
     "calibrate": "inverse.calibrate",

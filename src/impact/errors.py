@@ -1,9 +1,10 @@
 """The exceptions of the program, all under one root.
 
     ImpactError
-    ├── ConfigError    the config of a sweep is invalid: all problems, one per line
+    ├── ConfigError    the config of a sweep is invalid: all problems, one per line; a ValueError
+    │   └── MissingFileError  a file that was named does not exist; a FileNotFoundError
     ├── ModelError     the definition of a contact force model is invalid
-    ├── UsageError     an argument does not fit the data or the file system
+    ├── UsageError     an argument does not fit the data or the file system; a ValueError
     ├── ResultError    a file is not a readable result
     ├── StoreError     the result could not be computed or stored; finished ranges are kept
     ├── InUseError     another process writes the output
@@ -16,14 +17,18 @@ exceptions to exit codes.
 
 from __future__ import annotations
 
+import sys
+import warnings
 from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
+from pathlib import Path
 from types import MappingProxyType
 
 from .formatting import escape_controls, safe_text
 
 # characters of a problem; a longer one is cut in its middle, since its end says what was expected
 MAX_PROBLEM = 2000
+PACKAGE = str(Path(__file__).parent)
 
 
 class ImpactError(Exception):
@@ -51,15 +56,19 @@ def _shorten(problem: str) -> str:
     return problem if len(problem) <= MAX_PROBLEM else f"{problem[:half]}…{problem[1 - half :]}"
 
 
-class ConfigError(ImpactError):
+class ConfigError(ImpactError, ValueError):
     """The config of a sweep is invalid; `problems` holds one line for each problem."""
+
+
+class MissingFileError(ConfigError, FileNotFoundError):
+    """A file that was named does not exist."""
 
 
 class ModelError(ImpactError):
     """The definition of a contact force model is invalid, or a model is not in the catalogue."""
 
 
-class UsageError(ImpactError):
+class UsageError(ImpactError, ValueError):
     """An argument does not fit the data or the file system: an unknown coordinate, an output that exists."""
 
 
@@ -77,6 +86,18 @@ class InUseError(ImpactError):
 
 class UnfinishedError(ImpactError):
     """A sweep was stopped; the message contains the finished work that is kept."""
+
+
+class ImpactWarning(UserWarning):
+    """An input or a result is probably not what was intended."""
+
+
+def warn(text: str) -> None:
+    """Warn at the line outside of this package that called it."""
+    frame, level = sys._getframe(1), 2
+    while frame.f_back is not None and frame.f_code.co_filename.startswith(PACKAGE):
+        frame, level = frame.f_back, level + 1
+    warnings.warn(escape_controls(text), ImpactWarning, stacklevel=level)
 
 
 class Interruption(BaseException):

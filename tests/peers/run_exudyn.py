@@ -29,6 +29,7 @@ def collide(
     mbs.Assemble()
     settings = exudyn.SimulationSettings()
     settings.solution.file.write = False
+    settings.timeIntegration.minimumStepSize = 1e-6 * step
     settings.timeIntegration.numberOfSteps = count
     settings.timeIntegration.endTime = count * step
     mbs.SolveDynamic(settings, solverType=getattr(exudyn.DynamicSolverType, solver))

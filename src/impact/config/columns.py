@@ -11,8 +11,9 @@ import io
 import math
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from difflib import get_close_matches
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
@@ -24,17 +25,47 @@ from ..errors import ConfigError, did_you_mean
 from ..formatting import safe_text
 from .draft import Draft
 from .files import as_table, read_text, set_value
-from .input_names import InputName, input_values
-from .quantities import MAX_PROBLEMS, ConfigProblem, KeyPath, Quantity, UnitError, as_text, mismatch_error
+from .input_names import SWEEP_INPUTS, InputName, input_values
+from .quantities import (
+    DECIMALS,
+    MAX_PROBLEMS,
+    SEPARATORS,
+    ConfigProblem,
+    KeyPath,
+    Quantity,
+    UnitError,
+    as_text,
+    is_unit,
+    mismatch_error,
+)
+from .tables import LABORATORY
 
 MAX_CSV_BYTES = 2_000_000  # size of a CSV file, whose values a result stores
-COLUMN_HEADER = re.compile(r"\s*(.*?)\s*(?:\[\s*(.*?)\s*\])?\s*", re.DOTALL)
-ROUND_BRACKETS = re.compile(r"(.*\S)\s*\(\s*(.*?)\s*\)", re.DOTALL)
+SQUARE_BRACKETS, ROUND_BRACKETS = (
+    re.compile(rf"(.*?)\s*{ends}", re.DOTALL) for ends in (r"\[(.*)\]", r"\((.*)\)")
+)
+# a cell of a number with each decimal sign, which may have a unit; and one whose comma may separate thousands
+NUMBER_WITH = {
+    sign: re.compile(rf"[-+]?[0-9]*[{sign}][0-9]+(?:[eE][-+]?[0-9]+)?(?:\s*[^\s0-9.,].*)?") for sign in DECIMALS
+}
+THOUSANDS = re.compile(r"[-+]?[1-9][0-9]{0,2}(?:,[0-9]{3})+")
+# keys of a table that names a file of cases
+FILE_KEYS = {"file", "separator", "decimal"}
+# what cells without a value contain
+MISSING = ("", "na", "n/a", "nan", "none", "null", "<na>")
 
 # the quantity of a column by its name, None for names of materials; KeyError for an unknown name
 QuantityOf = Callable[[str], Quantity | None]
 # values in SI units or names of materials, and problems: the index of a cell and a message
 Cells = tuple[list[float | str], list[tuple[int, str]]]
+
+
+@dataclass(frozen=True)
+class CsvForm:
+    """How a CSV file is written; what is empty is recognised."""
+
+    separator: str = ""
+    decimal: str = ""
 
 
 @dataclass(frozen=True)
@@ -56,6 +87,25 @@ class Columns:
         line = self.header if row is None else self.lines[row]
         place = f"{self.source}:{line}" if line else self.source
         return ": ".join(part for part in (place, safe_text(column, 60), message) if part)
+
+    def take(self, rows: Sequence[int]) -> Columns:
+        """Keep some rows."""
+        cells = {name: [column[row] for row in rows] for name, column in self.cells.items()}
+        return replace(self, lines=[self.lines[row] for row in rows], cells=cells)
+
+    def find(self, text: str) -> tuple[str, str]:
+        """Find a column by its name, with or without a unit; also returns the unit, which its header may lack."""
+        unit = ""
+        name = text if text in self.cells else ""
+        if not name:
+            name, unit = split_header(text)
+        if name not in self.cells:
+            hint = f"; {did_you_mean(text, list(self.cells))}" if self.is_known else ""
+            raise ConfigError(self.problem(f"got {as_text(text)}, expected one of its columns{hint}"))
+        own = self.units.get(name, "")
+        if unit and own and unit != own:
+            raise ConfigError(self.problem(f"got {as_text(text)}, expected [{safe_text(own)}] as in its header"))
+        return name, own or unit
 
     def read(
         self, column: str, quantity: Quantity | None, n: float | None, unit: str = ""
@@ -82,17 +132,26 @@ class Columns:
 def read_cells(
     cells: Iterable[object], quantity: Quantity | None, n: float | None, unit: str = "", *, is_text: bool = False
 ) -> Cells:
-    """Convert cells to SI units or to names of materials; text without a unit is a number only with `is_text`."""
+    """Convert cells to SI units or to names of materials; text without a unit is a number only with `is_text`.
+
+    Cells that are wrong for one reason are one problem, that of the first.
+    """
     values: list[float | str] = []
-    problems: list[tuple[int, str]] = []
+    problems: dict[str, tuple[int, str]] = {}
+    others: Counter[str] = Counter()
     for index, cell in enumerate(cells):
         try:
             values.append(_read_cell(cell, quantity, n, unit, is_text=is_text))
         except PydanticCustomError as error:
-            problems.append((index, error.message()))
-            if len(problems) >= MAX_PROBLEMS:
-                break
-    return values, problems
+            reason = error.message().partition(", expected ")[2] or error.message()
+            others[reason] += reason in problems
+            problems.setdefault(reason, (index, error.message()))
+    return values, [(index, message + also(others[reason])) for reason, (index, message) in problems.items()]
+
+
+def also(count: int) -> str:
+    """End a message about a row that stands for others."""
+    return f"; also in {count} other row{'s' * (count > 1)}" if count else ""
 
 
 def _read_cell(
@@ -127,53 +186,159 @@ def unit_expected(quantity: Quantity | None, unit: str, n: float | None = math.n
     return ""
 
 
-def read_csv(path: Path, quantity_of: QuantityOf, *, with_any_names: bool = False) -> Columns:
-    """Read the columns of a CSV file, whose first line has their names, some of them known, and their units."""
-    reader = csv.reader(io.StringIO(read_text(path, "CSV", MAX_CSV_BYTES), newline=""), strict=True)
-    try:
-        numbered = [(reader.line_num, row) for row in reader if row]
-    except csv.Error as error:
-        raise ConfigError(f"{path}:{reader.line_num}: not CSV: {error}") from None
+def read_csv(
+    path: Path, quantity_of: QuantityOf, *, form: CsvForm = CsvForm(), wanted: Collection[str] | None = None
+) -> Columns:
+    """Read the columns of a CSV file, whose first line has their names and their units.
+
+    Parameters
+    ----------
+    path : the file, in UTF-8; blank lines, and lines that begin with #, have no meaning
+    quantity_of : some names are known to it, unless `wanted` is given
+    form : the separator and the decimal sign; those that it leaves open are recognised
+    wanted : further names that are looked for
+
+    Raises
+    ------
+    ConfigError : the file cannot be read, is no CSV, or may be read in two ways; with nothing of the content of a
+        file in which no name is known
+    """
+    text = io.StringIO(read_text(path, "CSV", MAX_CSV_BYTES), newline=None)
+    numbered = [(n, line) for n, line in enumerate(text, 1) if line.strip() and not line.lstrip().startswith("#")]
+    # a line that Excel understands
+    separator = re.fullmatch(r"sep=([,;\t])\s*", numbered[0][1]) if numbered else None
+    if separator is not None:
+        form, numbered = replace(form, separator=form.separator or separator[1]), numbered[1:]
     if len(numbered) < 2:
         raise ConfigError(
             f"{path}: got {len(numbered)} lines, expected a line of names and at least one of values"
         )
-    (first, headers), *numbered = numbered
-    rows, header = dict(numbered), f"{path}:{first}"
-    if headers[0].lstrip().startswith("#"):
-        raise ConfigError(f"{header}: got a comment, expected the names of the columns")
-    separator = next((mark for mark in ";\t" if mark in headers[0]), "")
-    if len(headers) == 1 and separator:
-        got = f'columns separated by {as_text(separator)}, expected ","'
-        raise ConfigError(f"{header}: got {got}, and a point in numbers, such as 0.5")
+    looked_for = {split_header(name)[0] for name in wanted or ()} | {*(wanted or ())}
+
+    def is_looked_for(header: str) -> bool:
+        name, _ = split_header(header)
+        return name in looked_for or header in looked_for or _is_known(name, quantity_of)
+
+    mark = form.separator or _find_separator(path, numbered, is_looked_for)
+    try:
+        rows = _split(numbered, mark)
+    except csv.Error as error:
+        raise ConfigError(f"{path}:{error}") from None
+    (first, headers), *_ = rows.items()
+    del rows[first]
     names = [split_header(text) for text in headers]
-    with_square_brackets = {name: _with_square_brackets(name, quantity_of) for name, _ in names}
-    is_known = any(_is_known(name, quantity_of) or with_square_brackets[name] for name, _ in names)
-    if not (is_known or with_any_names):
+    is_known = any(_is_known(name, quantity_of) for name, _ in names)
+    if not is_known and wanted is None:
         expected = "names of inputs or outputs, such as v1 [m/s] or e_out"
-        raise ConfigError(f"{header}: got no known column, expected {expected}")
-    problems = [
-        f"{header}: {safe_text(name, 60)}: got round brackets, expected {as_text(expected)}"
-        for name, expected in with_square_brackets.items()
-        if expected
-    ]
-    for name, count in Counter(name for name, _ in names).items():
+        raise ConfigError(f"{path}:{first}: got no known column, expected {expected}")
+    problems = _length_problems(path, rows, len(headers), mark)
+    for name, count in Counter(name for name, _ in names if name).items():
         if count > 1:
             got = f"{as_text(name) if is_known else 'a name'} {'twice' if count == 2 else f'{count} times'}"
-            problems.append(f"{header}: got {got}, expected each column once")
-    problems += _length_problems(path, rows, len(headers))
+            problems.append(f"{path}:{first}: got {got}, expected each column once")
     if problems:
         raise ConfigError(*problems[:MAX_PROBLEMS])
-    columns = zip(*rows.values(), strict=True)
-    cells = {name: [cell.strip() for cell in column] for (name, _), column in zip(names, columns, strict=True)}
-    return Columns(str(path), first, list(rows), dict(names), cells, is_known)
+    units, cells = {}, {}
+    for position, ((name, unit), column) in enumerate(
+        zip(names, zip(*rows.values(), strict=True), strict=True), 1
+    ):
+        # a column without a name and values is that of a separator at the end of each line
+        if name or any(column):
+            label = name or f"column {position}"
+            units[label], cells[label] = unit, list(column)
+    columns = Columns(str(path), first, list(rows), units, cells, is_known)
+    return _with_decimal_points(columns, form.decimal, [name for name in units if is_looked_for(name)])
+
+
+def _split(numbered: Sequence[tuple[int, str]], separator: str) -> dict[int, list[str]]:
+    """Split lines into cells, by the number of the line; a csv.Error begins with it."""
+    reader = csv.reader(
+        (line for _, line in numbered), delimiter=separator, strict=True, skipinitialspace=separator != "\t"
+    )
+    rows = {}
+    try:
+        for row in reader:
+            rows[numbered[reader.line_num - 1][0]] = [cell.strip() for cell in row]
+        return rows
+    except csv.Error as error:
+        raise csv.Error(f"{numbered[reader.line_num - 1][0]}: not CSV: {error}") from None
+
+
+def _find_separator(path: Path, numbered: Sequence[tuple[int, str]], is_looked_for: Callable[[str], bool]) -> str:
+    """Recognise the separator by the header: it separates all rows alike, and names that are looked for."""
+    readings: dict[str, list[list[str]]] = {}
+    errors: list[str] = []
+    for mark in SEPARATORS:
+        try:
+            readings[mark] = list(_split(numbered, mark).values())
+        except csv.Error as error:
+            errors.append(f"{path}:{error}")
+    readings = {mark: rows for mark, rows in readings.items() if len(rows[0]) > 1}
+    if errors and not readings:
+        raise ConfigError(errors[0])
+    regular = {mark: rows for mark, rows in readings.items() if len({*map(len, rows)}) == 1} or readings
+    readings = {mark: rows for mark, rows in regular.items() if any(map(is_looked_for, rows[0]))} or regular
+    if len(readings) > 1 and any(is_looked_for(header) for rows in readings.values() for header in rows[0]):
+        each = " or ".join(f"by {as_text(mark)} into {len(rows[0])}" for mark, rows in readings.items())
+        choice = " or ".join(f"separator = {as_text(mark)}" for mark in readings)
+        raise ConfigError(
+            f"{path}:{numbered[0][0]}: got columns separated {each}, expected one; {choice} settles it"
+        )
+    # a file of one column has none
+    return next(iter(readings), ";")
+
+
+def _with_decimal_points(columns: Columns, decimal: str, looked_for: Sequence[str]) -> Columns:
+    """Write decimal commas as points; the sign is that of all numbers, else of those that are looked for."""
+    signs: dict[str, list[tuple[int, str]]] = {}
+    for names in [looked_for] if decimal else [list(columns.cells), looked_for]:
+        signs = {}
+        for sign, pattern in NUMBER_WITH.items():
+            cells = [
+                (columns.lines[i], cell)
+                for name in names
+                for i, cell in enumerate(map(str, columns.cells[name]))
+                if pattern.fullmatch(cell)
+            ]
+            if cells:
+                signs[sign] = cells
+        if len(signs) == 1:
+            break
+    places = {sign: f"{columns.source}:{cells[0][0]}" for sign, cells in signs.items()}
+    if not decimal and len(signs) > 1:
+        got = f"got a decimal comma, and a point in line {signs['.'][0][0]}, expected one of them"
+        raise ConfigError(f'{places[","]}: {got}; decimal = "," or decimal = "." settles it')
+    for sign in signs:
+        if decimal and sign != decimal:
+            raise ConfigError(f"{places[sign]}: got a number with {as_text(sign)}, expected {as_text(decimal)}")
+    if not decimal and "," in signs and all(THOUSANDS.fullmatch(cell) for _, cell in signs[","]):
+        cell = signs[","][0][1] if columns.is_known else "a comma in a number"
+        got = f"got {cell}, which may be decimal or separate thousands"
+        raise ConfigError(f'{places[","]}: {got}; decimal = "," settles it, or numbers without commas')
+    if "," not in signs:
+        return columns
+    comma = NUMBER_WITH[","]
+    with_points = {
+        name: [cell.replace(",", ".", 1) if comma.fullmatch(cell) else cell for cell in map(str, column)]
+        for name, column in columns.cells.items()
+    }
+    return replace(columns, cells=with_points)
 
 
 def split_header(text: str) -> tuple[str, str]:
-    """Split the header of a column, such as "v1 [mm/s]", into its name and its unit."""
-    match = COLUMN_HEADER.fullmatch(text)
-    assert match is not None, "any text matches"
-    return match[1], match[2] or ""
+    """Split a header into a name and a unit, which is in square brackets, or in round ones if it is a known one.
+
+    >>> split_header("v1 [mm/s]"), split_header("v1 (cm/s)"), split_header("e (mean)"), split_header("e_out [-]")
+    (('v1', 'mm/s'), ('v1', 'cm/s'), ('e (mean)', ''), ('e_out', ''))
+    """
+    text = text.strip()
+    match = SQUARE_BRACKETS.fullmatch(text) or ROUND_BRACKETS.fullmatch(text)
+    unit = match[2].strip() if match else ""
+    if match is None or not match[1] or (text.endswith(")") and unit != "-" and not is_unit(unit)):
+        return text, ""
+    if unit.lower() in ("%", "percent", "per cent", "pct"):
+        unit = "%"
+    return match[1], "" if unit in ("-", "1") else unit
 
 
 def _is_known(column: str, quantity_of: QuantityOf) -> bool:
@@ -184,49 +349,92 @@ def _is_known(column: str, quantity_of: QuantityOf) -> bool:
     return True
 
 
-def _with_square_brackets(column: str, quantity_of: QuantityOf) -> str:
-    """Put the unit of a header in square brackets, if it is in round ones and the name is known; else empty."""
-    match = ROUND_BRACKETS.fullmatch(column)
-    if match is None or not _is_known(match[1], quantity_of):
+def near_miss(header: str, known: Iterable[str]) -> str:
+    """Find the known name that a header seems to mean; empty for none.
+
+    >>> known = ["sigma", "m2", "e_out", "e"]
+    >>> near_miss("simga", known), near_miss("m2_", known), near_miss("E", known), near_miss("remark", known)
+    ('sigma', 'm2', '', '')
+    """
+    plain = {_letters(name): name for name in known}
+    letters = _letters(header)
+    # a single letter means many things
+    if len(letters) < 2:
         return ""
-    quantity, unit = quantity_of(match[1]), match[2]
-    return f"{match[1]} [{quantity.unit if quantity is not None and unit_expected(quantity, unit) else unit}]"
+    close = get_close_matches(letters[:64], [name for name in plain if len(name) > 3], n=1, cutoff=0.8)
+    return plain.get(letters) or (plain[close[0]] if close else "")
 
 
-def _length_problems(path: Path, rows: Mapping[int, Sequence[str]], n_columns: int) -> list[str]:
-    """List each wrong number of values in a row, with its first line, and each comment."""
-    expected = f"expected {n_columns}, one for each column"
-    problems: list[str] = []
+def _letters(header: str) -> str:
+    return re.sub(r"[^a-z0-9]", "", re.sub(r"[(\[].*", "", header).lower())
+
+
+def complete_rows(
+    columns: Columns, names: Iterable[str], *, refuse: bool = False
+) -> tuple[list[int], str, list[tuple[str, int, str]]]:
+    """Find the rows in which each column has a value.
+
+    Returns them, a note that counts the others, and problems: column, row and message. The others are problems
+    with `refuse`, or if there is no complete row.
+    """
+    empty = {
+        name: [row for row, cell in enumerate(columns.cells[name]) if str(cell).strip().lower() in MISSING]
+        for name in names
+    }
+    empty = {name: rows for name, rows in empty.items() if rows}
+    left_out = {row for rows in empty.values() for row in rows}
+    rows, total = [row for row in range(len(columns.lines)) if row not in left_out], len(columns.lines)
+    if left_out and (refuse or not rows):
+        expected = "expected a value" + ("" if refuse else " in each column of at least one row")
+        return rows, "", [(name, r[0], f"got nothing, {expected}{also(len(r) - 1)}") for name, r in empty.items()]
+    counts = [f"{len(r)} {'has' if len(r) == 1 else 'have'} no {name}" for name, r in empty.items()]
+    note = ", ".join(counts).replace(" ha", f" of {total} rows ha", 1)
+    return rows, f"{note}: left out" if note else "", []
+
+
+def _length_problems(path: Path, rows: Mapping[int, Sequence[str]], n_columns: int, separator: str) -> list[str]:
+    """List each wrong number of values in a row, with its first line."""
     lines_by_length: dict[int, list[int]] = {}
     for line, row in rows.items():
-        if len(row) != n_columns and row[0].lstrip().startswith("#"):
-            problems.append(f"{path}:{line}: got a comment, {expected.replace(',', ' values,')}")
-        elif len(row) != n_columns:
+        if len(row) != n_columns:
             lines_by_length.setdefault(len(row), []).append(line)
-    for n_values, (line, *others) in lines_by_length.items():
-        also = f"; also on {len(others)} other line{'s' * (len(others) > 1)}" if others else ""
-        problems.append(f"{path}:{line}: got {n_values} values, {expected}{also}")
-    return problems
+    hint = "; a decimal comma needs another separator, or quotes" if separator == "," else ""
+    return [
+        f"{path}:{line}: got {n_values} values, expected {n_columns}, one for each column{also(len(others))}"
+        + (hint if n_values > n_columns else "")
+        for n_values, (line, *others) in lines_by_length.items()
+    ]
 
 
 def columns_of_table(table: Any, source: str) -> Columns:
-    """Take the columns of a DataFrame, or of a dataset of xarray, whose units are attributes."""
+    """Take the columns of a mapping, a DataFrame, or a dataset of xarray, whose units are attributes."""
     units: dict[str, str] = {}
     if hasattr(table, "data_vars"):
         units = {str(name): str(variable.attrs.get("units", "")) for name, variable in table.variables.items()}
         table = table.to_dataframe().reset_index()
-    cells = {split_header(str(header)): values.tolist() for header, values in table.items()}
+    cells = {
+        split_header(str(header)): getattr(values, "tolist", lambda v=values: v)()
+        for header, values in table.items()
+    }
+    names = [name for name, _ in cells]
+    twice = next((name for name, count in Counter(names).items() if count > 1), None)
+    if twice is not None:
+        raise ConfigError(
+            ": ".join(part for part in (source, f"got {as_text(twice)} twice, expected each column once") if part)
+        )
     return Columns(
         source,
         0,
-        range(1, len(table) + 1),
+        range(1, max(map(len, cells.values()), default=0) + 1),
         {name: unit or units.get(name, "") for name, unit in cells},
         {name: values for (name, _), values in cells.items()},
         is_text=False,
     )
 
 
-def read_csv_of(draft: Draft, file: str, *, with_any_names: bool = False) -> Columns:
+def read_csv_of(
+    draft: Draft, file: str, form: CsvForm = CsvForm(), wanted: Collection[str] | None = None
+) -> Columns:
     """Read a CSV file that a config names."""
     if draft.folder is None:
         raise ConfigError(f"{file}: not read; a stored config contains values, not file names")
@@ -234,45 +442,54 @@ def read_csv_of(draft: Draft, file: str, *, with_any_names: bool = False) -> Col
     def quantity_of(name: str) -> Quantity | None:
         if name in OUTPUTS:
             return Quantity(OUTPUTS[name].unit, "")
+        if name in LABORATORY:
+            return LABORATORY[name][0]
         return InputName.parse(name).quantity(draft.known_models)
 
-    return read_csv(draft.folder / file, quantity_of, with_any_names=with_any_names)
+    return read_csv(draft.folder / file, quantity_of, form=form, wanted=wanted)
 
 
-def read_files(draft: Draft) -> tuple[dict[KeyPath, object], list[str]]:
-    """Read the CSV files of cases and of single columns: the values that replace their names, and problems."""
+def csv_form(table: Mapping[Any, Any]) -> CsvForm:
+    """Read the keys `separator` and `decimal`; those that are wrong are reported with the others."""
+    separator, decimal = table.get("separator"), table.get("decimal")
+    return CsvForm(separator if separator in SEPARATORS else "", decimal if decimal in DECIMALS else "")
+
+
+def read_files(draft: Draft) -> tuple[dict[KeyPath, object], list[str], list[str]]:
+    """Read the CSV files of cases and of single columns: the values that replace their names, problems, notes.
+
+    Every column of cases is an input, and every cell has a value: a point that is left out would be another sweep.
+    """
     open_csv = cache(partial(read_csv_of, draft))
     values: dict[KeyPath, object] = {}
     problems: list[str] = []
-    cases = draft.table("sweep").get("cases")
+    cases, form = draft.table("sweep").get("cases"), CsvForm()
+    table = as_table(cases)
+    if isinstance(table.get("file"), str) and table.keys() <= FILE_KEYS:
+        cases, form = table["file"], csv_form(table)
     if isinstance(cases, str):
         try:
-            values["sweep", "cases"] = _read_cases(open_csv(cases), draft)
+            values["sweep", "cases"] = _read_cases(open_csv(cases, form), draft)
         except ConfigError as error:
             problems += error.problems
-    for name, file, column in _file_columns(draft.data):
+    for name, file, column, form in _file_columns(draft.data):
         try:
-            columns = open_csv(file, with_any_names=True)
-            found = _find_column(columns, column if column is not None else str(name), is_only=column is None)
-            list_of_values = columns.values(found, name.quantity(draft.known_models), draft.exponent)
+            columns = open_csv(file, form, () if column is None else (column,))
+            found, unit = _find_column(columns, str(name) if column is None else column, is_only=column is None)
+            list_of_values = columns.values(found, name.quantity(draft.known_models), draft.exponent, unit)
             values[name.path] = list_of_values if column is not None else {"empirical": list_of_values}
         except ConfigError as error:
             problems += error.problems
         except KeyError:
             continue  # an unknown key is reported with the others
-    return values, list(dict.fromkeys(problems))
+    return values, list(dict.fromkeys(problems)), []
 
 
-def _find_column(columns: Columns, name: str, *, is_only: bool) -> str:
+def _find_column(columns: Columns, name: str, *, is_only: bool) -> tuple[str, str]:
     """Find a column by its name; with `is_only`, the single column of a file may have any name."""
     if is_only and len(columns.units) == 1:
-        return next(iter(columns.units))
-    if name in columns.units:
-        return name
-    hint = f"; {did_you_mean(name, list(columns.units))}" if columns.is_known else ""
-    if any(header.startswith(f"{name} (") for header in columns.units):
-        hint = f'; a unit is in square brackets: "{safe_text(name, 60)} [UNIT]"'
-    raise ConfigError(columns.problem(f"got {as_text(name)}, expected one of its columns{hint}"))
+        return next(iter(columns.units.items()))
+    return columns.find(name)
 
 
 def _read_cases(columns: Columns, draft: Draft) -> dict[str, list[float | str]]:
@@ -287,26 +504,29 @@ def _read_cases(columns: Columns, draft: Draft) -> dict[str, list[float | str]]:
         except ConfigError as error:
             problems += error.problems
         except KeyError:
-            problems.append(columns.problem(InputName.parse(name).unknown_message(draft.known_models), name))
+            meant = near_miss(name, SWEEP_INPUTS)
+            unknown = InputName.parse(name).unknown_message(draft.known_models)
+            problems.append(columns.problem(f'no such input; did you mean "{meant}"?' if meant else unknown, name))
     if problems:
         raise ConfigError(*problems)
     return values
 
 
-def _file_columns(data: Mapping[str, Any]) -> Iterator[tuple[InputName, str, str | None]]:
-    """Yield name, file and column of every `{ file = ..., column = ... }` and `{ empirical = file }`."""
+def _file_columns(data: Mapping[str, Any]) -> Iterator[tuple[InputName, str, str | None, CsvForm]]:
+    """Yield name, file, column and form of every `{ file = ..., column = ... }` and `{ empirical = file }`."""
     for name, reference in input_values(data):
         match reference:
-            case {"file": str(file), "column": str(column), **others} if not others:
-                yield name, file, column
+            case {"file": str(file), "column": str(column), **others} if others.keys() <= FILE_KEYS:
+                yield name, file, column, csv_form(others)
             case {"empirical": str(file), **others} if not others:
-                yield name, file, None
+                yield name, file, None, CsvForm()
 
 
 def named_files(data: Mapping[str, Any]) -> list[str]:
     """List the names of all CSV files in the plain data of a config."""
-    names = [as_table(data.get("sweep")).get("cases"), as_table(data.get("data")).get("file")]
-    names += [file for _, file, _ in _file_columns(data)]
+    cases = as_table(data.get("sweep")).get("cases")
+    names = [as_table(cases).get("file", cases), as_table(data.get("data")).get("file")]
+    names += [file for _, file, _, _ in _file_columns(data)]
     return list(dict.fromkeys(name for name in names if isinstance(name, str)))
 
 

@@ -18,7 +18,7 @@ from pydantic_core import PydanticCustomError
 from ..contact.friction import FrictionLaw
 from ..contact.model import ForceModel
 from ..contact.models import catalogue
-from ..errors import ConfigError
+from ..errors import ConfigError, UsageError
 from ..formatting import safe_text
 from .files import (
     as_table,
@@ -66,6 +66,17 @@ class Setting:
         return self.text or override_text(self.path, to_plain_data(self.value)[0])
 
 
+def settings_of(overrides: str | Iterable[str] | Mapping[str, object]) -> list[Setting]:
+    """Read changes of a config: texts PATH=VALUE, or values by path.
+
+    >>> [setting.override for setting in settings_of({"sweep.e": [0.5, 1.0], "models": "hertz"})]
+    ['sweep.e=[0.5, 1.0]', 'models="hertz"']
+    """
+    if isinstance(overrides, Mapping):
+        return [Setting(read_override(f"{path}=")[0], value, f"--set {path}") for path, value in overrides.items()]
+    return [Setting.parse(text) for text in ([overrides] if isinstance(overrides, str) else overrides)]
+
+
 @dataclass(frozen=True)
 class Measurements:
     """Measured points, in SI."""
@@ -100,6 +111,7 @@ class Draft:
     measurements: Measurements | None = None
     problems: tuple[ConfigProblem, ...] = ()
     lines: tuple[str, ...] = ()  # complete messages about settings and files
+    notes: tuple[str, ...] = ()  # on what is left out
 
     def table(self, name: str) -> dict[str, Any]:
         """Return a table of the config, or an empty one."""
@@ -227,6 +239,10 @@ def _library_setting(name: str, without: Iterable[str] = ()) -> Setting:
 def open_config(source: Path | Mapping[str, object], plugins: Sequence[ForceModel] = ()) -> Draft:
     """Open the config of a TOML file or a mapping, in which names of files are relative to its folder."""
     if not isinstance(source, Mapping):
+        if not isinstance(source, str | Path):
+            raise UsageError(
+                f"source: got a {type(source).__name__}, expected a mapping, or the name of a TOML file"
+            )
         path = Path(source)
         return replace(open_text(read_text(path), str(path), plugins), folder=path.parent)
     data, problems = to_plain_data(source)

@@ -6,12 +6,14 @@ import json
 import re
 import tomllib
 from collections.abc import Callable, Mapping
+from decimal import Decimal
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..errors import ConfigError
+from ..errors import ConfigError, MissingFileError
 from ..formatting import safe_text
 from .lines import BARE_KEY
 from .quantities import ConfigProblem, KeyPath, as_text
@@ -55,7 +57,8 @@ def read_text(path: Path, kind: str = "TOML", most: int = MAX_CONFIG_BYTES) -> s
             content = file.read(most + 1)
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise ConfigError(f"{name}: cannot be read: {reason}") from None
+        kind_of_error = MissingFileError if isinstance(error, FileNotFoundError) else ConfigError
+        raise kind_of_error(f"{name}: cannot be read: {reason}") from None
     if content.startswith(RESULT_MAGIC):
         raise ConfigError(f"{name}: {file_hint(path, content)}")
     if len(content) > most:
@@ -64,7 +67,8 @@ def read_text(path: Path, kind: str = "TOML", most: int = MAX_CONFIG_BYTES) -> s
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
-        raise ConfigError(f"{name}:{line}: not UTF-8: byte 0x{content[error.start]:02x}") from None
+        hint = "; save it as UTF-8" if kind == "CSV" else ""
+        raise ConfigError(f"{name}:{line}: not UTF-8: byte 0x{content[error.start]:02x}{hint}") from None
 
 
 def parse_document(text: str, name: str) -> Any:
@@ -108,7 +112,7 @@ def _syntax_error_line(text: str, language: str, message: str) -> str:
     return f"{line}: not {language}: {reason}" + (f": {shown}" if shown else "")
 
 
-def to_plain_data(value: object, path: KeyPath = ()) -> tuple[Any, list[ConfigProblem]]:
+def to_plain_data(value: Any, path: KeyPath = ()) -> tuple[Any, list[ConfigProblem]]:
     """Convert a value to dicts, lists and Python numbers; list invalid text and too many levels as problems.
 
     >>> to_plain_data({"e": np.linspace(0, 1, 3), "m2": (1, np.float64(2))})
@@ -116,8 +120,7 @@ def to_plain_data(value: object, path: KeyPath = ()) -> tuple[Any, list[ConfigPr
     """
     if type(value) in (float, int, bool):
         return value, []
-    if isinstance(value, np.ndarray | np.generic):
-        value = value.tolist()
+    value = _from_library(value)
     if isinstance(value, str) and not _is_storable(value):
         return value, [(path, f"got {as_text(value)}, expected text without NUL and lone surrogates")]
     if not isinstance(value, Mapping | list | tuple):
@@ -142,6 +145,32 @@ def to_plain_data(value: object, path: KeyPath = ()) -> tuple[Any, list[ConfigPr
             table[key], element_problems = to_plain_data(element, (*path, key))
             problems += element_problems
     return table, problems
+
+
+def _from_library(value: Any) -> object:
+    """Convert a value of numpy, pandas, xarray or pint to numbers, texts and lists; others are unchanged.
+
+    The libraries are not imported: pandas and pint are needed only where a value is theirs.
+
+    >>> from fractions import Fraction
+    >>> [_from_library(value) for value in (np.arange(2.0), range(1, 3), Fraction(1, 2))]
+    [[0.0, 1.0], [1, 2], 0.5]
+    """
+    if hasattr(value, "magnitude") and hasattr(value, "units"):
+        number, unit = _from_library(value.magnitude), str(value.units)
+        if unit == "dimensionless":
+            return number
+        return [f"{each!r} {unit}" for each in number] if isinstance(number, list) else f"{number!r} {unit}"
+    if hasattr(value, "iloc") and hasattr(value, "columns"):
+        return value.to_dict("list")
+    if not isinstance(value, str | Mapping) and hasattr(value, "values") and hasattr(value, "dtype"):
+        # a series, an index or a data array
+        value = value.values
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    if isinstance(value, range):
+        return list(value)
+    return float(value) if isinstance(value, Fraction | Decimal) else value
 
 
 def _is_storable(text: str) -> bool:

@@ -20,7 +20,7 @@ from ..contact.variables import OUTPUTS, default_variables
 from . import measurements, quantities, tables
 from .columns import expand_cases, named_files, read_files
 from .design import design_problems, distribution_paths, draw_columns, unit_samples
-from .draft import Draft, Measurements, Setting, add_library_materials, open_config, open_text
+from .draft import Draft, Measurements, Setting, add_library_materials, open_config, open_text, settings_of
 from .files import as_table, override_text, set_value
 from .grid import MAX_POINTS, Axis, build_grid, chunk_problems
 from .input_names import InputName
@@ -57,6 +57,7 @@ class Config:
     distributions: Mapping[str, Distribution] = field(default_factory=dict)  # of the uncertain inputs
     files: tuple[Path, ...] = field(default=(), repr=False, compare=False)
     frictions: tuple[FrictionLaw, ...] = ()  # without one, impacts are central
+    notes: tuple[str, ...] = field(default=(), repr=False, compare=False)  # on what was left out of measurements
 
     @property
     def overrides(self) -> tuple[str, ...]:
@@ -80,7 +81,7 @@ def read_config(
     >>> read_config({"models": "hertz", "sweep": sweep, "materials": {"steel": steel}}).axes
     (Axis(columns={'e': (0.5, 1.0)}, numbered='', numbers=()),)
     """
-    draft = open_config(source, plugins).with_settings(map(Setting.parse, overrides))
+    draft = open_config(source, plugins).with_settings(settings_of(overrides))
     return build(draft, max_points, purpose)
 
 
@@ -96,7 +97,7 @@ def parse_config(
 
     No file is read, because the text may come from a result of unknown origin.
     """
-    draft = open_text(text, name, plugins).with_settings(map(Setting.parse, overrides))
+    draft = open_text(text, name, plugins).with_settings(settings_of(overrides))
     return build(draft, max_points, purpose)
 
 
@@ -163,6 +164,7 @@ def build(draft: Draft, max_points: int = MAX_POINTS, purpose: Purpose = "sweep"
         distributions=distributions,
         files=draft.files or (),
         frictions=tuple(draft.frictions),
+        notes=draft.notes,
     )
 
 
@@ -172,8 +174,8 @@ def inline_files(draft: Draft) -> Draft:
         return draft
     draft = replace(draft, files=tuple((draft.folder or Path()) / file for file in named_files(draft.data)))
     for read in (read_files, measurements.read_data_file):
-        values, lines = read(draft)
-        draft = replace(draft, lines=(*draft.lines, *lines))
+        values, lines, notes = read(draft)
+        draft = replace(draft, lines=(*draft.lines, *lines), notes=(*draft.notes, *notes))
         for path, value in values.items():
             setting = Setting(path, value, "", override_text(path, value))
             data, _ = set_value(draft.data, path, value)

@@ -2,26 +2,49 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
+import numpy as np
 from pydantic_core import PydanticCustomError
 
+from ..array_types import Array
 from ..contact.friction import FrictionLaw
 from ..contact.model import ForceModel, with_base_quantities
 from ..contact.variables import OUTPUTS
-from ..errors import ConfigError, did_you_mean
+from ..errors import ConfigError
 from ..formatting import number, safe_text
-from .columns import Cells, Columns, contains_path, read_cells, read_csv_of
+from .columns import (
+    Columns,
+    also,
+    columns_of_table,
+    complete_rows,
+    contains_path,
+    csv_form,
+    near_miss,
+    read_cells,
+    read_csv_of,
+    split_header,
+)
 from .draft import Draft, Measurements
-from .files import set_value
+from .files import as_table, set_value
 from .input_names import InputName, input_values
 from .quantities import MAX_PROBLEMS, ConfigProblem, KeyPath, Quantity, as_text, value_error
-from .tables import LOSSES, MAX_MEASURED, MIN_SIGMA, NOISES, SWEEP_QUANTITIES
+from .tables import (
+    GRAVITY,
+    LABORATORY,
+    LOSSES,
+    MAX_MEASURED,
+    MIN_SIGMA,
+    NOISES,
+    STANDARD_GRAVITY,
+    SWEEP_DEFAULTS,
+    SWEEP_QUANTITIES,
+)
 
 SIGMA, SPECIMEN = "sigma", "specimen"
-SPECIMEN_EXPECTED = "got nothing, expected the name of a specimen"
 # intervals of measured values; noise may move a fraction below 0 or above 1, but not farther than this
 _INTERVALS: dict[str, dict[str, Any]] = {
     "any": {"least": -MAX_MEASURED, "most": MAX_MEASURED},
@@ -39,10 +62,27 @@ MEASURED_OUTPUTS = {
 class _Column:
     """What a column of [data] holds."""
 
-    kind: Literal["input", "output", "sigma", "specimen"]
-    name: str  # of the input, of the output, or of the output whose standard deviations they are
+    kind: Literal["input", "output", "sigma", "specimen", "laboratory"]
+    name: str  # of what it holds; of standard deviations, of what they are those
     quantity: Quantity
     values: tuple[Any, ...] = ()  # in SI units, or names of specimens
+
+    @property
+    def header(self) -> str:
+        """Its name in [data]."""
+        return f"{SIGMA}_{self.name}" if self.kind == SIGMA else self.name
+
+
+@dataclass(frozen=True)
+class _Points:
+    """Measured points as they are stored."""
+
+    columns: tuple[_Column, ...] = ()
+    lines: tuple[int, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    def of_kind(self, kind: str) -> dict[str, tuple[Any, ...]]:
+        return {column.name: column.values for column in self.columns if column.kind == kind}
 
 
 # the header of a column, or "" for all together; the index of a cell, or None for the whole column; and a message
@@ -64,34 +104,158 @@ def purpose_problems(data: Mapping[str, Any]) -> list[ConfigProblem]:
     return [(path, f"got a fit, expected a value or an axis; {takes}") for path in fit_paths(data)][:1]
 
 
-def _read_columns(columns: Columns, draft: Draft) -> tuple[list[_Column], list[_Problem]]:
+def _read_columns(columns: Columns, draft: Draft) -> tuple[_Points, list[_Problem]]:
     """Read columns of a file, which are text and have units, or lists of a config, and report all problems."""
+    kinds, note, problems = _used_columns(columns, draft)
+    rows, count, gaps = complete_rows(columns, kinds, refuse=draft.table("data").get("missing") == "error")
+    if problems or gaps:
+        return _Points(), [*problems, *gaps]
+    complete = columns.take(rows)
+    n = None if any(column.name == "n" for column in kinds.values()) else draft.exponent
+    read: list[_Column] = []
+    for header, column in kinds.items():
+        # a standard deviation has the unit of what it is one of
+        unit = columns.units.get(header) or (columns.units.get(column.name, "") if column.kind == SIGMA else "")
+        values, found = _read_column(complete, column, header, unit, n)
+        problems += [(header, None if index is None else rows[index], message) for index, message in found]
+        read.append(replace(column, values=tuple(values)))
+    notes = tuple(f"{columns.source}: {text}".removeprefix(": ") for text in (count, note) if text)
+    points = _Points(tuple(read), tuple(complete.lines), notes)
+    if not problems and points.of_kind("laboratory"):
+        points = _with_derived(points, rows, _gravity(draft.table("data")))
+    return points, problems
+
+
+def _used_columns(columns: Columns, draft: Draft) -> tuple[dict[str, _Column], str, list[_Problem]]:
+    """Find what columns hold, by header; also returns a note of those without use, and problems."""
     kinds: dict[str, _Column] = {}
     problems: list[_Problem] = []
-    outputs = [header for header in columns.cells if header in MEASURED_OUTPUTS]
+    unused: list[str] = []
+    derived = {name: header for header in columns.cells for name in LABORATORY.get(header, (None, ()))[1]}
+    outputs = list(dict.fromkeys(name for name in (*columns.cells, *derived) if name in MEASURED_OUTPUTS))
     for header in columns.cells:
         try:
             column = _column_of(header, outputs, draft.known_models)
+            if column is None:
+                unused.append(safe_text(header, 60))
+                continue
             twin = next((key for key, c in kinds.items() if (c.kind, c.name) == (column.kind, column.name)), None)
             if twin is not None:
                 raise value_error(f"got a second column of {column.name}, next to {as_text(twin)}, expected one")
             kinds[header] = column
-            name = InputName.parse(column.name)
-            if column.kind == "input" and contains_path(draft.data, name.path):
-                raise value_error(f"set together with {name.config_key}, expected one of the two")
+            _check_conflict(column, derived, draft)
         except PydanticCustomError as error:
             problems.append((header, None, error.message()))
     if not outputs and not problems:
         problems.append(("", None, "got no column of an output, expected one, such as e_out or contact_time"))
-    n = None if any(column.name == "n" for column in kinds.values()) else draft.exponent
-    result: list[_Column] = []
-    for header, column in kinds.items():
-        # a standard deviation has the unit of its output
-        unit = columns.units.get(header) or (columns.units.get(column.name, "") if column.kind == "sigma" else "")
-        values, column_problems = _read_column(columns, column, header, unit, n)
-        problems += [(header, index, message) for index, message in column_problems]
-        result.append(replace(column, values=tuple(values)))
-    return result, problems
+    of_lab = [column.name for column in kinds.values() if column.kind == "laboratory"]
+    if of_lab:
+        problems += _laboratory_problems(of_lab, kinds, draft)
+    note = f"columns without use: {', '.join(unused[:MAX_PROBLEMS])}" if unused else ""
+    return kinds, note, problems
+
+
+def _check_conflict(column: _Column, derived: Mapping[str, str], draft: Draft) -> None:
+    """Check that what a column holds is given once; `derived` has what follows from heights and times."""
+    name = InputName.parse(column.name)
+    if column.kind == "input" and contains_path(draft.data, name.path):
+        hint = "; a measured restitution is e_out" if column.name == "e" else ""
+        raise value_error(f"set together with {name.config_key}, expected one of the two{hint}")
+    follows = LABORATORY[column.name][1] if column.kind == "laboratory" else ()
+    others = [derived[key] for key in follows if derived[key] != column.name]
+    others += [f"sweep.{key}" for key in ("v1", "speed") if "v1" in follows and key in draft.table("sweep")]
+    others += [derived[column.name]] if column.kind in ("input", "output") and column.name in derived else []
+    if others:
+        raise value_error(f"set together with {others[0]}, from which it follows, expected one of the two")
+
+
+def _laboratory_problems(of_lab: Sequence[str], kinds: Mapping[str, _Column], draft: Draft) -> Iterator[_Problem]:
+    """Check that heights and times are complete, and those of a ball on a body at rest."""
+    if "rebound_height" in of_lab and "drop_height" not in of_lab:
+        yield "rebound_height", None, "got no column drop_height, expected one next to it"
+    deviations = {column.name: header for header, column in kinds.items() if column.kind == SIGMA}
+    if "e_out" in deviations and not deviations.keys().isdisjoint(of_lab):
+        other = next(deviations[name] for name in of_lab if name in deviations)
+        yield deviations["e_out"], None, f"set together with {other}, expected one of the two"
+    for key, expected in (("m2", math.inf), ("v2", 0.0)):
+        value = draft.table("sweep").get(key, SWEEP_DEFAULTS.get(key))
+        try:
+            is_at_rest = SWEEP_QUANTITIES[key].read(value) == expected
+        except PydanticCustomError:
+            is_at_rest = False
+        if not is_at_rest or key in kinds:
+            got = f"got {key} = {'a column' if key in kinds else as_text(value)}, expected {key} = {expected:g}"
+            yield of_lab[0], None, f"{got} in [sweep]: heights and times are those of a ball on a body at rest"
+
+
+def _gravity(table: Mapping[str, Any]) -> float:
+    """Read the key g; the validation of [data] reports an invalid one."""
+    try:
+        return GRAVITY.read(table.get("g", STANDARD_GRAVITY))
+    except PydanticCustomError:
+        return STANDARD_GRAVITY
+
+
+def derive_impacts(
+    values: Mapping[str, Sequence[float]], rows: Sequence[int], specimens: Sequence[str], g: float
+) -> tuple[dict[str, list[float]], list[int]]:
+    """Compute velocities and restitutions of a ball that falls on a body at rest, from heights or times of flight.
+
+    Derived here, for a motion without drag. A drop from h1 and a rebound to h2: v1 = sqrt(2 g h1), e_out =
+    sqrt(h2/h1). Flights of t1 and t2 before and after an impact: v1 = g t1/2, e_out = t2/t1. Deviations are
+    propagated to first order.
+
+    Parameters
+    ----------
+    values : of each row [SI], by names of LABORATORY and, with the prefix `sigma_`, their standard deviations
+    rows : number of each row; flights in successive rows of one specimen are successive ones of one ball
+    specimens : of each row
+    g : acceleration of gravity [m/s^2]
+
+    Returns
+    -------
+    v1, e_out and sigma_e_out, as far as they follow, and the position of the row to which each value belongs
+
+    >>> derive_impacts({"flight_time": [0.5, 0.4, 0.32]}, [0, 1, 2], ["", "", ""], 10.0)
+    ({'v1': [2.5, 2.0], 'e_out': [0.8, 0.8]}, [0, 1])
+    """
+    before = after = list(range(len(rows)))
+    first, second, power = "drop_height", "rebound_height", 0.5
+    if "flight_time" in values:
+        first, second, power = "flight_time", "flight_time", 1.0
+        before = [i for i in before[:-1] if rows[i + 1] == rows[i] + 1 and specimens[i] == specimens[i + 1]]
+        after = [i + 1 for i in before]
+
+    def column(name: str, at: list[int]) -> Array:
+        return np.asarray(values[name], float)[at] if name in values else np.zeros(len(at))
+
+    start, end = column(first, before), column(second, after)
+    derived = {"v1": 0.5 * g * start if power == 1.0 else np.sqrt(2.0 * g * start)}
+    if second in values:
+        derived["e_out"] = (end / start) ** power
+        deviations = [f"{SIGMA}_{first}", f"{SIGMA}_{second}"]
+        if not values.keys().isdisjoint(deviations):
+            relative = np.hypot(column(deviations[0], before) / start, column(deviations[1], after) / end)
+            derived[f"{SIGMA}_e_out"] = power * derived["e_out"] * relative
+    return {name: array.tolist() for name, array in derived.items()}, before
+
+
+def _with_derived(points: _Points, rows: Sequence[int], g: float) -> _Points:
+    """Replace heights and times of flight by what follows from them."""
+    values = {column.header: column.values for column in points.columns if column.name in LABORATORY}
+    specimens = points.of_kind(SPECIMEN).get(SPECIMEN, ("",) * len(rows))
+    derived, kept = derive_impacts(values, rows, specimens, g)
+    columns = [_Column("input", "v1", SWEEP_QUANTITIES["v1"], tuple(derived["v1"]))]
+    if "e_out" in derived:
+        columns.append(_Column("output", "e_out", MEASURED_OUTPUTS["e_out"], tuple(derived["e_out"])))
+    if f"{SIGMA}_e_out" in derived:
+        columns.append(_Column("sigma", "e_out", _deviation("e_out"), tuple(derived[f"{SIGMA}_e_out"])))
+    columns += [
+        replace(column, values=tuple(column.values[i] for i in kept))
+        for column in points.columns
+        if column.name not in LABORATORY
+    ]
+    return replace(points, columns=tuple(columns), lines=tuple(points.lines[i] for i in kept))
 
 
 def _read_column(
@@ -100,32 +264,37 @@ def _read_column(
     """Read a column; problems have the index of a cell, or None for the header."""
     cells = columns.cells[header]
     if column.kind == SPECIMEN:
-        specimens = [cell if isinstance(cell, str) else number(cell) for cell in cells]
-        return specimens, [(index, SPECIMEN_EXPECTED) for index, name in enumerate(specimens) if not name]
-    si_unit = column.quantity.unit
-    if unit.lower() in ("%", "percent", "pct", "per cent"):
-        expected = f'a fraction: divide the column by 100 and write "{safe_text(header, 60)}"'
-        return (), [(None, f"got [{unit}], expected {expected}")]
-    if columns.is_text and not unit and si_unit != "1":
-        expected = f'one in brackets, such as "{safe_text(header, 60)} [{si_unit}]"'
-        return (), [(None, f"got no unit, expected {expected}")]
-    return _percent_problem(cells, column.quantity) or columns.read(header, column.quantity, n, unit)
+        return [cell if isinstance(cell, str) else number(cell) for cell in cells], []
+    si_unit, name = column.quantity.unit, safe_text(header, 60)
+    if columns.is_text and not unit and si_unit != "1" and any(_as_float(cell) is not None for cell in cells):
+        return (), [(None, f'got no unit, expected one in brackets, such as "{name} [{si_unit}]"')]
+    if column.quantity.most == _INTERVALS["fraction"]["most"] and not unit:
+        large = [index for index, cell in enumerate(cells) if (_as_float(cell) or 0.0) > column.quantity.most]
+        if large:
+            got = f"got {as_text(cells[large[0]])}, expected a fraction: percent? name the unit"
+            return (), [(large[0], f'{got}, as in "{name} [%]"{also(len(large) - 1)}')]
+    return columns.read(header, column.quantity, n, unit)
 
 
-def _percent_problem(cells: Sequence[object], quantity: Quantity) -> Cells | None:
-    """Refuse values in percent; the first stands for the whole column."""
-    for index, cell in enumerate(cells):
-        if _is_in_percent(cell, quantity):
-            return [], [(index, _percent_message(str(cell)))]
-    return None
+def _as_float(cell: object) -> float | None:
+    """Convert a number without a unit; None if it is none."""
+    try:
+        return float(cell)  # type: ignore[arg-type]
+    except (TypeError, ValueError, OverflowError):
+        return None
 
 
-def _column_of(header: str, outputs: Sequence[str], models: Mapping[str, ForceModel]) -> _Column:
-    """Find what the column with a header holds; `outputs` are the outputs that have a column."""
+def _column_of(header: str, outputs: Sequence[str], models: Mapping[str, ForceModel]) -> _Column | None:
+    """Find what the column with a header holds, None for no use; `outputs` are the outputs that have a column."""
+    if header in LABORATORY:
+        return _Column("laboratory", header, LABORATORY[header][0])
     if header in MEASURED_OUTPUTS:
         return _Column("output", header, MEASURED_OUTPUTS[header])
     if header == SPECIMEN:
         return _Column("specimen", header, Quantity("1", "name of a specimen"))
+    if header.removeprefix(f"{SIGMA}_") in LABORATORY:
+        measured = header.removeprefix(f"{SIGMA}_")
+        return _Column("sigma", measured, replace(LABORATORY[measured][0], meaning="standard deviation"))
     if header == SIGMA or header.removeprefix(f"{SIGMA}_") in MEASURED_OUTPUTS:
         if header == SIGMA and len(outputs) > 1:
             expected = " or ".join(f"{SIGMA}_{output}" for output in outputs)
@@ -134,17 +303,19 @@ def _column_of(header: str, outputs: Sequence[str], models: Mapping[str, ForceMo
         if outputs and output not in outputs:
             raise value_error(f"got no column {output}, expected one next to its standard deviation")
         return _Column("sigma", output, _deviation(output))
-    if not header:
-        raise value_error("got a column without a name, expected that of an input or an output")
     name = InputName.parse(header)
     try:
         quantity = name.quantity(models)
     except KeyError:
-        if name.owner:
+        # a header such as "No. 1" has a dot as well
+        if header.startswith(("materials.", "model.", "friction.")) or near_miss(name.owner, models):
             raise value_error(name.unknown_message(models)) from None
-        deviations = [f"{SIGMA}_{output}" for output in outputs]
-        choices = [*MEASURED_OUTPUTS, SIGMA, SPECIMEN, *SWEEP_QUANTITIES, *deviations]
-        raise value_error(f"no such input or output; {did_you_mean(header, choices)}") from None
+        of_sigma = [*MEASURED_OUTPUTS, *LABORATORY]
+        known = [*of_sigma, SIGMA, SPECIMEN, *SWEEP_QUANTITIES, *(f"{SIGMA}_{output}" for output in of_sigma)]
+        meant = near_miss(header, known)
+        if meant:
+            raise value_error(f'no such input or output; did you mean "{meant}"?') from None
+        return None
     if quantity is None:
         raise value_error("got names of materials, expected numbers; all points have the materials of [sweep]")
     if quantity.words:
@@ -156,42 +327,48 @@ def _deviation(output: str) -> Quantity:
     return Quantity(OUTPUTS[output].unit, "standard deviation", least=MIN_SIGMA, most=MAX_MEASURED)
 
 
-def read_data_file(draft: Draft) -> tuple[dict[KeyPath, object], list[str]]:
+def read_data_file(draft: Draft) -> tuple[dict[KeyPath, object], list[str], list[str]]:
     """Read the file of [data], as `columns.read_files` reads others."""
     table = draft.table("data")
-    if not isinstance(table.get("file"), str) or "columns" in table:
-        return {}, []
+    if not isinstance(table.get("file"), str) or not _are_headers(table.get("columns", {})):
+        return {}, [], []
+    headers = as_table(table.get("columns"))
     try:
-        columns = read_csv_of(draft, table["file"])
+        columns = read_csv_of(draft, table["file"], csv_form(table), tuple(headers.values()) if headers else None)
+        columns = _mapped(columns, headers)
     except ConfigError as error:
-        return {}, [*error.problems]
-    units = {header: "" if unit in ("-", "1") else unit for header, unit in columns.units.items()}
-    read, problems = _read_columns(replace(columns, units=units), draft)
+        return {}, [*error.problems], []
+    points, problems = _read_columns(columns, draft)
+    if problems and not columns.is_known:
+        # it may be any file, of which messages contain nothing
+        problems = [(header, row, text[max(text.find("expected"), 0) :]) for header, row, text in problems]
     if problems:
-        return {}, [columns.problem(text, header, row) for header, row, text in problems[:MAX_PROBLEMS]]
-    values = {header: list(column.values) for header, column in zip(columns.cells, read, strict=True)}
-    return {("data", "columns"): values, ("data", "lines"): list(columns.lines)}, []
+        return {}, [columns.problem(text, header, row) for header, row, text in problems[:MAX_PROBLEMS]], []
+    values = {column.header: list(column.values) for column in points.columns}
+    return {("data", "columns"): values, ("data", "lines"): list(points.lines)}, [], list(points.notes)
 
 
-def _is_in_percent(cell: object, quantity: Quantity) -> bool:
-    """Check whether a value has the sign %, or is too large for a fraction."""
-    if not isinstance(cell, str | int | float):
-        return False
-    if "%" in str(cell):
-        return True
-    try:
-        return quantity.most == _INTERVALS["fraction"]["most"] and float(cell) > quantity.most
-    except (ValueError, OverflowError):
-        return False
+def _are_headers(value: object) -> bool:
+    """Check whether the key `columns` names headers of the file, instead of values."""
+    return isinstance(value, dict) and all(isinstance(header, str) for header in value.values())
 
 
-def _percent_message(text: str) -> str:
-    """Describe a value in percent, and suggest the fraction."""
-    try:
-        fraction = f", such as {number(float(text.removesuffix('%')) / 100.0)}"
-    except ValueError:
-        fraction = ""
-    return f"got {as_text(text)}, expected a fraction{fraction}"
+def _mapped(columns: Columns, headers: Mapping[str, str]) -> Columns:
+    """Give the columns that [data] columns names the names that it gives them."""
+    names, units = {}, dict(columns.units)
+    for name, header in headers.items():
+        found, unit = columns.find(header)
+        names[found], units[found] = name, unit
+    # a column that has such a name already is another one
+    renamed = {
+        header: names.get(header, f"{header} of the file" if header in headers else header)
+        for header in columns.cells
+    }
+    return replace(
+        columns,
+        units={renamed[header]: unit for header, unit in units.items()},
+        cells={renamed[header]: cells for header, cells in columns.cells.items()},
+    )
 
 
 def read_measurements(draft: Draft) -> Draft:
@@ -201,31 +378,37 @@ def read_measurements(draft: Draft) -> Draft:
         expected = 'got neither file nor columns, expected such as file = "drops.csv"'
         return draft.with_problems([(("data",), expected)])
     lists = table.get("columns")
+    path: KeyPath = ("data", "columns")
+    if isinstance(lists, dict) and lists and _are_headers(lists) and "file" not in table:
+        return draft.with_problems([(path, 'got headers, expected a file as well, such as file = "drops.csv"')])
     if not isinstance(lists, dict) or not lists or not all(isinstance(v, list) and v for v in lists.values()):
         return draft
-    path: KeyPath = ("data", "columns")
-    columns, column_problems = _read_columns(Columns("", 0, (), {}, lists, is_text=False), draft)
+    n_rows = len(next(iter(lists.values())))
+    lengths: list[ConfigProblem] = [
+        ((*path, name), f"got {len(cells)} values, expected {n_rows}, as in the first column")
+        for name, cells in lists.items()
+        if len(cells) != n_rows
+    ]
+    if lengths:
+        return draft.with_problems(lengths)
+    try:
+        points, column_problems = _read_columns(columns_of_table(lists, ""), draft)
+    except ConfigError as error:
+        return draft.with_problems((path, problem) for problem in error.problems)
+    written = {split_header(header)[0]: header for header in lists}
     problems: list[ConfigProblem] = [
-        ((*path, *([header] if header else []), *([] if index is None else [index])), message)
+        ((*path, *([written[header]] if header else []), *([] if index is None else [index])), message)
         for header, index, message in column_problems
     ]
-    n_points = len(next(iter(lists.values())))
-    problems += [
-        ((*path, name), f"got {len(cells)} values, expected {n_points}, as in the first column")
-        for name, cells in lists.items()
-        if len(cells) != n_points
-    ]
-    lines = table.get("lines")
+    lines, n_points = table.get("lines"), len(points.lines)
     if "file" in table and lines is None:
         problems.append((path, "set together with file, expected one of the two"))
-    if isinstance(lines, list) and len(lines) != n_points:
-        problems.append((("data", "lines"), f"got {len(lines)} values, expected {n_points}, one for each point"))
-
-    def of_kind(kind: str) -> dict[str, tuple[Any, ...]]:
-        return {column.name: column.values for column in columns if column.kind == kind}
-
-    outputs, sigma = of_kind("output"), of_kind("sigma")
-    specimens = of_kind(SPECIMEN).get(SPECIMEN, ())
+    if isinstance(lines, list) and len(lines) != n_rows:
+        problems.append((("data", "lines"), f"got {len(lines)} values, expected {n_rows}, one for each point"))
+    elif isinstance(lines, list):
+        points = replace(points, lines=tuple(lines[row - 1] for row in points.lines))
+    outputs, sigma = points.of_kind("output"), points.of_kind(SIGMA)
+    specimens = points.of_kind(SPECIMEN).get(SPECIMEN, ())
     if "sigma" in table and outputs:
         first = next(iter(outputs))
         if first in sigma:
@@ -252,8 +435,8 @@ def read_measurements(draft: Draft) -> Draft:
         return draft.with_problems(problems[:MAX_PROBLEMS])
     measurements = Measurements(
         file=str(table.get("file", "")),
-        lines=tuple(lines) if isinstance(lines, list) else tuple(range(1, n_points + 1)),
-        inputs=of_kind("input"),
+        lines=points.lines,
+        inputs=points.of_kind("input"),
         outputs=outputs,
         sigma={name: sigma[name] for name in outputs if name in sigma},
         noise=noise,
@@ -264,7 +447,7 @@ def read_measurements(draft: Draft) -> Draft:
     for name, values in measurements.inputs.items():
         # rules between inputs apply to the first value
         data, _ = set_value(data, InputName.parse(name).path, values[0])
-    return replace(draft, data=data, measurements=measurements)
+    return replace(draft, data=data, measurements=measurements, notes=(*draft.notes, *points.notes))
 
 
 def _read_sigma(value: object, output: str, n_points: int) -> tuple[tuple[Any, ...], list[ConfigProblem]]:
@@ -273,7 +456,7 @@ def _read_sigma(value: object, output: str, n_points: int) -> tuple[tuple[Any, .
     cells = value if isinstance(value, list) else [value]
     if cells is value and len(cells) != n_points:
         return (), [(path, f"got {len(cells)} values, expected {n_points}, one for each point")]
-    values, problems = _percent_problem(cells, _deviation(output)) or read_cells(cells, _deviation(output), None)
+    values, problems = read_cells(cells, _deviation(output), None)
     texts = [(index, message) for index, message in problems if isinstance(cells[index], str)]
     if cells is not value:
         return tuple(values) * n_points, [(path, message) for _, message in texts]

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cache, lru_cache
-from typing import Annotated, Any, ClassVar, Self, TypeAlias, cast
+from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias, cast
 
 import numpy as np
 from pydantic import (
@@ -218,11 +218,18 @@ def bounded_int(least: int, most: int | None = None) -> ReadAs:
     return ReadAs(Annotated[int, bounds, BeforeValidator(_float_to_int), expected(f"a whole number {interval}")])
 
 
+SEPARATORS, DECIMALS = (",", ";", "\t"), (".", ",")
+SeparatorKey: TypeAlias = Annotated[Any, ReadAs(Literal[SEPARATORS]), expected('",", ";" or "\\t"')]
+DecimalKey: TypeAlias = Annotated[Any, ReadAs(Literal[DECIMALS]), expected('"." or ","')]
+
+
 class Column(Table):
     """A column of a CSV file; reading replaces it by the list of its values."""
 
     file: Annotated[str, expected("the name of a CSV file")] = Field(description="CSV file")
     column: Annotated[str, expected("the name of a column")] = Field(description="a name in its first line")
+    separator: SeparatorKey = Field(None, description="of columns, where it is not recognised")
+    decimal: DecimalKey = Field(None, description="sign, where it is not recognised")
 
 
 def _one_form_schema(schema: dict[str, Any]) -> None:
@@ -576,6 +583,11 @@ def number_in(unit: str, text: str) -> float | None:
         return Quantity(unit, "").read(text)
     except PydanticCustomError:
         return None
+
+
+def is_unit(text: str) -> bool:
+    """Check whether a text is a unit of any quantity."""
+    return _si_scale(text) is not None
 
 
 class UnitError(ValueError):

@@ -33,16 +33,19 @@ from ..contact.models import built_in, catalogue
 from ..contact.variables import OUTPUTS
 from ..errors import did_you_mean
 from .quantities import (
+    COLUMN,
     MAX_AXIS_VALUES,
     MAX_PROBLEMS,
     MAX_UNIT_LENGTH,
     RANGE,
     SCALAR,
     ConfigProblem,
+    DecimalKey,
     Names,
     Numbers,
     Quantity,
     ReadAs,
+    SeparatorKey,
     Table,
     ValidationContext,
     bounded_int,
@@ -64,6 +67,11 @@ Noise = Literal["given", "scale", "excess"]
 # how a residual counts, see `scipy.optimize.least_squares`
 Loss = Literal["linear", "huber", "cauchy"]
 NOISES, LOSSES = get_args(Noise), get_args(Loss)
+Missing = Literal["skip", "error"]
+MISSING_ROWS = get_args(Missing)
+# m/s^2, as scipy.constants.g
+STANDARD_GRAVITY = 9.80665
+GRAVITY = Quantity("m/s^2", "acceleration that turns heights and flight times into velocities", 0, above=True)
 DESIGN_METHODS = ("sobol", "lhs", "halton", "random")
 MAX_SAMPLES = 2**22
 MODELS_EXPECTED = 'a model, or a list of models; "all" are all'
@@ -81,11 +89,57 @@ ZipGroup = Annotated[
 ListsByName = Annotated[
     dict[str, Annotated[list[float | str], Field(min_length=1), expected("a list of values")]], Field(min_length=1)
 ]
+CELL_EXPECTED = "a number, a text, or nothing where a value is missing"
+# of measurements, in which values may be missing; or headers of a file by name
+CellsByName = Annotated[
+    dict[
+        str,
+        Annotated[
+            list[Annotated[Any, ReadAs(float | str | None), expected(CELL_EXPECTED)]],
+            Field(min_length=1),
+            expected("a list of values"),
+        ],
+    ],
+    Field(min_length=1),
+]
+HeadersByName = Annotated[dict[str, Annotated[str, expected("a header of the file")]], Field(min_length=1)]
+DATA_COLUMNS_EXPECTED = (
+    "a table of lists by name, such as { v1 = [1.0, 2.0], e_out = [0.8, 0.7] }, or of headers of a file, "
+    'such as { e_out = "Restitution" }'
+)
+
+
+def _columns_form(value: object) -> str:
+    return SCALAR if isinstance(value, dict) and str in map(type, value.values()) else RANGE
+
+
+DataColumns = Annotated[
+    Annotated[CellsByName, expected(DATA_COLUMNS_EXPECTED), Tag(RANGE)]
+    | Annotated[HeadersByName, expected(DATA_COLUMNS_EXPECTED), Tag(SCALAR)],
+    Discriminator(_columns_form),
+]
 CASES_EXPECTED = "the name of a CSV file, or a table of lists by config name, such as { v1 = [1.0, 2.0] }"
+
+
+class CasesFile(Table):
+    """A CSV file of cases; reading replaces it by the lists of its values."""
+
+    file: Annotated[str, expected("the name of a CSV file")] = Field(description="CSV file")
+    separator: SeparatorKey = Field(None, description="of columns, where it is not recognised")
+    decimal: DecimalKey = Field(None, description="sign, where it is not recognised")
+
+
+def _cases_form(value: object) -> str:
+    if not isinstance(value, dict):
+        return SCALAR
+    return COLUMN if isinstance(value.get("file"), str) else RANGE
+
+
 CasesTable = Annotated[
     Annotated[str, expected(CASES_EXPECTED), Tag(SCALAR)]
-    | Annotated[ListsByName, expected(CASES_EXPECTED), Tag(RANGE)],
-    Discriminator(lambda value: RANGE if isinstance(value, dict) else SCALAR),
+    | Annotated[ListsByName, expected(CASES_EXPECTED), Tag(RANGE)]
+    | Annotated[CasesFile, Tag(COLUMN)],
+    Discriminator(_cases_form),
 ]
 
 
@@ -240,6 +294,14 @@ class Output:
 MIN_SIGMA, MAX_MEASURED = 1e-30, 1e100
 
 
+# what is measured of a ball that falls on a body at rest, and what follows from it
+LABORATORY = {
+    "drop_height": (Quantity("m", "height of the drop", 0.0, MAX_MEASURED, above=True), ("v1",)),
+    "rebound_height": (Quantity("m", "height of the rebound", 0.0, MAX_MEASURED, above=True), ("e_out",)),
+    "flight_time": (Quantity("s", "time between two impacts", 0.0, MAX_MEASURED, above=True), ("v1", "e_out")),
+}
+
+
 def _is_deviation(value: object) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and MIN_SIGMA <= value <= MAX_MEASURED
 
@@ -275,11 +337,15 @@ class Data(Table):
     file: Annotated[Any, ReadAs(str), expected("the name of a CSV file")] = Field(
         None, description="CSV file, whose columns are inputs and outputs with units, and standard deviations"
     )
-    columns: Annotated[
-        Any,
-        ReadAs(ListsByName),
-        expected("a table of lists by name, such as { v1 = [1.0, 2.0], e_out = [0.8, 0.7] }"),
-    ] = Field(None, description="the values of the file, in SI")
+    columns: Annotated[Any, ReadAs(DataColumns)] = Field(
+        None, description="the values, by name, or the headers of columns of the file"
+    )
+    separator: SeparatorKey = Field(None, description="of the columns of the file, where it is not recognised")
+    decimal: DecimalKey = Field(None, description="sign of the file, where it is not recognised")
+    missing: Annotated[Any, ReadAs(Missing), known_name("what becomes of rows", lambda info: MISSING_ROWS)] = (
+        Field(None, description="a row without a value is left out (skip, the default), or an error")
+    )
+    g: Annotated[float, GRAVITY] = STANDARD_GRAVITY
     lines: Annotated[
         Any, ReadAs(list[Annotated[int, bounded_int(1)]]), expected("a list of the numbers of lines")
     ] = Field(None, description="the line of each point in the file, if the values are in columns")

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import copyreg
+from collections.abc import Callable, Iterable, Mapping
 from importlib import import_module
 from pkgutil import iter_modules
 from types import MappingProxyType
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 from ..errors import ModelError, did_you_mean
 
@@ -47,3 +48,18 @@ def look_up(laws: Mapping[str, Law], key: str, noun: str) -> Law:
     if key not in laws:
         raise ModelError(f'no {noun} "{key}"; {did_you_mean(key, list(laws))}')
     return laws[key]
+
+
+def pickle_by_key(kind: type[Law], find: Callable[[str], Law]) -> None:
+    """Let laws of a catalogue be pickled as their keys: their formulas are no functions of a module."""
+
+    def reduce(law: Law) -> tuple[Any, ...]:
+        try:
+            is_declared = find(law.key) is law
+        except ModelError:
+            is_declared = False
+        state = (find, (law.key,)) if is_declared else object.__reduce_ex__(law, 2)
+        assert isinstance(state, tuple)
+        return state
+
+    copyreg.pickle(kind, reduce)

@@ -18,7 +18,7 @@ from .impulse import velocities_after
 from .model import ForceModel, Law
 from .powers import all_within
 from .rigid import ObliqueImpacts
-from .simulate import CollisionResult, simulate
+from .simulate import CollisionResult, ComputeCollisions, simulate
 from .status import FIRST_FAILURE, LIMIT, NO_IMPACT, STATUS_OK
 from .tangential import TangentialResult, simulate_friction
 from .variables import CENTRAL_OUTPUTS
@@ -81,6 +81,7 @@ def collide(
     errors: dict[str, str] | None = None,
     names: Iterable[str] = CENTRAL_OUTPUTS,
     oblique: tuple[Pair, ObliqueImpacts] | None = None,
+    compute: ComputeCollisions | None = None,
 ) -> Outputs:
     """Simulate impacts by a law: their `outputs`; one that fails has NaN and a status, and affects no other.
 
@@ -93,6 +94,7 @@ def collide(
     integrator : "exact", the continuous law with error control, or one of `impact.contact.fixed_step.SCHEMES`
     fixed_step : the phase and the step of a scheme by name, see `impact.contact.simulate.simulate`, of shape (n,)
     errors : receives a line for each distinct error of the law, see `impact.contact.formula_calls.describe_error`
+    compute : see `impact.contact.simulate.simulate`
     oblique : the model with a friction law, and the tangential inputs of the impacts, for outputs of friction
     """
     with np.errstate(all="ignore"):
@@ -109,6 +111,7 @@ def collide(
         core=core,
         integrator=integrator,
         errors=errors,
+        compute=compute,
     )
     if oblique is None:
         return outputs(model, impacts, result, names, checked)

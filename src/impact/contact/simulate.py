@@ -91,8 +91,8 @@ class RecordedCollision:
     params: Params
 
 
-# integrates distinct impacts through both phases, see `integrate_phases`
-IntegrateBoth = Callable[..., RecordedCollision]
+# computes the collisions of distinct impacts, see `integrate_collisions`
+ComputeCollisions = Callable[..., CollisionResult]
 
 
 def simulate(
@@ -107,6 +107,7 @@ def simulate(
     core: str = "numpy",
     integrator: str = EXACT,
     errors: dict[str, str] | None = None,
+    compute: ComputeCollisions | None = None,
 ) -> CollisionResult:
     """Integrate impacts by a law; one that fails has a status, and affects no other.
 
@@ -116,14 +117,16 @@ def simulate(
     values : `dimensionless_values` of the impacts, by name, each of shape (k,); for a scheme also `PHASE`, and one
         of `STEPS_PER_CONTACT` and `STEP`
     status : by `check_inputs`, shape (k,); impacts that are not OK are not integrated
+    compute : computes distinct collisions of the continuous law in place of the integration, such as an
+        `InterpolatedCollisions`
     """
-    integrate_both = partial(integrate_phases, rtol=rtol, max_steps=max_steps, core=core)
+    integrate = partial(integrate_collisions, rtol=rtol, max_steps=max_steps, core=core)
     simulate_part: SimulatePart[CollisionResult] = partial(
-        _simulate_distinct, model, integrate_both=integrate_both
+        _simulate_distinct, model, compute=compute or integrate, separates_strong=compute is None
     )
     if integrator != EXACT:
         collide_part = partial(
-            _collide_at_fixed_steps, model, scheme=integrator, integrate_both=integrate_both, max_steps=max_steps
+            _collide_at_fixed_steps, model, scheme=integrator, compute=integrate, max_steps=max_steps
         )
         simulate_part = partial(_simulate_fixed_steps, collide_part=collide_part)
     return simulate_parts(CollisionResult, model.key, n, values, status, simulate_part, collapse, errors)
@@ -196,8 +199,9 @@ def _simulate_distinct(
     values: ValueArrays,
     count: int,
     *,
-    integrate_both: IntegrateBoth,
+    compute: ComputeCollisions,
     collapse: bool,
+    separates_strong: bool = True,
 ) -> CollisionResult:
     """Integrate each distinct dimensionless problem once, those with strong damping in their own coordinate."""
     law_values = with_coefficients(model, with_units(values, n), count)
@@ -207,9 +211,11 @@ def _simulate_distinct(
     def integrate_distinct(problems: DistinctProblems) -> CollisionResult:
         never_separates = exact[problems.rows][problems.first] == 0.0
         size = never_separates.size
-        return integrate_both(problems.law, problems.params, size, never_separates=never_separates).result
+        return compute(problems.law, problems.params, size, never_separates=never_separates)
 
-    problems = distinct_problems(model, n, law_values, status == STATUS_OK, collapse)
+    problems = distinct_problems(
+        model, n, law_values, status == STATUS_OK, collapse, separates_strong=separates_strong
+    )
     parts = [(part.rows, integrate_distinct(part).take(part.row_of_impact)) for part in problems]
     result = replace(CollisionResult.joined(count, status, parts), chi=chi, exact=exact)
     stopped = status == LIMIT
@@ -242,12 +248,14 @@ def distinct_problems(
     chosen: NDArray[np.bool_],
     collapse: bool,
     columns: Params = (),
+    *,
+    separates_strong: bool = True,
 ) -> Iterator[DistinctProblems]:
     """Find the distinct problems of the chosen impacts: those in the velocity, then those with strong damping.
 
     `columns` are further arrays of shape (count,) in which distinct problems may differ.
     """
-    strong = is_strong(model, law_values, chosen.size)
+    strong = is_strong(model, law_values, chosen.size) & separates_strong
     for is_strongly_damped in (False, True):
         part = chosen & (strong == is_strongly_damped)
         size = int(np.count_nonzero(part))
@@ -286,7 +294,7 @@ def _collide_at_fixed_steps(
     count: int,
     *,
     scheme: str,
-    integrate_both: IntegrateBoth,
+    compute: ComputeCollisions,
     collapse: bool,
     max_steps: int,
 ) -> CollisionResult:
@@ -296,7 +304,7 @@ def _collide_at_fixed_steps(
     def contact_times(rows: Positions, size: int) -> tuple[Array, NDArray[np.int8]]:
         """Compute the contact times of the continuous law, and statuses that are OK where there is one."""
         continuous = _simulate_distinct(
-            model, n, _values_at(of_law, rows), size, integrate_both=integrate_both, collapse=collapse
+            model, n, _values_at(of_law, rows), size, compute=compute, collapse=collapse
         )
         never_ends = continuous.status == LIMIT
         return continuous.contact_time, np.where(never_ends, np.int8(Status.NOT_SEPARATED), continuous.status)
@@ -430,6 +438,22 @@ def integrate_phases(
         if law.model.release == "force":
             result.permanent[rows] += motion.indentation(law, restitution.state[0])
     return RecordedCollision(result, approach, restitution, phases.params)
+
+
+def integrate_collisions(
+    law: motion.MotionLaw,
+    params: Params,
+    n: int,
+    *,
+    rtol: float,
+    max_steps: int,
+    never_separates: NDArray[np.bool_] | bool = False,
+    core: str = "numpy",
+) -> CollisionResult:
+    """Integrate n impacts; see `integrate_phases`."""
+    return integrate_phases(
+        law, params, n, rtol=rtol, max_steps=max_steps, never_separates=never_separates, core=core
+    ).result
 
 
 @dataclass(frozen=True)

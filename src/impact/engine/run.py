@@ -12,7 +12,7 @@ import numpy as np
 from ..config.grid import MAX_POINTS
 from ..contact.records import Record
 from ..contact.status import FIRST_FAILURE, FrictionStatus
-from ..errors import StoreError, UnfinishedError, UsageError
+from ..errors import StoreError, UnfinishedError, UsageError, warn
 from .executors import SERIAL, ExecutorSpec
 from .trajectories import TrajectoryRange
 
@@ -32,7 +32,7 @@ ProgressCallback = Callable[[Progress], None]
 
 
 def ignore(message: object) -> None:
-    """Do nothing: the default of `on_progress` and `on_note`."""
+    """Do nothing: the default of `on_progress`."""
 
 
 def never() -> bool:
@@ -51,7 +51,7 @@ class Run:
     overwrite : replace the output, and a work folder that is not resumed
     max_points : the largest number of points, of all models together
     on_progress : called from time to time with the progress
-    on_note : called with a sentence about each implausible value
+    on_note : called with a sentence about each implausible value; by default an `ImpactWarning`
     should_stop : returns whether to stop; ranges of trajectories that are running are finished and kept
     """
 
@@ -60,7 +60,7 @@ class Run:
     overwrite: bool = False
     max_points: int = MAX_POINTS
     on_progress: ProgressCallback = ignore
-    on_note: Callable[[str], None] = ignore
+    on_note: Callable[[str], None] = warn
     should_stop: Callable[[], bool] = never
 
     @contextmanager

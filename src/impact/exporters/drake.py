@@ -82,7 +82,8 @@ def notes(collision: Collision) -> list[str]:
         "two materials: k = k1 k2/(k1 + k2), dissipation d = (k2 d1 + k1 d2)/(k1 + k2)",
         "unset, dissipation is 50 s/m and point_stiffness 1e6 N/m (since 1.36.0): 50 s/m is e = 0.02 at 1 m/s",
         "unset, the contact model is hydroelastic with fallback: point_stiffness holds only where it falls back",
-        "unset, the approximation is LAGGED, which gives the same restitution; SAP has relaxation_time instead",
+        "unset, the approximation is LAGGED, which gives the same restitution",
+        "SAP has relaxation_time instead of dissipation; unset it is 0.1 s for each ball, which stops any rebound",
         "the force is that at the end of the step, never negative; each step takes energy, so that e is smaller",
         "time_step=0 with the integrator semi_explicit_euler loses less: impact timestep --scheme kick-drift",
         "no friction: replace CoulombFriction(0, 0) by yours; unset, both coefficients are 0.5",
@@ -104,6 +105,19 @@ CODE = Code(
     lines=lines,
     notes=notes,
     template=TWO_BALLS,
+    wall={
+        "import AddContactMaterial, ": "import AddContactMaterial, HalfSpace, ",
+        ", (2, {m2}, {R2}, {material2})": ",",
+        "plant.Finalize()": (
+            "pose = HalfSpace.MakePose([-1, 0, 0], [0, 0, 0])\n"
+            'plant.RegisterCollisionGeometry(plant.world_body(), pose, HalfSpace(), "wall", {material2})\n'
+            "plant.Finalize()"
+        ),
+        "({x1}, {x2}), ({v1}, {v2})": "({x1},), ({v1},)",
+        "v1, v2 = (joint.get_translation_rate(context) for joint in joints)": (
+            "v1, v2 = joint.get_translation_rate(context), {v2}"
+        ),
+    },
     program="python",
     install="pip install drake",
     version_of=python_package_version("drake"),

@@ -288,6 +288,11 @@ def _header(problem: ExportProblem, collision: Collision, row: TimestepRow) -> l
     header += [*([_better_fit(problem)] if problem.better_fit else []), *problem.fit_notes]
     if problem.defaulted_axes:
         header.append(f"first value of each axis of the source: {', '.join(problem.defaulted_axes)}")
+    if problem.has_wall:
+        radius = float(law.impact.R_eff[0])
+        known = "" if math.isnan(radius) else f", R* = {quantity(radius, 'm')}"
+        moving = "; in a script it is at rest, and ball 1 has v1 - v2" if collision["v2"] else ""
+        header.append(f"ball 2 is a plane wall: m = m1{known}{moving}")
     if problem.solved_parameter:
         value = collision[problem.solved_parameter]
         header.append(f"{problem.solved_parameter} = {value!r} gives the e that is wanted")

@@ -21,6 +21,8 @@ mbs.CreateSphereSphereContact(itemNumbers=balls, spheresRadii=[{R1}, {R2}], **co
 mbs.Assemble()
 settings = exudyn.SimulationSettings()
 settings.solution.file.write = False
+# steps are cut where the contact begins and ends
+settings.timeIntegration.minimumStepSize = 1e-6 * dt
 settings.timeIntegration.numberOfSteps = {steps}
 settings.timeIntegration.endTime = {steps} * dt
 mbs.SolveDynamic(settings)
@@ -31,39 +33,24 @@ print("e_out =", (v2 - v1) / {v0})
 
 def parameters(collision: Collision) -> dict[str, float | str]:
     """Write the arguments of CreateSphereSphereContact."""
-    c = collision
-    values: dict[str, float | str] = {
-        "impactModel": IMPACT_MODELS[c.model.key],
-        "contactStiffness": c["K"],
-        "contactStiffnessExponent": c["n"],
-    }
-    if c.model.key == "kelvin-voigt":
-        return {**values, "contactDamping": c["C"]}
-    return {**values, "contactDamping": 0.0, "restitutionCoefficient": c["e"]}
+    c, number = collision, IMPACT_MODELS[collision.model.key]
+    loss = {"restitutionCoefficient": c["e"]} if number else {"contactDamping": c["C"]}
+    return {"impactModel": number, "contactStiffness": c["K"], "contactStiffnessExponent": c["n"], **loss}
 
 
 def lines(collision: Collision, parameters: Parameters) -> list[str]:
-    return [
-        "contact = dict(",
-        *(f"    {name}={value!r}," for name, value in parameters.items()),
-        ")",
-        f"dt = {collision.dt!r}",
-    ]
+    values = ", ".join(f"{name}={value!r}" for name, value in parameters.items())
+    return [f"contact = dict({values})", f"dt = {collision.dt!r}"]
 
 
 def notes(collision: Collision) -> list[str]:
-    remarks = [
-        "in SI, of the pair: each contact of CreateSphereSphereContact has its own values, without any mixing",
-        "contactStiffness is in N/m^n; unset, the exponent n is 1",
-    ]
-    if collision.model.key == "kelvin-voigt":
-        return [*remarks, "the force pulls before the contact ends; restitutionCoefficient is not used"]
     return [
-        *remarks,
-        "unset, restitutionCoefficient is 1 and impactModel 0, which has contactDamping only; e has to be above 0",
-        "begin with a gap: a contact in the first step has no impact velocity, thus no damping, and e is 1",
-        "minimumImpactVelocity, by default 0: a slower impact has the damping of that speed, and rebounds faster",
-        "contactDamping adds to the damping of the impact model",
+        "in SI, of the pair: each contact of CreateSphereSphereContact has its own values, without any mixing",
+        "contactStiffness is in N/m^n; unset, the exponent n is 1, impactModel 0 and restitutionCoefficient 1",
+        "impactModel 0 takes no restitutionCoefficient and pulls at the end; 1 and 2 add contactDamping, if given",
+        "1 and 2: begin with a gap; a contact in the first step has no impact velocity, no damping, and e is 1",
+        "steps are cut at the contact: the solver stops if minimumStepSize, by default 1e-8 s, is near dt",
+        "1 and 2: impacts below minimumImpactVelocity (0) have the damping of that speed, and rebound faster",
     ]
 
 
@@ -78,6 +65,15 @@ CODE = Code(
     lines=lines,
     notes=notes,
     template=TWO_BALLS,
+    wall={
+        " ({m2}, {x2}, {v2})": "",
+        "mbs.CreateSphereSphereContact(itemNumbers=balls, spheresRadii=[{R1}, {R2}]": (
+            "balls.append(mbs.CreateGround())\n"
+            # the diagonal, along which the quad is split, is 4 radii away
+            "corners = [[0, y * {R1}, z * {R1}] for y, z in ((-9, -9), (-9, 27), (9, 27), (9, -9))]\n"
+            "mbs.CreateSphereQuadContact(itemNumbers=balls, sphereRadius={R1}, quadPoints=corners"
+        ),
+    },
     program="python",
     install="pip install exudyn",
     version_of=python_package_version("exudyn"),

@@ -102,6 +102,11 @@ CODE = Code(
     lines=lines,
     notes=notes,
     template=TWO_MASSES,
+    wall={
+        "((1, {m1}), (2, {m2}))": "((1, {m1}), (2, 0.0))",
+        "gap = -{gap}\n": "ops.fix(2, 1)\ngap = -{gap}\n",
+        'ops.setNodeVel(2, 1, {v2}, "-commit")\n': "",
+    },
     program="python",
     install="pip install openseespy",
     version_of=python_package_version("openseespy"),

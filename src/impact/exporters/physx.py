@@ -27,8 +27,7 @@ def lines(collision: Collision, parameters: Parameters) -> list[str]:
 def notes(collision: Collision) -> list[str]:
     return [
         "in SI; two materials: by default the mean of both; with a rigid one, the values of the compliant one",
-        "a restitution from 0 to 1 is another law, rigid, and without effect below bounceThresholdVelocity",
-        "bounceThresholdVelocity is by default 0.2 m/s; it has no effect on a compliant contact",
+        "a restitution from 0 to 1 is another law, rigid, without rebound below bounceThresholdVelocity (0.2 m/s)",
         "compliantContactAccelerationSpring: values are per effective mass; it is off by default",
         "the force is that at the end of the step, never negative; each step takes energy, so that e is smaller",
         "PGS, and contactOffset less than dt times the speed: impact timestep --model kelvin-voigt-no-tension "

@@ -10,6 +10,8 @@ from ..config.load import Config
 from ..contact.impacts import INPUTS, Impacts
 from ..contact.model import ForceModel
 from ..contact.models import find
+from ..engine.build_impacts import build_impacts
+from ..engine.plan import Plan
 from ..engine.plugins import Plugins
 from ..errors import UsageError
 from ..formatting import number
@@ -38,6 +40,7 @@ class ExportProblem:
     e_continuous, peak_indentation : [-] and [m], of the continuous law
     solved_parameter : what was solved for, with the requested e; "" for none
     defaulted_axes : names of axes of the source that are at their first value
+    has_wall : ball 2 is a plane wall
     fit_notes : of a calibration, the rank of the law and its weight, and other laws that were fitted
     better_fit : the law of a calibration that fits best, where it is none of the code; else ""
     missing_law : the default law of the newest release, where this one lacks it and none was requested; else ""
@@ -51,6 +54,7 @@ class ExportProblem:
     config: Config
     solved_parameter: str
     defaulted_axes: tuple[str, ...]
+    has_wall: bool
     fit_notes: tuple[str, ...]
     better_fit: str
     missing_law: str
@@ -69,7 +73,8 @@ class ExportProblem:
         values = input_values(self.law.impact)
         for name in ("R1", "R2"):
             if math.isnan(values[name]):
-                values[name] = RADIUS_PER_PEAK * self.peak_indentation
+                is_wall = name == "R2" and self.has_wall
+                values[name] = math.inf if is_wall else RADIUS_PER_PEAK * self.peak_indentation
         names = self.config.scalars
         material1, material2 = (
             str(names.get(f"material{ball}", names.get("material", ""))) for ball in ("1", "2")
@@ -80,6 +85,7 @@ class ExportProblem:
             values=values,
             materials=(material1, material2),
             has_user_stiffness="K" in names or f"{self.model.key}.K" in names,
+            has_wall=self.has_wall,
             dt=dt,
             gap=(STEPS_BEFORE - phase) * dt * values["v0"],
             steps=STEPS_BEFORE + math.ceil(CONTACTS_RUN * self.law.contact_time / dt),
@@ -90,6 +96,15 @@ def input_values(impact: Impacts) -> dict[str, float]:
     """Return all inputs and derived quantities of one impact, by name, in SI."""
     names = [*INPUTS, "m", "R_eff", "E_eff", "v0", *impact.parameters]
     return {name: float(impact.quantity(name)[0]) for name in names}
+
+
+def with_wall(config: Config, code: Code, version: str) -> tuple[Config, bool]:
+    """Set the inputs that a plane wall acts with in a code, and return whether ball 2 is such a wall."""
+    values = input_values(build_impacts(Plan(config).inputs, config.models[0], ()))
+    if math.isfinite(values["m2"]) or math.isfinite(values["R2"]):
+        return config, False
+    inputs = code.wall_inputs(config.models[0].key, version, values)
+    return replace(config, scalars={**config.scalars, **inputs}), True
 
 
 def prepare_export(
@@ -120,6 +135,7 @@ def prepare_export(
         if name in at:
             raise UsageError(f"--at: got e and {name}, expected one of the two")
         config, defaulted_axes = single_point(point_source, key, {**at, **placeholder(law, unknown)})
+        config, has_wall = with_wall(config, code, version)
         requested_e = float(config.scalars["e"])
         result = solve_input(config, plugins, unknown, {"e_out": requested_e})
         if not result.roots:
@@ -128,6 +144,7 @@ def prepare_export(
         config = replace(config, scalars={**config.scalars, name: result.roots[0].value})
     else:
         config, defaulted_axes = single_point(point_source, key, at)
+        config, has_wall = with_wall(config, code, version)
     fixed, collision = fixed_step_law(config, PHASES, code.scheme)
     calibration = point_source.calibration
     better_fit, fit_notes = _fit_notes(code, version, key, calibration) if calibration else ("", ())
@@ -140,6 +157,7 @@ def prepare_export(
         config=config,
         solved_parameter=solved,
         defaulted_axes=defaulted_axes,
+        has_wall=has_wall,
         fit_notes=fit_notes,
         better_fit=better_fit,
         missing_law=missing,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -20,9 +21,12 @@ from ..config.input_names import InputName
 from ..config.load import Config, parse_config, read_config
 from ..config.measurements import fitted_parameters
 from ..config.quantities import Quantity
+from ..config.tables import Solver
 from ..contact.friction import Pair
+from ..contact.interpolant import InterpolatedCollisions, motion_key
 from ..contact.model import ForceModel
 from ..contact.output_formulas import collide
+from ..contact.simulate import ComputeCollisions
 from ..contact.units import dimension
 from ..engine.build_impacts import build_impacts, build_oblique
 from ..engine.execute import WorkerContext, context_of, models_of_context
@@ -36,7 +40,7 @@ from ..results.calibration import calibration_template, fitted_config, position_
 from ..results.schema import FIT_STATUSES
 from ..results.xarray_backend import save
 from .batched_solvers import VectorFunction
-from .fit import Bounds, DataPoints, Fit, FitProblem, fit_all, half_widths
+from .fit import Bounds, DataPoints, Fit, FitProblem, fit_all
 
 # points of the curve of each law over an input
 CURVE_POINTS = 101
@@ -115,6 +119,8 @@ def calibrate(
         if best is None:
             raise UsageError("--model: set without --best FILE, which is written for that law")
         position_of_law(list(laws_to_fit(config)), model, "--model")
+    for note in config.notes:
+        warnings.warn(note, stacklevel=2)
     result = calibrate_config(config, plugin_set.of(config.models), jobs)
     if output is not None:
         save(result, output, overwrite=overwrite)
@@ -139,18 +145,22 @@ def calibrate_config(config: Config, plugins: Plugins, jobs: int = 1) -> xr.Data
 
 
 def prediction(
-    config: Config, law: PlanLaw, names: Sequence[str], inputs: Mapping[str, Sequence[float]], points: int
+    config: Config,
+    law: PlanLaw,
+    names: Sequence[str],
+    inputs: Mapping[str, Sequence[float]],
+    points: int,
+    compute: ComputeCollisions | None = None,
 ) -> VectorFunction:
     """Build the function from parameters, shape (k, len(names)), to outputs of a law, shape (k, outputs points).
 
-    All points of the first output come first; NaN where the law has no result.
+    All points of the first output come first; NaN where the law has no result. `compute` is that of
+    `impact.contact.simulate.simulate`.
     """
     assert config.data is not None
     outputs, model = tuple(config.data.outputs), model_of(law)
     scalars = {name: value for name, value in config.scalars.items() if name not in (*names, *inputs)}
     solver = config.solver
-    # fits are integrated by NumPy unless the config names numba
-    core = "numba" if solver.core == "numba" else "numpy"
 
     def predict(rows: Array) -> Array:
         columns = {name: np.tile(values, len(rows)) for name, values in inputs.items()}
@@ -168,9 +178,10 @@ def prediction(
             impacts,
             rtol=solver.rtol,
             max_steps=solver.max_steps,
-            core=core,
+            core=core_of(solver),
             names=outputs,
             oblique=oblique,
+            compute=compute,
         )
         # a law on which no column has an effect has one trajectory
         shape = len(rows) * points
@@ -205,16 +216,37 @@ def fit_laws(config: Config) -> dict[str, FittedLaw]:
         key: fitted_parameters(config.fits, model_of(law), law.friction if isinstance(law, Pair) else None)
         for key, law in laws.items()
     }
-    problems, functions = [], {}
-    for key, law in laws.items():
-        problems.append(FitProblem(key, _bounds(config, names[key]), points))
-        functions[key] = prediction(config, law, names[key], data.inputs, len(data.lines))
-    fits = fit_all(problems, functions)
+    problems: list[FitProblem] = []
+    functions: dict[str, VectorFunction] = {}
+    shared: dict[object, InterpolatedCollisions] = {}
     varied = varied_input(data.inputs)
-    return {
-        key: FittedLaw(names[key], fit, _curve(config, law, names[key], fit, problem, varied))
-        for (key, law), problem, fit in zip(laws.items(), problems, fits, strict=True)
-    }
+    for key, law in laws.items():
+        problem = FitProblem(key, _bounds(config, names[key]), points, f"{key}, integrated")
+        problems.append(problem)
+        compute = _interpolated(config, law, shared)
+        functions[problem.key] = prediction(config, law, names[key], data.inputs, len(data.lines), compute)
+        functions[problem.final_key] = _with_curve(config, law, names[key], varied)
+    fits = fit_all(problems, functions)
+    return {key: FittedLaw(names[key], fit, _curve(config, fit)) for key, fit in zip(laws, fits, strict=True)}
+
+
+def core_of(solver: Solver) -> str:
+    """Choose the core of fits: NumPy unless the config names numba."""
+    return "numba" if solver.core == "numba" else "numpy"
+
+
+def _interpolated(
+    config: Config, law: PlanLaw, shared: dict[object, InterpolatedCollisions]
+) -> InterpolatedCollisions | None:
+    """Interpolate the collisions of a law, together with others of the same motion; None with friction."""
+    assert config.data is not None
+    if isinstance(law, Pair):
+        return None
+    solver, outputs = config.solver, tuple(config.data.outputs)
+    interpolated = InterpolatedCollisions(
+        law, outputs, rtol=solver.rtol, max_steps=solver.max_steps, core=core_of(solver)
+    )
+    return shared.setdefault(motion_key(law), interpolated)
 
 
 def _bounds(config: Config, names: Sequence[str]) -> Bounds:
@@ -236,33 +268,29 @@ def varied_input(inputs: Mapping[str, Sequence[float]]) -> tuple[str, Array]:
     return name, space(lower, upper, CURVE_POINTS)
 
 
-def _curve(
-    config: Config,
-    law: PlanLaw,
-    names: Sequence[str],
-    fit: Fit,
-    problem: FitProblem,
-    varied: tuple[str, Array],
-) -> Array:
-    """Predict the outputs over the varied input, with the ends of the band of 95 % without the noise."""
+def _with_curve(config: Config, law: PlanLaw, names: Sequence[str], varied: tuple[str, Array]) -> VectorFunction:
+    """Build the function that predicts the measurements, and then each output over the varied input."""
     assert config.data is not None
-    name, grid = varied
-    outputs = len(config.data.outputs)
-    if not name:
-        return np.full((3, outputs, 0), np.nan)
-    inputs = {other: [column[0]] * grid.size for other, column in config.data.inputs.items()} | {
-        name: grid.tolist()
-    }
-    predict = prediction(config, law, names, inputs, grid.size)
-    u = problem.bounds.units(fit.estimate)
-    steps = np.where(u < 0.5, 1e-4, -1e-4)
-    rows = problem.bounds.values(np.clip(np.vstack([u, u + np.diag(steps)]), 0.0, 1.0))
-    values = predict(rows)
-    slopes = (values[1:] - values[0]) / (rows[1:] - rows[0]).diagonal()[:, None]
-    half = np.full(values.shape[1], np.nan)
-    if np.isfinite(fit.covariance).all() and problem.is_determined:
-        half = half_widths(fit.covariance, fit.covariance_deviation, slopes.T)
-    return np.stack([values[0], values[0] - half, values[0] + half]).reshape(3, outputs, grid.size)
+    inputs, (name, grid) = config.data.inputs, varied
+    columns = {other: [*column, *[column[0]] * grid.size] for other, column in inputs.items()}
+    if name:
+        columns[name] = [*inputs[name], *grid.tolist()]
+    count = len(config.data.lines)
+    predict = prediction(config, law, names, columns, count + grid.size)
+
+    def predict_with_curve(rows: Array) -> Array:
+        values = predict(rows).reshape(len(rows), -1, count + grid.size)
+        parts = np.split(values, [count], axis=2)
+        return np.concatenate([part.reshape(len(rows), -1) for part in parts], axis=1)
+
+    return predict_with_curve
+
+
+def _curve(config: Config, fit: Fit) -> Array:
+    """Collect the outputs over the varied input, with the ends of the band of 95 % without the noise."""
+    assert config.data is not None
+    curve, half = fit.other_predicted, fit.other_half_width
+    return np.stack([curve, curve - half, curve + half]).reshape(3, len(config.data.outputs), -1)
 
 
 def determined_groups(config: Config, model: ForceModel, names: Sequence[str], fit: Fit) -> list[str]:

@@ -156,13 +156,14 @@ class Fit:
     estimate : parameters, shape (p,)
     lower, upper : ends of the intervals of 95 % by profile likelihood, shape (p,); NaN where a parameter is not
         identified; a bound where the interval reaches it
-    covariance, covariance_deviation : of the parameters in the linear approximation, and its standard deviation,
-        as far as the noise is estimated, shape (p, p)
+    covariance : of the parameters in the linear approximation, shape (p, p)
     identifiable : whether the measurements determine each parameter, shape (p,)
     unidentified : directions in the logarithms of the parameters (in units of the bounds for those that may be
         negative or zero) that do not change the prediction, shape (k, p)
     predicted, residual : at the points; the residual is measured minus predicted, shape (n,)
     jacobian : derivatives of the predictions by the parameters, shape (n, p)
+    other_predicted, other_half_width : the other values that the final function predicts, and the half-widths of
+        their intervals of 95 %, without the noise, shape (k,)
     chi2_reduced : with noise "scale" the variance of the points in units of the given variances
     p_value : probability of a larger chi2; NaN where the noise is estimated from the residuals
     aicc : corrected information criterion of Akaike; NaN with too few points
@@ -175,12 +176,13 @@ class Fit:
     lower: Array
     upper: Array
     covariance: Array
-    covariance_deviation: Array
     identifiable: Mask
     unidentified: Array
     predicted: Array
     residual: Array
     jacobian: Array
+    other_predicted: Array
+    other_half_width: Array
     chi2_reduced: float
     p_value: float
     excess: float
@@ -197,6 +199,9 @@ class FitProblem:
     key: str
     bounds: Bounds
     data: DataPoints
+    # of the function for the final predictions and their derivatives, which may predict more values than are
+    # measured, after these; "" for the same
+    final_key: str = ""
 
     @property
     def count(self) -> int:
@@ -208,9 +213,9 @@ class FitProblem:
         """Whether there are more points than parameters, of the noise too."""
         return self.data.values.size > self.count + (self.data.noise != "given")
 
-    def predict(self, evaluate: Evaluate, u: Array) -> Array:
+    def predict(self, evaluate: Evaluate, u: Array, *, is_final: bool = False) -> Array:
         """Predict the measurements from rows u, shape (k, p) to (k, n)."""
-        return evaluate(self.key, self.bounds.values(u))
+        return evaluate((is_final and self.final_key) or self.key, self.bounds.values(u))
 
     def scale(self, predicted: Array) -> Array:
         """Subtract the measurements from predictions, in given standard deviations, shape (..., n)."""
@@ -396,7 +401,7 @@ def profile_end(
 
 
 def final_jacobian(problem: FitProblem, evaluate: Evaluate, u: Array) -> tuple[Array, Array]:
-    """Predict, shape (n,), with derivatives by u, shape (n, p), of fourth order inside the bounds."""
+    """Predict by the final function, shape (n,), with derivatives by u, shape (n, p), of fourth order inside."""
     count = problem.count
     steps = np.minimum(FINAL_STEP, 0.5 * np.minimum(u, 1.0 - u))
     inside = steps > 1e-2 * FINAL_STEP
@@ -415,7 +420,7 @@ def final_jacobian(problem: FitProblem, evaluate: Evaluate, u: Array) -> tuple[A
     rows = np.tile(u, (4 * count + 1, 1))
     for parameter in range(count):
         rows[4 * parameter : 4 * parameter + 4, parameter] += offsets[parameter]
-    predicted = problem.predict(evaluate, np.clip(rows, 0.0, 1.0))
+    predicted = problem.predict(evaluate, np.clip(rows, 0.0, 1.0), is_final=True)
     jacobian = np.einsum("pk,pkn->np", weights, predicted[:-1].reshape(count, 4, predicted.shape[1]))
     return predicted[-1], jacobian
 
@@ -469,8 +474,19 @@ class _Minimum:
     # of the largest likelihood; with noise "excess" the minimum is that of the restricted one
     objective: float
     best: Estimate
-    predicted: Array
-    jacobian: Array
+    # the measurements and the other values that the final function predicts, and their derivatives by u
+    all_predicted: Array
+    all_slopes: Array
+
+    @property
+    def predicted(self) -> Array:
+        """Predict the measurements, shape (n,)."""
+        return self.all_predicted[: self.problem.data.values.size]
+
+    @property
+    def jacobian(self) -> Array:
+        """Differentiate the predictions of the measurements by u, shape (n, p)."""
+        return self.all_slopes[: self.problem.data.values.size]
 
     @cached_property
     def scaled_jacobian(self) -> Array:
@@ -613,19 +629,27 @@ class _Minimum:
         intervals[:, np.diag(self.covariance) > 0.0] = np.reshape(ends, (-1, 2)).T
         slope = problem.bounds.slope(best.u)
         data, squares = problem.data, float(self.white_residual @ self.white_residual)
+        covariance, deviation = (
+            matrix * np.outer(slope, slope) for matrix in (self.covariance, self.covariance_deviation)
+        )
+        other_slopes = (self.all_slopes / slope)[data.values.size :]
+        half_width = np.full(len(other_slopes), np.nan)
+        if np.isfinite(covariance).all() and problem.is_determined:
+            half_width = half_widths(covariance, deviation, other_slopes)
         left_out = (data.values - np.array(predictions)) / data.sigma if predictions else np.array([np.nan])
         return Fit(
             status=self._status(),
             estimate=problem.bounds.values(best.u),
             lower=problem.bounds.values(lower),
             upper=problem.bounds.values(upper),
-            covariance=self.covariance * np.outer(slope, slope),
-            covariance_deviation=self.covariance_deviation * np.outer(slope, slope),
+            covariance=covariance,
             identifiable=self.identifiable,
             unidentified=self.unidentified,
             predicted=self.predicted,
             residual=data.values - self.predicted,
             jacobian=self.jacobian / slope,
+            other_predicted=self.all_predicted[data.values.size :],
+            other_half_width=half_width,
             chi2_reduced=squares / self.freedom if self.freedom > 0 else math.nan,
             p_value=float(chi2.sf(squares, self.freedom)) if data.noise == "given" else math.nan,
             excess=best.excess,

@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..array_types import Array
+from ..config.measurements import SIGMA
 from ..contact.variables import OUTPUTS
 from ..errors import UsageError, did_you_mean
 from ..formatting import decimals, safe_text
 from ..results.calibration import calibration_title, fit_status
 from ..results.kinds import is_calibration
 from .curves import CurveData, Panel, curve_of, x_axis_fields
-from .data import SIGMA, Points
+from .data import Points
 from .kinds import Choice, Kind
 from .labels import model_label
 from .slices import conditions_of

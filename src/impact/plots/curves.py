@@ -18,9 +18,10 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import ArrayLike
 
+from ..config.measurements import SIGMA
 from ..errors import UsageError
 from ..formatting import NO_BREAK, heading
-from .data import MEASURED, SIGMA, Points
+from .data import MEASURED, Points
 from .kinds import Choice
 from .labels import label_axis, pretty_conditions, symbol, words_of
 from .slices import unit_of
@@ -256,7 +257,7 @@ def _draw_points(axes: Axes, panel: Panel, points: Points) -> dict[str, Artist]:
         bars = axes.errorbar(
             points.columns[panel.x_name],
             points.columns[name],
-            points.columns.get(SIGMA),
+            points.columns.get(f"{SIGMA}_{name}", points.columns.get(SIGMA)),
             color="black",
             zorder=3,
             marker="o",

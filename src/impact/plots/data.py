@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import io
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import Field, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
-from ..config.columns import columns_of_table, read_csv
-from ..config.quantities import Quantity, as_text
-from ..config.tables import SWEEP_QUANTITIES
+from ..config.columns import columns_of_table, complete_rows, near_miss, read_csv
+from ..config.measurements import SIGMA, SPECIMEN, derive_impacts
+from ..config.quantities import Quantity
+from ..config.tables import LABORATORY, STANDARD_GRAVITY, SWEEP_QUANTITIES
 from ..contact.variables import HISTORY, OUTPUTS
-from ..errors import ConfigError, UsageError, did_you_mean
-from ..formatting import heading, number
+from ..errors import ConfigError, UsageError
+from ..formatting import heading, number, safe_text
 from ..results.schema import plain_unit
 
 if TYPE_CHECKING:
@@ -26,7 +28,6 @@ if TYPE_CHECKING:
 # suffixes of a table, and its forms
 TABLE_SUFFIXES = (".csv", ".tex", ".parquet")
 TABLE_FORMS = ("wide", "long")
-SIGMA = "sigma"
 MEASURED = "Measured"
 
 
@@ -114,26 +115,50 @@ class Points:
     columns: Mapping[str, tuple[float, ...]]
 
 
-def read_points(points: str | Path | pd.DataFrame | xr.Dataset) -> Points:
-    """Read measured points of a CSV file or of a table of pandas or xarray.
+def read_points(points: str | Path | Mapping[str, Sequence[object]] | pd.DataFrame | xr.Dataset) -> Points:
+    """Read measured points of a CSV file, a mapping of lists, or a table of pandas or xarray.
 
     The names of the columns are those of inputs and variables, with their units in brackets: "v1 [mm/s]". Without
-    a unit a column is in SI. `sigma` is the standard deviation of the variable in the
-    column before it, by default in its unit.
+    a unit a column is in SI. `sigma` is the standard deviation of the variable in the column before it, by default
+    in its unit, `sigma_NAME` that of a variable. Heights and times of flight are taken as in [data]. Warnings name
+    other columns, and count the rows in which a value is missing, which are left out.
     """
     quantities = _column_quantities()
-    is_file = isinstance(points, str | Path)
-    columns = read_csv(Path(points), quantities.__getitem__) if is_file else columns_of_table(points, "points")
-    values: dict[str, tuple[float, ...]] = {}
-    variable = ""
-    for name in columns.units:
-        if name not in quantities:
-            raise ConfigError(columns.problem(f"got {as_text(name)}; {did_you_mean(name, sorted(quantities))}"))
+    if isinstance(points, str | Path):
+        columns = read_csv(Path(points), quantities.__getitem__)
+    else:
+        columns = columns_of_table(points, "points")
+    used = [name for name in columns.cells if name in quantities]
+    unused = [name for name in columns.cells if name not in quantities and name != SPECIMEN]
+    problems = [
+        columns.problem(f'no such input or variable; did you mean "{meant}"?', name)
+        for name in unused
+        if (meant := near_miss(name, quantities))
+    ]
+    if not used:
+        problems.append(columns.problem("got no known column, expected such as v1 [m/s] or e_out"))
+    rows, count, gaps = complete_rows(columns, used)
+    problems += [columns.problem(message, name, row) for name, row, message in gaps]
+    if problems:
+        raise ConfigError(*problems)
+    for note in (count, f"columns without use: {', '.join(unused)}" if unused else ""):
+        if note:
+            warnings.warn(safe_text(f"{columns.source}: {note}", 1000), stacklevel=2)
+    columns, values, variable = columns.take(rows), {}, ""
+    for name in used:
         quantity, unit = quantities[name], ""
-        if name == SIGMA and variable:
-            quantity, unit = replace(quantity, unit=quantities[variable].unit), columns.units[variable]
+        if name.startswith(SIGMA):
+            # it has the unit of the variable whose deviations they are
+            measured = name.removeprefix(f"{SIGMA}_") if name != SIGMA else variable
+            unit = columns.units.get(measured, "")
+            quantity = replace(quantity, unit=quantities[measured].unit) if measured else quantity
         values[name] = tuple(map(float, columns.values(name, quantity, None, unit)))
         variable = name
+    if not LABORATORY.keys().isdisjoint(values):
+        specimens = list(map(str, columns.cells.get(SPECIMEN, [""] * len(rows))))
+        derived, kept = derive_impacts(values, rows, specimens, STANDARD_GRAVITY)
+        others = {name: [column[i] for i in kept] for name, column in values.items() if name not in LABORATORY}
+        values = {name: tuple(column) for name, column in (derived | others).items()}
     return Points(columns.source, values)
 
 
@@ -147,4 +172,8 @@ def _column_quantities() -> dict[str, Quantity]:
     inputs = {name: Quantity(rule.unit, rule.meaning) for name, rule in SWEEP_QUANTITIES.items()}
     time, impulse = Quantity("s", "time"), Quantity("N s", "impulse")
     sigma = Quantity("1", "standard deviation", least=0.0)
-    return {**outputs, **inputs, "t": time, "tau": impulse, SIGMA: sigma}
+    laboratory = {name: quantity for name, (quantity, _) in LABORATORY.items()}
+    deviations = {
+        f"{SIGMA}_{name}": replace(sigma, unit=quantity.unit) for name, quantity in (outputs | laboratory).items()
+    }
+    return {**outputs, **inputs, "t": time, "tau": impulse, SIGMA: sigma, **laboratory, **deviations}

@@ -14,6 +14,7 @@ from ..contact.model import ForceModel
 from ..engine.plugins import read_plugins
 from ..errors import UsageError
 from ..results.single_impact import Impact, histories
+from ..results.xarray_backend import result_of
 from .data import PlotData, Points, read_points
 from .kinds import STUDIES, Choice, Look, default_kind, find_kind
 from .labels import check_labels, escape_mathtext, pretty_conditions
@@ -28,7 +29,7 @@ DEFAULT_LOOK = Look()
 
 
 def plot(
-    dataset: xr.Dataset | Impact,
+    dataset: xr.Dataset | Impact | str | Path,
     *,
     kind: str | None = None,
     x: str | None = None,
@@ -52,7 +53,7 @@ def plot(
 
     Parameters
     ----------
-    dataset : a result, a time history, or an impact of `run`
+    dataset : a result or its file, a time history, or an impact of `run`
     kind : one of `impact.plots.kinds.KINDS`; by default "final-velocities", "uncertainty" for samples of uncertain
         inputs, "loop" for an impact, or "calibration" or "sensitivity" for the result of that function
     x : the coordinate to draw over; by default e, else the first numeric axis
@@ -93,6 +94,7 @@ def plot(
         if dataset.history is None:
             raise UsageError(f"no motion to draw: {dataset.why_no_history}")
         dataset = dataset.history
+    dataset = result_of(dataset)
     choice = Choice(x, y, variable, sel, models, log, equations, frictions)
     look = Look(width, height, style, title, labels)
     return draw(get_plot_data(dataset, kind or default_kind(dataset).name, choice, plugins), look, points, ax)

@@ -12,6 +12,7 @@ from ..config.grid import SAMPLE
 from ..contact.model import ForceModel
 from ..errors import UsageError
 from ..formatting import quantity, safe_text
+from ..results.xarray_backend import result_of
 from .draw import plot
 from .kinds import STUDIES, default_kind, find_kind, kinds_of, source_of
 from .slices import unit_of, x_axis
@@ -23,12 +24,12 @@ if TYPE_CHECKING:
 DPI = 110
 
 
-def explore(dataset: xr.Dataset, *, plugins: Sequence[ForceModel | str | Path] = ()) -> VBox:
+def explore(dataset: xr.Dataset | str | Path, *, plugins: Sequence[ForceModel | str | Path] = ()) -> VBox:
     """Show a result with controls in a notebook: the kind of picture, the models, and a slider for each axis.
 
     Parameters
     ----------
-    dataset : a result
+    dataset : a result, or its file
     plugins : see `plot`
 
     Returns
@@ -46,6 +47,7 @@ def explore(dataset: xr.Dataset, *, plugins: Sequence[ForceModel | str | Path] =
         import ipywidgets
     except ImportError:
         raise UsageError('needs ipywidgets; pip install "impact-sweep[notebook]"') from None
+    dataset = result_of(dataset)
     if "model" not in dataset.dims:
         raise UsageError("expected the result of a sweep, with models; impact.plot draws a time history")
 

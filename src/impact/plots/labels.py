@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Collection, Iterator, Mapping
-from functools import cache
+from functools import cache, partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -193,7 +193,8 @@ def label_axis(
 
 def number_axis(axis: Axis, size: float = 1.0, *, log: bool = False) -> None:
     """Write the numbers of an axis, in multiples of `size`; logarithmic ones are few, and never between powers."""
-    axis.set_major_formatter(FuncFormatter(lambda value, _: typographic(value / size, powers=log)))
+    # a function of a module, so that a figure can be pickled
+    axis.set_major_formatter(FuncFormatter(partial(_tick_text, size=size, log=log)))
     if log:
         low, high = sorted(axis.get_view_interval())
         narrow = (1.0, 2.0, 5.0) if high < 1e2 * low else (1.0, 3.0)
@@ -203,6 +204,10 @@ def number_axis(axis: Axis, size: float = 1.0, *, log: bool = False) -> None:
         axis.set_major_locator(DegreeLocator("auto", steps=[1, 2, 2.5, 5, 10], min_n_ticks=3))
     else:
         axis.set_major_locator(MaxNLocator("auto", steps=[1, 2, 2.5, 5, 10], min_n_ticks=3))
+
+
+def _tick_text(value: float, position: int, *, size: float, log: bool) -> str:
+    return typographic(value / size, powers=log)
 
 
 class DegreeLocator(MaxNLocator):

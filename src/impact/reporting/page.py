@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -37,14 +36,14 @@ from ..results.calibration import (
     fit_rows,
 )
 from ..results.kinds import is_calibration, is_sensitivity
-from ..results.plausibility import depth_summary, material_notes, result_notes
+from ..results.plausibility import material_notes, result_notes, with_depths
 from ..results.ranking import DEFAULT_TOL, Ranking, rank_models, rankable_parts
 from ..results.replay_command import describe_point
 from ..results.schema import FIT_STATUSES, count_points, exponents_of
 from ..results.sensitivity import INDEX_HEADINGS, describe_design, describe_study, index_rows, iterate_studies
 from ..results.slabs import MAX_SUMMARY_POINTS, is_large
 from ..results.summary import Summary, extremes_of, summarize
-from ..results.xarray_backend import load
+from ..results.xarray_backend import result_of
 from .figures import at_text, coordinate_text, figures_of
 
 if TYPE_CHECKING:
@@ -87,7 +86,7 @@ def report(
         if output.suffix.lower() not in (".html", ".htm"):
             raise UsageError(f"{output}: expected a name that ends in .html")
         check_outputs([output], [dataset, *plugins], overwrite=overwrite)
-    text = page(load(dataset) if isinstance(dataset, str | Path) else dataset, plugins)
+    text = page(result_of(dataset), plugins)
     if output is not None:
         write_file(output, text.encode(), overwrite=overwrite)
     return text
@@ -97,8 +96,7 @@ def page(dataset: xr.Dataset, plugins: Sequence[ForceModel | str | Path] = ()) -
     """Write a result as one page of HTML; for errors see `report`."""
     if "model" not in dataset.dims:
         raise UsageError("got a time history, expected the result of a sweep")
-    summary, depths = summarize(dataset, MAX_FAILED), depth_summary(dataset)
-    summary = replace(summary, deep=depths.deep, deepest=depths.deepest)
+    summary = with_depths(summarize(dataset, MAX_FAILED), dataset)
     fits = _fits_section(dataset) if is_calibration(dataset) else None
     studies = list(_studies(dataset)) if is_sensitivity(dataset) else []
     ranked, headline = (None, "") if fits or studies else _rank_models(dataset)

@@ -21,8 +21,9 @@ from ..display import Block, Displayed, Table, Wrapped
 from ..engine.checkpoint import write_range
 from ..engine.execute import context_of, integrate_columns
 from ..engine.plan import Plan
-from ..engine.run import Run, ignore
+from ..engine.run import Run
 from ..engine.trajectories import RANGE_TRAJECTORIES, TrajectoryMap, keys_of
+from ..errors import warn
 from .layouts import LAYOUTS
 from .schema import dataset_template, stored_variables
 from .sweep import prepare
@@ -139,7 +140,7 @@ def estimate(
     plugins: Sequence[ForceModel | str | Path] = (),
     jobs: int = 1,
     max_points: int = MAX_POINTS,
-    on_note: Callable[[str], None] = ignore,
+    on_note: Callable[[str], None] = warn,
 ) -> Estimate:
     """Count the points and trajectories of a sweep, and estimate its size and time; nothing is written.
 
@@ -147,7 +148,7 @@ def estimate(
     ----------
     source, overrides, plugins, max_points : see `sweep`
     jobs : number of processes or threads that integrate
-    on_note : called with a sentence about each implausible value
+    on_note : called with a sentence about each implausible value; by default an `ImpactWarning`
 
     Raises
     ------

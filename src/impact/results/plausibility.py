@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ..contact.status import Status
@@ -54,7 +55,13 @@ def result_notes(summary: Summary) -> Iterator[str]:
         )
 
 
-def depth_summary(dataset: xr.Dataset) -> Summary:
+def with_depths(summary: Summary, dataset: xr.Dataset) -> Summary:
+    """Add `deep` and `deepest` of a dataset to its summary."""
+    depths = _depth_summary(dataset)
+    return replace(summary, deep=depths.deep, deepest=depths.deepest)
+
+
+def _depth_summary(dataset: xr.Dataset) -> Summary:
     """Find `deep` and `deepest` from the radii, without models of more computed points than a summary has."""
     summary = Summary()
     axes = [str(dim) for dim in dataset.sizes if dim != "model"]

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 
-from ..config.draft import Draft, Setting, open_text
+from ..config.draft import Draft, open_text, settings_of
 from ..config.grid import MAX_POINTS
 from ..config.load import Config, Purpose, build
 from ..engine.plugins import Plugins
@@ -33,7 +33,7 @@ def stored_config(
     if not allow_changed_plugins:
         for reason in (*changed_plugins(attributes, plugins, name), *unknown_plugins(attributes, plugins, name)):
             raise UsageError(reason)
-    return build(draft.with_settings(map(Setting.parse, overrides)), max_points, purpose)
+    return build(draft.with_settings(settings_of(overrides)), max_points, purpose)
 
 
 def stored_draft(attributes: Mapping[str, object], plugins: Plugins, name: str) -> Draft:
@@ -45,7 +45,7 @@ def stored_draft(attributes: Mapping[str, object], plugins: Plugins, name: str) 
         raise ResultError(f"{name}: its attribute config is not text")
     check_plugins(attributes, plugins, name)
     stored = read_attribute(attributes, "config_set", name, required=True)
-    return open_text(text, name, plugins.models).with_settings(map(Setting.parse, stored))
+    return open_text(text, name, plugins.models).with_settings(settings_of(stored))
 
 
 def config_of_part(config: Config, dataset: xr.Dataset) -> Config:

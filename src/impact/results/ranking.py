@@ -6,7 +6,8 @@ import math
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, Literal
+from pathlib import Path
+from typing import Any, Literal, overload
 
 import numpy as np
 import xarray as xr
@@ -24,6 +25,7 @@ from .replay_command import describe_point
 from .schema import columns_along, foreign_dims
 from .selection import law_positions, select
 from .slabs import Slab, distinct_points, is_computed, over_varying_dims, slabs, varying_dims
+from .xarray_backend import result_of
 
 # lazy results with more points are not ranked; this many take some minutes
 MAX_RANKED_POINTS = 2**30
@@ -151,12 +153,24 @@ class Ranked:
 
 
 @dataclass(frozen=True)
-class Ranking(Displayed):
+class Ranking(Displayed, Sequence[Ranked]):
     """The models or pairs of a result, ordered by their share of points within the tolerance, then by errors."""
 
     tol: float
     models: tuple[Ranked, ...]
     criterion: Criterion = BY_ERROR
+
+    @overload
+    def __getitem__(self, index: int) -> Ranked: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> tuple[Ranked, ...]: ...
+
+    def __getitem__(self, index: int | slice) -> Ranked | tuple[Ranked, ...]:
+        return self.models[index]
+
+    def __len__(self) -> int:
+        return len(self.models)
 
     @property
     def headings(self) -> tuple[str, ...]:
@@ -223,7 +237,7 @@ class Ranking(Displayed):
 
 
 def recommend(
-    dataset: xr.Dataset,
+    dataset: xr.Dataset | str | Path,
     *,
     tol: float = DEFAULT_TOL,
     sel: Mapping[str, float | str] | None = None,
@@ -242,7 +256,7 @@ def recommend(
 
     Parameters
     ----------
-    dataset : a result
+    dataset : a result, or its file
     tol : largest accepted |e_out - e|, or distance from the target
     sel : values of axes, such as `{"m2": 1.0}`; by default all values of an axis are ranked
     models : keys of the models to rank; by default all
@@ -263,6 +277,7 @@ def recommend(
     >>> print(impact.recommend(result, models=["gharib-hurmuzlu-2012"]).headline)
     no model gives e within 0.01 everywhere; gharib-hurmuzlu-2012 is nearest: 25.7% of 101 points
     """
+    dataset = result_of(dataset)
     require_sweep(dataset, "recommend")
     if not 0.0 < tol < math.inf:
         raise UsageError(f"tol: got {tol:g}, expected a positive finite number")

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from ..atomic import atomic_write, check_outputs
+from ..config.draft import settings_of
 from ..config.grid import MAX_POINTS
 from ..config.tables import CORES
 from ..contact.model import ForceModel
@@ -27,7 +28,7 @@ from ..engine.plan import Plan
 from ..engine.plugins import read_plugins
 from ..engine.run import ProgressCallback, ProgressCounter, Run, ignore, never, report_kept_ranges
 from ..engine.trajectories import TrajectoryRange
-from ..errors import ResultError, StoreError, UnfinishedError, UsageError
+from ..errors import ResultError, StoreError, UnfinishedError, UsageError, warn
 from .outcome import SweepOutcome
 from .provenance import stored_config
 from .schema import dataset_template
@@ -115,7 +116,7 @@ def sweep_shard(
     max_points: int = MAX_POINTS,
     overwrite: bool = False,
     on_progress: ProgressCallback = ignore,
-    on_note: Callable[[str], None] = ignore,
+    on_note: Callable[[str], None] = warn,
     should_stop: Callable[[], bool] = never,
 ) -> ShardProgress:
     """Integrate one shard of a sweep into its work folder; `merge` joins the folders of all shards.
@@ -146,7 +147,7 @@ def sweep_shard(
     # the command of the whole sweep: `merge` reports it for a missing shard
     config = str(source) if isinstance(source, str | Path) else "CONFIG.toml"
     command = ["impact", "sweep", config, "-o", str(output)]
-    command += [word for change in overrides for word in ("--set", change)]
+    command += [word for setting in settings_of(overrides) for word in ("--set", setting.override)]
     command += [word for path in plugins if isinstance(path, str | Path) for word in ("--plugin", str(path))]
     with run.connected() as connected:
         progress = _complete_shard(Path(output), plan, chosen, command, connected)

@@ -16,7 +16,7 @@ import xarray as xr
 
 from .._version import __version__
 from ..config.design import distribution_paths
-from ..config.draft import Draft, Setting, listed_names, open_config, open_text
+from ..config.draft import Draft, Setting, listed_names, open_config, open_text, settings_of
 from ..config.files import as_table
 from ..config.grid import Axis
 from ..config.input_names import SWEEP_INPUTS, InputName, input_values
@@ -528,14 +528,14 @@ def open_source(source: ConfigSource, overrides: Sequence[str], plugins: Plugins
         return _open_stored(source, overrides, plugins, "the result")
     if source is None:
         draft = open_text(STARTER_CONFIG.read_text(encoding="utf-8"), "starter", plugins.models)
-        draft = draft.with_settings([STARTER_E, *map(Setting.parse, overrides)])
+        draft = draft.with_settings([STARTER_E, *settings_of(overrides)])
         return PointSource(draft, plugins, has_selection=("models",) in draft.origins)
     draft = open_config(Path(source) if isinstance(source, str) else source, plugins.models)
-    return PointSource(draft.with_settings(map(Setting.parse, overrides)), plugins)
+    return PointSource(draft.with_settings(settings_of(overrides)), plugins)
 
 
 def _open_stored(dataset: xr.Dataset, overrides: Sequence[str], plugins: Plugins, name: str) -> PointSource:
-    calibration, settings = None, tuple(map(Setting.parse, overrides))
+    calibration, settings = None, tuple(settings_of(overrides))
     if is_calibration(dataset):
         config = stored_config(dataset.attrs, (), plugins, name, allow_changed_plugins=True, purpose="calibrate")
         calibration = Calibration(dataset.load(), config, settings, name)

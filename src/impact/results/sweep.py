@@ -27,11 +27,11 @@ from ..engine.plan import Plan
 from ..engine.plugins import read_plugins
 from ..engine.run import DEFAULT_RUN, ProgressCallback, ProgressCounter, Run, ignore, never, report_kept_ranges
 from ..engine.trajectories import RANGE_TRAJECTORIES, TrajectoryRange
-from ..errors import ResultError, StoreError, UnfinishedError, UsageError
+from ..errors import ResultError, StoreError, UnfinishedError, UsageError, warn
 from .layouts import LAYOUTS, FillSlab
 from .netcdf import MAX_LABEL_BYTES, encode_text, is_text
 from .outcome import SweepOutcome
-from .plausibility import material_notes
+from .plausibility import material_notes, result_notes, with_depths
 from .schema import dataset_template, plan_coordinates, stored_variables
 from .summary import summarize
 from .trajectory_table import TrajectoryTable, in_memory, lazy_dataset, table_of_ranges
@@ -112,6 +112,10 @@ def sweep(
         `output` exists
     StoreError : the disk is full or failed; or processes were killed repeatedly
 
+    Warns
+    -----
+    ImpactWarning : an input or the result is probably not what was intended
+
     >>> import impact
     >>> result = impact.sweep({
     ...     "models": ["lankarani-nikravesh-1990"],
@@ -132,19 +136,24 @@ def sweep(
     with bar as on_progress:
         if output is None:
             run = Run(backend, max_points=max_points, on_progress=on_progress)
-            return sweep_in_memory(prepare(source, overrides, plugins, run), run)
-        sweep_to_file(
-            source,
-            output,
-            overrides=overrides,
-            plugins=plugins,
-            backend=backend,
-            max_points=max_points,
-            resume=resume,
-            overwrite=overwrite,
-            on_progress=on_progress,
-        )
-    return load(output)
+            result = sweep_in_memory(prepare(source, overrides, plugins, run), run)
+            summary = with_depths(summarize(result), result)
+        else:
+            outcome = sweep_to_file(
+                source,
+                output,
+                overrides=overrides,
+                plugins=plugins,
+                backend=backend,
+                max_points=max_points,
+                resume=resume,
+                overwrite=overwrite,
+                on_progress=on_progress,
+            )
+            result, summary = load(output), outcome.summary
+    for note in result_notes(summary):
+        warn(note)
+    return result
 
 
 def sweep_to_file(
@@ -158,7 +167,7 @@ def sweep_to_file(
     resume: bool = False,
     overwrite: bool = False,
     on_progress: ProgressCallback = ignore,
-    on_note: Callable[[str], None] = ignore,
+    on_note: Callable[[str], None] = warn,
     should_stop: Callable[[], bool] = never,
 ) -> SweepOutcome:
     """Run a sweep into a file and summarize it, without reading the file again.
@@ -173,7 +182,7 @@ def sweep_to_file(
     resume : continue with the work folder of an interrupted sweep
     overwrite : replace the file if it exists
     on_progress : called from time to time with the progress
-    on_note : called with a sentence about each implausible value
+    on_note : called with a sentence about each implausible value; by default an `ImpactWarning`
     should_stop : returns whether to stop; finished ranges stay in the work folder
 
     Returns

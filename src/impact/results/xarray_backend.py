@@ -17,12 +17,14 @@ from ..atomic import Sink, atomic_write, check_output, check_outputs
 from ..config.files import RESULT_MAGIC
 from ..config.grid import MAX_POINTS
 from ..config.tables import Output
+from ..contact.variables import OUTPUTS
 from ..errors import ResultError, UnfinishedError, UsageError
 from ..formatting import safe_text
 from .hdf5_structure import byte_reader, check_root
-from .kinds import require_sweep
+from .kinds import kind_of, require_sweep
 from .layouts import LAYOUTS
 from .netcdf import RegionValues, encode_attribute, read_variables, write_dataset
+from .schema import MODEL_METADATA
 from .seal import check_seal, write_seal
 from .selection import law_positions, select
 from .slabs import slabs
@@ -180,6 +182,26 @@ def load(path: str | Path) -> xr.Dataset:
         return dataset
     with dataset, _named_errors(path):
         return dataset.load() if table_of_result(dataset) is None else in_memory(dataset)
+
+
+def result_of(result: object) -> xr.Dataset:
+    """Open what a function takes as a result: a dataset, or the file of one; a selected law stays a dimension.
+
+    Raises
+    ------
+    UsageError : it is something else
+    """
+    if isinstance(result, str | Path):
+        return load(result)
+    if not isinstance(result, xr.Dataset):
+        raise UsageError(f"result: got a {type(result).__name__}, expected a dataset, or the file of a result")
+    for dim in ("friction", "model"):
+        if dim in result.coords and result[dim].ndim == 0 and kind_of(result) == "sweep":
+            metadata = ("exponent", *MODEL_METADATA) if dim == "model" else ()
+            along = [name for name, output in OUTPUTS.items() if dim in output.dims and name in result]
+            names = [dim, *along, *(name for name in metadata if name in result.coords)]
+            result = result.assign({name: result[name].expand_dims(dim) for name in names})
+    return result
 
 
 def expand(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import cache
 
-from ..catalogue import by_key, declared_laws, look_up
+from ..catalogue import by_key, declared_laws, look_up, pickle_by_key
 from ..friction import FrictionLaw
 
 # the order of a list of friction laws, by what they remember
@@ -31,3 +31,6 @@ def find_friction(key: str) -> FrictionLaw:
     ModelError : no friction law has this key; the message names the nearest one
     """
     return look_up(frictions(), key, "friction law")
+
+
+pickle_by_key(FrictionLaw, find_friction)

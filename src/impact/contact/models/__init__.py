@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from functools import cache
 
-from ..catalogue import by_key, declared_laws, look_up
+from ..catalogue import by_key, declared_laws, look_up, pickle_by_key
 from ..model import ForceModel
 
 # families in the order of the paper; other families follow
@@ -56,3 +56,6 @@ def original_key(key: str) -> str:
     """
     model = catalogue().get(key)
     return model.same_as if model is not None and model.same_as else key
+
+
+pickle_by_key(ForceModel, find)

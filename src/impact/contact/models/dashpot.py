@@ -27,6 +27,16 @@ DELIVERED_RESTITUTION: dict[str, Formula] = {
 }
 
 
+def drag_exponent(n: float) -> float:
+    """The exponent of the indentation in the damping."""
+    return (n - 1) / 2
+
+
+def dashpot_force(elastic: Array, x: Array, v: Array, n: float, c: Array) -> Array:
+    """K δⁿ + c δ^((n−1)/2) δ̇, shared by all laws: those with the same c have the same motion."""
+    return dragged(elastic, power(x, drag_exponent(n)), v, c)
+
+
 def dashpot(key: str, *, zeta: Formula, release: Literal["gap", "force"], **about: Unpack[About]) -> ForceModel:
     """Make a law of a spring and a dashpot, from the formula of its damping ratio ζ = α/√(2(n+1)).
 
@@ -41,9 +51,9 @@ def dashpot(key: str, *, zeta: Formula, release: Literal["gap", "force"], **abou
         coefficients={
             "zeta": zeta,
             "c": lambda zeta, n, m, K: zeta * np.sqrt(2 * (n + 1) * m * K),
-            "q": lambda n: (n - 1) / 2,
+            "q": drag_exponent,
         },
-        force=lambda elastic, x, v, n, c: dragged(elastic, power(x, (n - 1) / 2), v, c),
+        force=dashpot_force,
         release=release,
         velocity_coordinate="force",
         oracle=DELIVERED_RESTITUTION[release],

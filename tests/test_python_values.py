@@ -1,0 +1,156 @@
+"""What Python users pass: values of other libraries, results by file, changes by path; what they keep: pickles."""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Callable
+from decimal import Decimal
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pint
+import pytest
+import xarray as xr
+
+import impact
+
+unit = pint.UnitRegistry()
+BASE = {
+    "models": ["hertz", "tsuji-1992"],
+    "sweep": {"e": [0.25, 0.5], "v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 6e9},
+}
+
+
+@pytest.fixture(scope="module")
+def result() -> xr.Dataset:
+    return impact.sweep(BASE)
+
+
+@pytest.mark.parametrize(
+    "half",
+    [
+        np.float64(0.5),
+        np.array(0.5),
+        Fraction(1, 2),
+        Decimal("0.5"),
+        0.5 * unit.dimensionless,
+        xr.DataArray(0.5),
+    ],
+    ids=lambda value: type(value).__name__,
+)
+def test_a_number_of_any_library_is_an_input(half: object, result: xr.Dataset) -> None:
+    here = impact.sweep(BASE, overrides={"sweep.e": half})
+    assert here["e_out"].values.tolist() == result["e_out"].sel(e=0.5).values.tolist()
+    assert impact.run(model="tsuji-1992", at={"e": half, "v1": 100 * unit.cm / unit.s}).point["v1"] == 1.0
+
+
+@pytest.mark.parametrize(
+    "axis",
+    [
+        np.array([0.25, 0.5]),
+        pd.Series([0.25, 0.5]),
+        pd.Index([0.25, 0.5]),
+        xr.DataArray([0.25, 0.5], dims="e"),
+        np.array([0.25, 0.5]) * unit.dimensionless,
+        (0.25, 0.5),
+    ],
+    ids=lambda value: type(value).__name__,
+)
+def test_a_sequence_of_any_library_is_an_axis(axis: object, result: xr.Dataset) -> None:
+    assert impact.sweep(BASE, overrides={"sweep.e": axis})["e_out"].equals(result["e_out"])
+
+
+def test_a_range_and_lengths_with_units_are_axes() -> None:
+    speeds = impact.sweep({**BASE, "sweep": {**BASE["sweep"], "v1": range(1, 3), "m1": [1, 2] * unit.g}})  # type: ignore[dict-item]
+    assert speeds["v1"].values.tolist() == [1.0, 2.0]
+    assert speeds["m1"].values.tolist() == [0.001, 0.002]
+
+
+@pytest.mark.parametrize(
+    "source", [None, [1], pd.DataFrame({"e": [0.1]}), b"x", 5], ids=lambda v: type(v).__name__
+)
+def test_another_type_is_named(source: object) -> None:
+    with pytest.raises(impact.UsageError, match=f"^source: got a {type(source).__name__}, expected a mapping"):
+        impact.sweep(source)  # type: ignore[arg-type]
+    with pytest.raises(impact.UsageError, match=f"^result: got a {type(source).__name__}, expected a dataset"):
+        impact.plot(source)  # type: ignore[arg-type]
+
+
+def test_a_result_may_be_given_by_its_file(result: xr.Dataset, tmp_path: Path) -> None:
+    path = tmp_path / "r.h5"
+    impact.save(result, path)
+    assert impact.recommend(str(path)) == impact.recommend(path) == impact.recommend(result)
+    assert impact.plot(path).axes
+
+
+def test_a_selected_model_is_a_result(result: xr.Dataset) -> None:
+    selected, listed = result.sel(model="tsuji-1992"), result.sel(model=["tsuji-1992"])
+    assert list(impact.recommend(selected)) == list(impact.recommend(listed))
+    assert [text.get_text() for text in impact.plot(selected, kind="restitution").texts] == [
+        text.get_text() for text in impact.plot(listed, kind="restitution").texts
+    ]
+
+
+def test_a_ranking_is_a_sequence(result: xr.Dataset) -> None:
+    ranking = impact.recommend(result)
+    assert len(ranking) == 2
+    assert ranking[0] is ranking.models[0]
+    assert [row.model for row in ranking[:1]] == [ranking.models[0].model]
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: impact.run(model="hertz"),
+        lambda: impact.models(),
+        lambda: impact.frictions(),
+        lambda: impact.recommend(impact.sweep(BASE)),
+        lambda: impact.solve("kuwabara-kono-1987", "A", {"e_out": 0.6}),
+        lambda: impact.cite("hertz"),
+    ],
+    ids=["run", "models", "frictions", "recommend", "solve", "cite"],
+)
+def test_results_can_be_pickled(make: Callable[[], object]) -> None:
+    before = make()
+    after = pickle.loads(pickle.dumps(before))
+    assert str(after) == str(before)
+
+
+def test_figures_can_be_pickled(result: xr.Dataset) -> None:
+    figure = impact.plot(result, kind="restitution")
+    again = pickle.loads(pickle.dumps(figure))
+    again.canvas.draw()
+    figure.canvas.draw()
+    assert [tick.get_text() for tick in again.axes[0].get_xticklabels()] == [
+        tick.get_text() for tick in figure.axes[0].get_xticklabels()
+    ]
+
+
+def test_a_law_of_the_catalogue_is_the_same_law_after_pickling() -> None:
+    law = impact.models()["tsuji-1992"]
+    assert pickle.loads(pickle.dumps(law)) is law
+
+
+def test_errors_are_those_of_python() -> None:
+    with pytest.raises(ValueError, match=r"got 1\.4"):
+        impact.run(at={"e": 1.4})
+    with pytest.raises(FileNotFoundError, match=r"^no\.toml: cannot be read"):
+        impact.sweep("no.toml")
+    error = pickle.loads(pickle.dumps(impact.ConfigError("a", "b\n")))
+    assert (type(error), error.problems) == (impact.ConfigError, ("a", "b\\x0a"))
+
+
+def test_implausible_inputs_and_results_are_warnings_at_the_line_of_the_user() -> None:
+    steel = {"E": 210, "nu": 0.3, "rho": 7800}
+    sweep = {"v1": -1.0, "R1": 0.01, "R2": 0.01, "material": "x"}
+    with pytest.warns(impact.ImpactWarning) as caught:
+        impact.sweep({"models": "hertz", "sweep": sweep, "materials": {"x": steel}})
+    assert [str(warning.message) for warning in caught] == [
+        "materials.x.E: got 210 Pa; did you mean 210 GPa?",
+        "none of 1 points is an impact: v1 <= v2, the balls do not approach",
+    ]
+    assert {warning.filename for warning in caught} == {__file__}
+    with pytest.warns(impact.ImpactWarning, match="peak indentation above 10% of the smaller radius"):
+        impact.sweep({"models": "hertz", "sweep": {**sweep, "v1": 2000.0, "material": "steel"}})
