@@ -346,6 +346,11 @@ class Data(Table):
         Field(None, description="a row without a value is left out (skip, the default), or an error")
     )
     g: Annotated[float, GRAVITY] = STANDARD_GRAVITY
+    fit: Annotated[
+        bool,
+        Field(strict=True, description="fit all parameters of the laws, and e, that the config does not have"),
+        expected("true or false"),
+    ] = False
     lines: Annotated[
         Any, ReadAs(list[Annotated[int, bounded_int(1)]]), expected("a list of the numbers of lines")
     ] = Field(None, description="the line of each point in the file, if the values are in columns")

@@ -248,12 +248,12 @@ def solve_input(config: Config, plugins: Plugins, unknown: Parameter, target: Ma
     Plan(config, plugins).pair_notes("frictions")
     if not (isinstance(value, int | float) and math.isfinite(value)):
         raise UsageError(f"--target {name}: got {value}, expected a finite number")
-    problem = _SolveProblem(config, plugins, unknown, name)
+    problem = SolveProblem(config, plugins, unknown, name)
     return _best_over_axis(problem, float(value)) if config.axes else _all_roots(problem, float(value))
 
 
 @dataclass(frozen=True)
-class _SolveProblem:
+class SolveProblem:
     """The target variable as a function of the unknown and of the condition, a position on the axis."""
 
     config: Config
@@ -319,7 +319,7 @@ class _SolveProblem:
         """List the allowed values that are tried first, in ascending order."""
         lower, upper = self.unknown.least, self.unknown.most
         decades = np.arange(-SCAN_DECADES * SCAN_PER_DECADE, SCAN_DECADES * SCAN_PER_DECADE + 1) / SCAN_PER_DECADE
-        sizes = self._scale() * 10.0**decades
+        sizes = self.natural_size() * 10.0**decades
         values = [sizes, np.array([bound for bound in (0.0, lower, upper) if math.isfinite(bound)])]
         if lower < 0.0:
             values.append(-sizes)
@@ -336,7 +336,7 @@ class _SolveProblem:
         exponent = {} if self.model.exponent is None else {"n": self.model.exponent}
         return with_numbers(self.unknown.unit, {**numbers, **exponent})
 
-    def _scale(self) -> float:
+    def natural_size(self) -> float:
         """Find the size of the unknown that is 1 in the contact's own units, or that of its typical value."""
         if self.unknown.typical:
             return abs(self.unknown.typical)
@@ -356,7 +356,7 @@ class _SolveProblem:
         return unit if 0.0 < unit < math.inf else 1.0
 
 
-def _all_roots(problem: _SolveProblem, target: float) -> SolveResult:
+def _all_roots(problem: SolveProblem, target: float) -> SolveResult:
     """Find all values that give the target."""
     scan = problem.scan_values()
     values = problem.evaluate(scan, is_scan=True)[problem.variable].values
@@ -402,7 +402,7 @@ def _all_roots(problem: _SolveProblem, target: float) -> SolveResult:
     return _result(problem, target, status, map(Root, roots, e_out), values)
 
 
-def _with_extrema(problem: _SolveProblem, scan: Array, values: Array, reached: Mask) -> tuple[Array, Array]:
+def _with_extrema(problem: SolveProblem, scan: Array, values: Array, reached: Mask) -> tuple[Array, Array]:
     """Add each refined interior extremum to a scan, except those that reach the target."""
     size = np.ones_like(values) if problem.is_of_order_one else np.abs(values)
     minima, maxima = _minima(values, size), _minima(-values, size)
@@ -446,7 +446,7 @@ def _runs(reached: Mask, scan: Array, bounds: set[float]) -> tuple[list[float], 
     return roots, ends
 
 
-def _best_over_axis(problem: _SolveProblem, target: float) -> SolveResult:
+def _best_over_axis(problem: SolveProblem, target: float) -> SolveResult:
     """Find the value for which the largest distance from the target over the axis of the config is least."""
     (axis,) = problem.config.axes
     conditions = np.arange(axis.size)
@@ -490,7 +490,7 @@ def _best_over_axis(problem: _SolveProblem, target: float) -> SolveResult:
 
 
 def _result(
-    problem: _SolveProblem,
+    problem: SolveProblem,
     target: float,
     status: SolveStatus,
     roots: Iterable[Root],
