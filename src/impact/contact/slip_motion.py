@@ -461,6 +461,10 @@ class SlipPhase:
         is_end = (k[0] < 0.0) & (y[0] < END_S)
         tolerance = np.where(is_end, CAP_TOLERANCE, MARGIN_TOLERANCE) / columns.G0
         sign_margin, sign_rate = columns.sign * k[-1] + MARGIN_TOLERANCE, columns.sign * local.dF
+        if self.law.model.release == "force":
+            # the contact ends where the force vanishes: it does not pull
+            apart = k[0] < 0.0
+            sign_margin, sign_rate = np.where(apart, 1.0, sign_margin), np.where(apart, 0.0, sign_rate)
         if not self.form.has_modes:
             return sign_margin[None], sign_rate[None]
         # where the contact ends growth vanishes, too, but its sign shows whether the slip has ended before
