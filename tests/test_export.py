@@ -16,6 +16,7 @@ import pytest
 import impact
 from impact.errors import ConfigError, UsageError
 from impact.exporters.export import comment_lines
+from impact.exporters.problem import prepare_export
 from impact.exporters.programs import run_program
 from impact.exporters.registry import CODES
 from impact.exporters.releases import first_law, installed_version
@@ -164,6 +165,69 @@ def test_yade_gets_twice_the_spring_and_dashpot_of_the_contact_for_each_ball() -
     assert (export.parameters["kn"], export.parameters["cn"]) == (2e6, 600.0)
 
 
+WALL = {"m2": math.inf, "R2": math.inf}
+
+
+@pytest.mark.parametrize("name", [code.name for code in CODES.values() if code.wall])
+def test_a_script_with_a_wall_has_one_ball(name: str) -> None:
+    """No text of a template is replaced twice, nothing that is infinite is written, and a wall is at rest."""
+    code = CODES[name]
+    assert [code.template.count(text) for text in code.wall] == [1] * len(code.wall)
+    config = source("soft", "soft", v2=-0.5, **WALL) | {"models": default_law(name)}
+    at = OWN_PARAMETERS.get(name, {})
+    script = impact.export(name, source=config, at=at, script=True, code_version=code.newest).script
+    assert script is not None
+    assert (
+        "ball 2 is a plane wall: m = m1, R* = 0.04 m; in a script it is at rest, and ball 1 has v1 - v2" in script
+    )
+    body = "\n".join(line for line in script.splitlines() if not line.startswith(code.comment[0]))
+    assert not re.search(r"\b(inf|nan)\b|-0\.5", body)
+    collision = prepare_export(code, default_law(name), code.newest, config, at, ()).collision(1e-6, 0.5)
+    with pytest.raises(UsageError, match="m2: got inf, expected a finite mass: no wall of"):
+        replace(code, wall={}).script(collision, code.parameters(collision))
+
+
+def test_a_wall_of_yade_before_hertzian_has_half_the_effective_radius() -> None:
+    older, newer = (
+        impact.export("yade", "yade-betan", source=source("soft", "soft", **WALL), dt=5e-6, code_version=version)
+        for version in ("2022.01a", "2023.02a")
+    )
+    assert older.contact_time == pytest.approx(newer.contact_time * 2**0.2, rel=1e-7)
+    assert any("Ig2_Wall_Sphere_ScGeom()" in line for line in older.lines)
+    assert any("Ig2_Wall_Sphere_ScGeom(hertzian=True)" in line for line in newer.lines)
+    assert older.e_continuous == pytest.approx(newer.e_continuous, rel=1e-9)
+    assert older.at_dt.e_mean != newer.at_dt.e_mean
+
+
+def test_a_wall_of_the_edinburgh_model_does_not_adhere() -> None:
+    law = "liggghts-edinburgh"
+    dry, adhesive = (
+        impact.export(
+            "liggghts",
+            source=source("soft", "soft", n=1.5, **WALL) | {"models": law, "model": {law: pair}},
+            code_version="3.8.0",
+        )
+        for pair in ({"k2": 2.0, "gamma": 0.0}, {"k2": 2.0, "gamma": 2e3})
+    )
+    assert adhesive.lines == dry.lines
+    assert adhesive.e_continuous == dry.e_continuous
+    assert "a wall does not adhere, whatever its surfaceEnergy is: 0 here" in adhesive.header
+
+
+def test_a_wall_of_another_material_is_a_stiffness_in_lammps() -> None:
+    law = "lammps-coeff-restitution-hertz"
+    one, two = (
+        impact.export("lammps", law, source=source("soft", other, **WALL), code_version="22Jul2025")
+        for other in ("soft", "hard")
+    )
+    modulus = 1.0 / ((1.0 - 0.3**2) / 1e9 + (1.0 - 0.2**2) / 5e9)
+    assert one.lines[0].startswith(
+        "fix             wall all wall/gran granular hertz/material 1000000000.0 0.5 0.3"
+    )
+    assert two.parameters["k_n"] == pytest.approx(4.0 / 3.0 * modulus)
+    assert two.lines[0].endswith("xplane NULL 0.0")
+
+
 def test_an_e_of_zero_is_the_critical_damping_of_yade() -> None:
     export = impact.export("yade", "yade-betan", source=source("soft", "soft", e=0.0))
     assert export.parameters["betan"] == 1.0
@@ -291,7 +355,11 @@ def test_every_law_of_a_code_is_in_the_list(cli: Run) -> None:
         ((), "--to: expected a code; impact export --list shows them"),
         (("--to", "lamps"), '--to: no code "lamps"; did you mean "lammps"?'),
         (("--to", "mujoco", "--model", "hertz"), 'MuJoCo has no law "hertz"; known: mujoco-solref'),
-        (("--to", "lammps", "--script", "--at", "m2=inf"), "--script: m2: got inf, expected a finite value"),
+        (("--to", "lammps", "--script", "--at", "m1=inf"), "--script: m1: got inf, expected m2 = inf for a wall"),
+        (
+            ("--to", "lammps", "--script", "--at", "m2=inf", "--at", "R2=1"),
+            "--script: m2: got inf, expected a finite value, or m2 = R2 = inf for a wall",
+        ),
         (("--to", "lammps", "--dt", "0"), "--dt: got 0, expected a finite number > 0"),
         (("--to", "lammps", "--code-version", "new"), '--code-version: got "new", expected the date of a release'),
         (

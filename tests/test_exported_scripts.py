@@ -6,6 +6,7 @@ coarse steps and at four phases, any other with the continuous law by extrapolat
 
 from __future__ import annotations
 
+import math
 import os
 import subprocess
 from collections.abc import Callable
@@ -23,7 +24,7 @@ from impact.exporters.releases import choose_version, law_of_code
 from impact.exporters.verification import verify_scripts
 
 from .conftest import Run, default_law
-from .test_peers import ENTRIES, MATERIALS, PYTHON, WITHOUT_PEER, by_impact, config_of
+from .test_peers import ENTRIES, MATERIALS, PYTHON, WITHOUT_PEER, Values, by_impact, config_of
 
 pytestmark = pytest.mark.peers
 
@@ -56,15 +57,27 @@ def code_and_version(name: str, key: str) -> tuple[Code, str, str]:
     return code, program, version
 
 
+def with_wall(collision: Values) -> Values:
+    """A wall in place of ball 2, of another material where there are some, and the same effective mass."""
+    values = collision | {"m1": 1 / (1 / collision["m1"] + 1 / collision["m2"]), "m2": math.inf, "R2": math.inf}
+    if "material" in values:
+        values |= {"material1": values.pop("material"), "material2": "hard"}
+    return values
+
+
+@pytest.mark.parametrize("second", ["ball", "wall"])
 @pytest.mark.parametrize(("name", "key"), EXPORTED, ids=[key for _, key in EXPORTED])
 def test_an_exported_script_measures_the_predicted_restitution(
-    name: str, key: str, record_property: Callable[[str, object], None]
+    name: str, key: str, second: str, record_property: Callable[[str, object], None]
 ) -> None:
+    """Of the walls, one is at rest, the other one moves."""
     code, program, version = code_and_version(name, key)
     entry = EXPORTED[name, key]
-    steps = COARSE_STEPS if code.scheme is not None else (float(entry.code.steps_per_contact),)
+    collisions = entry.collisions if second == "ball" else [with_wall(balls) for balls in entry.collisions[:2]]
+    coarse = COARSE_STEPS if second == "ball" else (COARSE_STEPS[-1], COARSE_STEPS[0])
+    steps = coarse if code.scheme is not None else (float(entry.code.steps_per_contact),)
     differences, uncertainties = [], []
-    for collision, steps_per_contact in zip(entry.collisions, steps, strict=False):
+    for collision, steps_per_contact in zip(collisions, steps, strict=False):
         source = config_of(key, collision)
         _, contact_time = by_impact(key, collision)
         export = impact.export(
@@ -77,9 +90,23 @@ def test_an_exported_script_measures_the_predicted_restitution(
         uncertainties.append(export.verification.uncertainty)
         print(export.verification)
     tolerance = TOLERANCES.get(key, 1e-9) if code.scheme is not None else max(uncertainties)
-    record_property("peer", (code.name, version, key, "script", 4 * len(differences), max(differences), tolerance))
+    variant = "script" if second == "ball" else "script, wall"
+    record_property("peer", (code.name, version, key, variant, 4 * len(differences), max(differences), tolerance))
     assert max(differences) <= tolerance
     assert max(uncertainties) <= (tolerance if code.scheme is not None else 5e-3)
+
+
+def test_a_wall_of_an_older_yade_halves_the_effective_radius() -> None:
+    """The installed release runs the lines of an older one, without hertzian, which has the same law of betan."""
+    code, program, _ = code_and_version("yade", "yade-betan")
+    source = config_of("yade-betan", with_wall(EXPORTED["yade", "yade-betan"].collisions[0]))
+    older, newer = (
+        prepare_export(code, "yade-betan", version, source, {}, ()) for version in ("2022.01a", "2023.02a")
+    )
+    dt = older.law.contact_time / 12
+    assert verify_scripts(older, program, dt).difference <= 1e-9
+    assert newer.law.contact_time == pytest.approx(older.law.contact_time / 2**0.2, rel=1e-8)
+    assert not verify_scripts(replace(older, version="2023.02a"), program, dt).agrees
 
 
 # errors that a template could have: a text of the script of a law, and what it becomes
@@ -121,11 +148,37 @@ PLANTED = (
 )
 
 
-@pytest.mark.parametrize(("name", "key", "old", "new"), PLANTED)
-def test_an_error_in_a_template_is_found(name: str, key: str, old: str, new: str) -> None:
+# the same in scripts with a wall
+PLANTED_WALLS = (
+    ("lammps", "lammps-coeff-restitution-hertz", "diameter 0.1", "diameter 0.05"),
+    ("lammps", "lammps-coeff-restitution-hertz", "wall/gran granular hertz", "wall/gran granular hooke"),
+    ("liggghts", "liggghts-hertz-limit-force", "0.0 limitForce on\n", "0.0\n"),
+    ("liggghts", "liggghts-hertz", "primitive type 2", "primitive type 1"),
+    ("yade", "yade-betan", "hertzian=True", "hertzian=False"),
+    ("mujoco", "mujoco-solref", 'zaxis="-1 0 0"', 'zaxis="-1 1 0"'),
+    ("drake", "drake-point-contact", "world_body(), pose", "world_body(), RigidTransform()"),
+    ("pybullet", "kelvin-voigt-no-tension", "contactProcessingThreshold=0", "contactProcessingThreshold=1"),
+    ("exudyn", "exudyn-carvalho-gonthier", "sphereRadius=0.05", "sphereRadius=0.0499"),
+    ("newton", "newton-semi-implicit", "-1.0, 0.0, 0.0", "-1.0, 0.3, 0.0"),
+    ("kratos", "kratos-hertz", '"search_tolerance_against_walls": 0.01', '"search_tolerance_against_walls": 0.0'),
+    (
+        "simbody",
+        "simbody-hunt-crossley",
+        "opensim.Vec3(0), model.getGround()",
+        "opensim.Vec3(0, 0, 1), model.getGround()",
+    ),
+)
+
+
+@pytest.mark.parametrize(
+    ("name", "key", "old", "new", "second"),
+    [(*words, "ball") for words in PLANTED] + [(*words, "wall") for words in PLANTED_WALLS],
+)
+def test_an_error_in_a_template_is_found(name: str, key: str, old: str, new: str, second: str) -> None:
     code, program, version = code_and_version(name, key)
     entry = EXPORTED[name, key]
-    problem = prepare_export(code, key, version, config_of(key, entry.collisions[0]), {}, ())
+    collision = entry.collisions[0] if second == "ball" else with_wall(entry.collisions[0])
+    problem = prepare_export(code, key, version, config_of(key, collision), {}, ())
 
     class Wrong(Code):
         def script(self, collision: Collision, parameters: Parameters) -> str:
@@ -139,11 +192,12 @@ def test_an_error_in_a_template_is_found(name: str, key: str, old: str, new: str
     assert not verify_scripts(replace(problem, code=Wrong(**vars(code))), program, dt).agrees
 
 
+@pytest.mark.parametrize("m2", [3.0, math.inf], ids=["ball", "wall"])
 @pytest.mark.parametrize("materials", [("soft", "hard"), ("hard", "hard")], ids="-".join)
-def test_lammps_mixes_two_materials_as_the_law_does(materials: tuple[str, str]) -> None:
+def test_lammps_mixes_two_materials_as_the_law_does(materials: tuple[str, str], m2: float) -> None:
     """With the moduli of two atom types in hertz/material; other codes are in `EXPORTED`."""
     _, program, _ = code_and_version("lammps", "lammps-coeff-restitution-hertz")
-    sweep = {"v1": 1.0, "m1": 1.0, "m2": 3.0, "R1": 0.05, "R2": 0.08, "e": 0.5}
+    sweep = {"v1": 1.0, "m1": 1.0, "m2": m2, "R1": 0.05, "R2": 0.08 if m2 == 3.0 else m2, "e": 0.5}
     source = {
         "models": "lammps-coeff-restitution-hertz",
         "materials": MATERIALS,
@@ -152,8 +206,9 @@ def test_lammps_mixes_two_materials_as_the_law_does(materials: tuple[str, str]) 
     export = impact.export("lammps", source=source, verify=True, program=program, script=True)
     assert export.verification is not None
     assert export.verification.difference <= 1e-9
-    assert export.script is not None
-    assert export.script.count("hertz/material") == len(set(materials))
+    # hertz/material of a wall takes one material
+    expected = len(set(materials)) if m2 == 3.0 else int(materials == ("hard", "hard"))
+    assert sum("hertz/material" in line for line in export.lines) == expected
 
 
 def test_every_law_of_a_code_with_scripts_is_run_or_has_a_reason() -> None:

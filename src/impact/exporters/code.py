@@ -15,7 +15,7 @@ Parameters = Mapping[str, float | str]
 
 @dataclass(frozen=True)
 class Collision:
-    """A collision of two balls on a line, as a code simulates it; everything in SI.
+    """A collision of two balls, or of a ball and a plane wall, on a line, as a code simulates it; all in SI.
 
     Parameters
     ----------
@@ -24,6 +24,7 @@ class Collision:
         effective m, R_eff, E_eff and the closing speed v0, and the law's own parameters; NaN for unknown ones
     materials : names of the materials of both balls; "" where none is given
     has_user_stiffness : K is set in the config, and does not follow from the materials
+    has_wall : ball 2 is a plane wall: its mass is infinite, and the config gives it no finite radius
     gap : between the surfaces at the start, so that the contact begins at the requested phase of a step
     steps : number of steps until the contact is over
     """
@@ -33,6 +34,7 @@ class Collision:
     values: Mapping[str, float]
     materials: tuple[str, str]
     has_user_stiffness: bool
+    has_wall: bool
     dt: float
     gap: float
     steps: int
@@ -66,12 +68,14 @@ class Collision:
         """Write the values of a script as text with all digits, in SI; ball 1 is on the left.
 
         The surfaces meet at the origin. `reach` is the distance from there that no part of a ball leaves, `skin`
-        the distance within which neighbours are searched for.
+        the distance within which neighbours are searched for. A wall is at rest: v1 is relative to it.
         """
-        for name in ("m1", "m2", "R1", "R2"):
+        for name in ("m1", "R1") if self.has_wall else ("m1", "m2", "R1", "R2"):
             if not math.isfinite(self[name]):
-                raise UsageError(f"--script: {name}: got {number(self[name])}, expected a finite value")
-        speed = abs(self["v1"]) + abs(self["v2"])
+                expected = "m2 = inf for a wall" if name == "m1" else "a finite value, or m2 = R2 = inf for a wall"
+                raise UsageError(f"--script: {name}: got {number(self[name])}, expected {expected}")
+        v1, v2 = (self["v0"], 0.0) if self.has_wall else (self["v1"], self["v2"])
+        radii = self["R1"] + (0.0 if self.has_wall else self["R2"])
         values = {
             "x1": -self["R1"] - self.gap,
             "x2": self["R2"],
@@ -80,10 +84,12 @@ class Collision:
             "dt": self.dt,
             "steps": self.steps,
             "gap": self.gap,
-            "reach": 2.0 * (self["R1"] + self["R2"] + self.gap + 2.0 * speed * self.steps * self.dt),
+            "reach": 2.0 * (radii + self.gap + 2.0 * (abs(v1) + abs(v2)) * self.steps * self.dt),
             "skin": 0.1 * min(self["R1"], self["R2"]),
+            "v1": v1,
+            "v2": v2,
         }
-        values |= {name: self[name] for name in ("R1", "R2", "m1", "m2", "v1", "v2", "v0")}
+        values |= {name: self[name] for name in ("R1", "R2", "m1", "m2", "v0")}
         return {name: repr(value) for name, value in values.items()}
 
 
@@ -98,7 +104,6 @@ class Code:
     newest : the newest release whose laws were seen, taken where the code is not installed
     tested : what was run, or what was read instead
     parameters : in the units and conventions of the code, by the code's own names
-    damping : the parameter that sets the restitution, of laws without an e
     scheme : see `impact.contact.fixed_step.SCHEMES`; None if its restitution at a time step is not predicted
     uncertainty : largest difference of e between the code and the map of its scheme
     rough : the same by law, where the code itself finds the damping only roughly
@@ -111,6 +116,9 @@ class Code:
     notes : remarks on a law: mixing of two materials, thresholds, clamps, versions
     warnings : what a user has to know before using the lines
     template : a complete input that prints `e_out = VALUE` last, see `script`; "" if none was ever run
+    wall : what the template has for a plane wall, by the text for ball 2 that it replaces; empty without one
+    wall_inputs : the inputs that a wall acts with where they differ from those of a plane of infinite mass, by
+        config name, from the key of the law, the version and the values of `Collision`
     suffix, program, install : of the file of a script; what runs it, "" without one; how to get that
     command : the command that runs a script, from the program and the file
     """
@@ -122,7 +130,6 @@ class Code:
     tested: str
     parameters: Callable[[Collision], dict[str, float | str]]
     lines: Callable[[Collision, Parameters], list[str]]
-    damping: Mapping[str, str] = field(default_factory=dict)
     scheme: str | None = None
     uncertainty: float = 1e-9
     rough: Mapping[str, float] = field(default_factory=dict)
@@ -133,6 +140,8 @@ class Code:
     notes: Callable[[Collision], list[str]] = lambda collision: []
     warnings: Callable[[Collision], list[str]] = lambda collision: []
     template: str = ""
+    wall: Mapping[str, str] = field(default_factory=dict)
+    wall_inputs: Callable[[str, str, Mapping[str, float]], Mapping[str, float]] = lambda key, version, values: {}
     suffix: str = ".py"
     program: str = ""
     install: str = ""
@@ -143,10 +152,15 @@ class Code:
 
         material2 is the name of the material of ball 2 in the lines: "material1" where they make only that one.
         """
+        template = self.template
+        if collision.has_wall and not self.wall:
+            raise UsageError(f"--script: m2: got inf, expected a finite mass: no wall of {self.title} was run")
+        for ball, wall in self.wall.items() if collision.has_wall else ():
+            template = template.replace(ball, wall)
         lines = self.lines(collision, parameters)
         material2 = "material2" if any(line.startswith("material2 = ") for line in lines) else "material1"
         values = {**parameters, **collision.script_values(), "lines": "\n".join(lines), "material2": material2}
-        return self.template.format(**values)
+        return template.format(**values)
 
     def uncertainty_of(self, key: str) -> float:
         """Return the tolerance on e of a law."""

@@ -97,7 +97,6 @@ CODE = Code(
         "drake-point-contact": "point contact, one material",
         "drake-point-contact-mixed": "point contact, two materials",
     },
-    damping={"drake-point-contact": "d", "drake-point-contact-mixed": "d1"},
     newest="1.51.1",
     tested="scripts were run in Drake 1.51.1, TAMSI",
     scheme="drake-tamsi",
@@ -105,6 +104,19 @@ CODE = Code(
     lines=lines,
     notes=notes,
     template=TWO_BALLS,
+    wall={
+        "import AddContactMaterial, ": "import AddContactMaterial, HalfSpace, ",
+        ", (2, {m2}, {R2}, {material2})": ",",
+        "plant.Finalize()": (
+            "pose = HalfSpace.MakePose([-1, 0, 0], [0, 0, 0])\n"
+            'plant.RegisterCollisionGeometry(plant.world_body(), pose, HalfSpace(), "wall", {material2})\n'
+            "plant.Finalize()"
+        ),
+        "({x1}, {x2}), ({v1}, {v2})": "({x1},), ({v1},)",
+        "v1, v2 = (joint.get_translation_rate(context) for joint in joints)": (
+            "v1, v2 = joint.get_translation_rate(context), {v2}"
+        ),
+    },
     program="python",
     install="pip install drake",
     version_of=python_package_version("drake"),

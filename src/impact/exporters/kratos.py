@@ -11,7 +11,44 @@ LAWS = {
     "kratos-hertz": "DEM_D_Hertz_viscous_Coulomb",
     "kratos-linear": "DEM_D_Linear_viscous_Coulomb",
 }
-TWO_BALLS = '''\
+BALL2 = """\
+Begin SubModelPart ball2
+Begin SubModelPartNodes
+2
+End SubModelPartNodes
+Begin SubModelPartElements
+2
+End SubModelPartElements
+End SubModelPart
+"""
+# a triangle around the origin
+RIGID_WALL = '''\
+with open("ballsDEM_FEM_boundary.mdpa", "w") as mesh:
+    mesh.write("""
+Begin Properties 0
+End Properties
+Begin Nodes
+3 0 -{reach} -{reach}
+4 0 {reach} -{reach}
+5 0 0 {reach}
+End Nodes
+Begin Conditions RigidFace3D3N
+1 0 3 4 5
+End Conditions
+Begin SubModelPart wall
+Begin SubModelPartNodes
+3
+4
+5
+End SubModelPartNodes
+Begin SubModelPartConditions
+1
+End SubModelPartConditions
+End SubModelPart
+""")
+'''
+TWO_BALLS = (
+    '''\
 import json
 import math
 import os
@@ -46,15 +83,9 @@ Begin SubModelPartElements
 1
 End SubModelPartElements
 End SubModelPart
-Begin SubModelPart ball2
-Begin SubModelPartNodes
-2
-End SubModelPartNodes
-Begin SubModelPartElements
-2
-End SubModelPartElements
-End SubModelPart
-""")
+'''
+    + BALL2
+    + '''""")
 
 {lines}
 
@@ -110,6 +141,7 @@ print("e_out =", (v2 - v1) / {v0}, flush=True)
 # not to end with the messages of Kratos
 os._exit(0)
 '''
+)
 
 
 def parameters(collision: Collision) -> dict[str, float | str]:
@@ -157,6 +189,10 @@ def notes(collision: Collision) -> list[str]:
         "two materials: 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2; the restitution is that of the pair",
         "an e below 0.001 is raised to it, and above 0.999 there is no damping; the force is never negative",
     ]
+    if collision.has_wall:
+        remarks.append(
+            "material2 is of the rigid face; it is found within search_tolerance_against_walls, unset 0"
+        )
     if collision.model.key == "kratos-linear":
         remarks.append("Kratos finds the damping ratio by bisection to 1e-4")
     remarks.append(
@@ -178,6 +214,23 @@ CODE = Code(
     lines=lines,
     notes=notes,
     template=TWO_BALLS,
+    wall={
+        "2 {x2} 0 0\n": "",
+        "2 0 2\n": "",
+        "2 0 {R2}\n": "",
+        BALL2: "",
+        "{lines}": RIGID_WALL + "\n{lines}",
+        "(material2, {m2}, {R2})": "(material2, {m1}, {R1})",
+        '[[f"SpheresPart.ball{{i}}", f"material{{i}}"] for i in (1, 2)]': (
+            '[["SpheresPart.ball1", "material1"], ["RigidFacePart.wall", "material2"]]'
+        ),
+        '    "NeighbourSearch': '    "search_tolerance_against_walls": 0.01,\n    "NeighbourSearch',
+        "for i in (1, 2)]\nfor ball": "for i in (1,)]\nfor ball",
+        "({v1}, {v2})": "({v1},)",
+        "v1, v2 = (ball.GetSolutionStepValue(Kratos.VELOCITY_X) for ball in balls)": (
+            "v1, v2 = balls[0].GetSolutionStepValue(Kratos.VELOCITY_X), {v2}"
+        ),
+    },
     program="python",
     install="pip install KratosDEMApplication",
     version_of=python_package_version("KratosDEMApplication"),

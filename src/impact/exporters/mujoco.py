@@ -57,7 +57,9 @@ def lines(collision: Collision, parameters: Parameters) -> list[str]:
 
 
 def notes(collision: Collision) -> list[str]:
+    is_standard = collision.model.key == "mujoco-solref"
     return [
+        *(["timeconst >= 2 dt: MuJoCo raises a smaller one to 2 dt (flag refsafe)"] if is_standard else []),
         "solref is per effective mass: the restitution does not depend on the masses, nor on the speed",
         "unset, solref is 0.02 1, critical damping: e is 0.135 at any speed; a timeconst below 2 dt is raised",
         "solimp is constant here; with the default one, 0.9 0.95 0.001 0.5 2, the restitution is another",
@@ -70,7 +72,6 @@ CODE = Code(
     name="mujoco",
     title="MuJoCo",
     laws={"mujoco-solref": "solref, standard format", "mujoco-solref-direct": "solref, direct format"},
-    damping={"mujoco-solref": "dampratio", "mujoco-solref-direct": "b"},
     newest="4.0.0",
     tested="scripts were run in MuJoCo 4.0.0, integrator Euler",
     scheme="kick-drift",
@@ -79,6 +80,13 @@ CODE = Code(
     comment=("<!-- ", " -->"),
     notes=notes,
     template=TWO_BALLS,
+    wall={
+        '<body pos="{x2} 0 0"><joint type="slide" axis="1 0 0"/><geom size="{R2}" mass="{m2}"/></body>': (
+            '<geom type="plane" size="1 1 1" zaxis="-1 0 0"/>'
+        ),
+        "data.qvel[:] = {v1}, {v2}": "data.qvel[:] = {v1}",
+        "v1, v2 = map(float, data.qvel)": "v1, v2 = float(data.qvel[0]), {v2}",
+    },
     program="python",
     install="pip install mujoco",
     version_of=python_package_version("mujoco"),

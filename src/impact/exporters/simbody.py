@@ -77,7 +77,7 @@ def lines(collision: Collision, parameters: Parameters) -> list[str]:
         for i in (1, 2)
         for line in (
             "<HuntCrossleyForce::ContactParameters>",
-            f"  <geometry>sphere{i}</geometry>",
+            f"  <geometry>{'wall' if i == 2 and collision.has_wall else f'sphere{i}'}</geometry>",
             f"  <stiffness>{parameters[f'stiffness{i}']!r}</stiffness>",
             f"  <dissipation>{parameters[f'dissipation{i}']!r}</dissipation>",
             "  <static_friction>0</static_friction>",
@@ -101,7 +101,6 @@ CODE = Code(
     name="simbody",
     title="Simbody in OpenSim",
     laws=LAWS,
-    damping={"simbody-hunt-crossley": "c", "simbody-hunt-crossley-mixed": "c1"},
     newest="4.6",
     tested="scripts were run in OpenSim 4.6, RungeKutta3 with a fixed step",
     parameters=parameters,
@@ -109,6 +108,18 @@ CODE = Code(
     comment=("<!-- ", " -->"),
     notes=notes,
     template=TWO_BALLS,
+    wall={
+        '    ("2", {m2}, {R2}, {x2}, {v2}),\n': "",
+        # it is where x > 0
+        "model.addForce(contact)": (
+            'wall = opensim.ContactHalfSpace(opensim.Vec3(0), opensim.Vec3(0), model.getGround(), "wall")\n'
+            "model.addContactGeometry(wall)\n"
+            "model.addForce(contact)"
+        ),
+        "v1, v2 = (joint.getCoordinate().getSpeedValue(state) for joint in joints)": (
+            "v1, v2 = joint.getCoordinate().getSpeedValue(state), {v2}"
+        ),
+    },
     program="python",
     install="pip install opensim",
     version_of=python_package_version("opensim"),

@@ -25,6 +25,8 @@ HISTORY = (
     (("", "yade-betan-pulling"), ("2013.09", "yade-betan")),
     (("", "yade-viscoelastic-pulling"), ("2014.01", "yade-viscoelastic")),
 )
+# radius of a wall in R*, in radii of the ball: without and with hertzian=True
+WALL_RADII = (1.0, 1e8)
 TWO_BALLS = """\
 {lines}
 for x, radius, mass, speed, material in (
@@ -74,6 +76,11 @@ def parameters(collision: Collision) -> dict[str, float | str]:
     return elastic | {"betan": c["betan"] if c.model.key == "yade-betan-direct" else linear_damping(c["e"])}
 
 
+def is_hertzian(version: str) -> bool:
+    """Return whether a wall can be hertzian; seen in 2023.02a."""
+    return version >= "2023.02a"
+
+
 def linear_damping(e: float) -> float:
     """Compute the damping ratio of a linear spring and dashpot that ends at zero indentation, see `yade-betan`."""
     if e == 0.0:
@@ -97,12 +104,16 @@ def lines(collision: Collision, parameters: Parameters) -> list[str]:
     text = [f"material1 = O.materials.append({material}, frictionAngle=0))"]
     if second:
         text.append(f"material2 = O.materials.append(FrictMat({_arguments(second)}, frictionAngle=0))")
+    bounds, geometries = "Bo1_Sphere_Aabb()", "Ig2_Sphere_Sphere_ScGeom()"
+    if collision.has_wall:
+        bounds += ", Bo1_Wall_Aabb()"
+        geometries += f", Ig2_Wall_Sphere_ScGeom({'hertzian=True' if is_hertzian(collision.version) else ''})"
     return [
         *text,
         "O.engines = [",
         "    ForceResetter(),",
-        "    InsertionSortCollider([Bo1_Sphere_Aabb()]),",
-        f"    InteractionLoop([Ig2_Sphere_Sphere_ScGeom()], [{physics}], [{law}]),",
+        f"    InsertionSortCollider([{bounds}]),",
+        f"    InteractionLoop([{geometries}], [{physics}], [{law}]),",
         "    NewtonIntegrator(damping=0),",
         "]",
         f"O.dt = {collision.dt!r}",
@@ -122,6 +133,12 @@ def notes(collision: Collision) -> list[str]:
             "en of ViscElMat finds its damping only roughly; kn and cn are exact",
             "the force is never negative (since January 2014)",
         ]
+    if collision.has_wall:
+        remarks.append(
+            "hertzian=True: by default a wall has R* = R1/2, 0.7071 of a plane's K, and 1.149 of its contact time"
+            if is_hertzian(collision.version)
+            else "a wall has R* = R1/2, 0.7071 of a plane's K, and 1.149 of its contact time"
+        )
     return [
         *remarks,
         "two materials: 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2; en and betan are set for each pair by MatchMaker",
@@ -134,11 +151,6 @@ CODE = Code(
     name="yade",
     title="YADE",
     laws=LAWS,
-    damping={
-        "yade-betan-direct": "betan",
-        "yade-viscoelastic": "C",
-        "yade-viscoelastic-pulling": "C",
-    },
     newest="2023.02a",
     tested="scripts were run in YADE 2023.02a",
     scheme="kick-drift",
@@ -148,6 +160,12 @@ CODE = Code(
     read_version=read_version,
     notes=notes,
     template=TWO_BALLS,
+    wall={
+        "    ({x2}, {R2}, {m2}, {v2}, {material2}),\n": "",
+        "O.run(": "O.bodies.append(utils.wall(0, axis=0, material={material2}))\nO.run(",
+        "v1, v2 = (ball.state.vel[0] for ball in O.bodies)": "v1, v2 = ball.state.vel[0], {v2}",
+    },
+    wall_inputs=lambda key, version, values: {"R2": WALL_RADII[is_hertzian(version)] * values["R1"]},
     program="yade",
     install="on Debian: apt-get install yade",
     version_of=printed_version("--version", r"(\d{4}\.\d{2}[a-z]?)"),

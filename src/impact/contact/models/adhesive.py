@@ -65,8 +65,8 @@ LIGGGHTS_EDINBURGH = ForceModel(
         "seen",
         "CFDEMproject/LIGGGHTS-PUBLIC, src/normal_model_edinburgh.h @84ba3d76 (3.8.0, 2017)",
         note="without the dashpot that may stand beside it; unless n = 1 the two values of d differ where f "
-        "reaches its limit, so that e jumps there, as in LIGGGHTS; a wall is the limit of two spheres, LIGGGHTS "
-        "takes another radius of the intersection there",
+        "reaches its limit, so that e jumps there, as in LIGGGHTS; a wall is the limit of two spheres, while "
+        "LIGGGHTS 3.8.0 does not adhere to a wall",
     ),
     parameters=(
         Parameter("k2", "1", "unloading stiffness k₂ over K, UnloadingStiffness", least=1.0),
