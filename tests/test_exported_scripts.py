@@ -156,6 +156,9 @@ PLANTED_WALLS = (
     ("liggghts", "liggghts-hertz", "primitive type 2", "primitive type 1"),
     ("yade", "yade-betan", "hertzian=True", "hertzian=False"),
     ("mujoco", "mujoco-solref", 'zaxis="-1 0 0"', 'zaxis="-1 1 0"'),
+    ("pybullet", "kelvin-voigt-no-tension", "planeNormal=[-1, 0, 0]", "planeNormal=[-1, 1, 0]"),
+    ("exudyn", "kelvin-voigt", "sphereRadius=0.05", "sphereRadius=0.04"),
+    ("newton", "newton-semi-implicit", "(-1.0, 0.0, 0.0, 0.0)", "(-1.0, 1.0, 0.0, 0.0)"),
     ("drake", "drake-point-contact", "world_body(), pose", "world_body(), RigidTransform()"),
     ("kratos", "kratos-hertz", '"search_tolerance_against_walls": 0.01', '"search_tolerance_against_walls": 0.0'),
     (

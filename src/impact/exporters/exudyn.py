@@ -69,6 +69,22 @@ CODE = Code(
     lines=lines,
     notes=notes,
     template=TWO_BALLS,
+    wall={
+        ", ({m2}, {x2}, {v2})": ",",
+        # a triangle takes no mass points
+        "import exudyn": "import exudyn\nfrom exudyn.utilities import InertiaSphere",
+        "CreateMassPoint": "CreateRigidBody",
+        "mass=m)": "inertia=InertiaSphere(m, {R1}))",
+        "mbs.CreateSphereSphereContact(itemNumbers=balls, spheresRadii=[{R1}, {R2}], **contact)": (
+            "corners = [[0, -{reach}, -{reach}], [0, 0, {reach}], [0, {reach}, -{reach}]]\n"
+            "balls.append(mbs.CreateGround())\n"
+            "contact |= dict(sphereRadius={R1}, trianglePoints=exudyn.Vector3DList(corners))\n"
+            "mbs.CreateSphereTriangleContact(itemNumbers=balls, **contact)"
+        ),
+        "v1, v2 = (mbs.GetObjectOutputBody(ball, exudyn.OutputVariableType.Velocity)[0] for ball in balls)": (
+            "v1, v2 = mbs.GetObjectOutputBody(balls[0], exudyn.OutputVariableType.Velocity)[0], {v2}"
+        ),
+    },
     program="python",
     install="pip install exudyn",
     version_of=python_package_version("exudyn"),

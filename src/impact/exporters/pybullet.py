@@ -70,6 +70,17 @@ CODE = Code(
     lines=lines,
     notes=notes,
     template=TWO_BALLS,
+    wall={
+        ", ({m2}, {R2}, {x2}, {v2})": ",",
+        "for _ in": (
+            "plane = bullet.createCollisionShape(bullet.GEOM_PLANE, planeNormal=[-1, 0, 0])\n"
+            "bullet.changeDynamics(bullet.createMultiBody(0, plane), -1, **contact)\n"
+            "for _ in"
+        ),
+        "v1, v2 = (bullet.getBaseVelocity(ball)[0][0] for ball in balls)": (
+            "v1, v2 = bullet.getBaseVelocity(balls[0])[0][0], {v2}"
+        ),
+    },
     program="python",
     install="pip install pybullet",
     version_of=python_package_version("pybullet"),
