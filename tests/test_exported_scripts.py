@@ -160,6 +160,9 @@ PLANTED_WALLS = (
     ("exudyn", "kelvin-voigt", "sphereRadius=0.05", "sphereRadius=0.04"),
     ("newton", "newton-semi-implicit", "(-1.0, 0.0, 0.0, 0.0)", "(-1.0, 1.0, 0.0, 0.0)"),
     ("drake", "drake-point-contact", "world_body(), pose", "world_body(), RigidTransform()"),
+    ("pybullet", "kelvin-voigt-no-tension", "contactProcessingThreshold=0", "contactProcessingThreshold=1"),
+    ("exudyn", "exudyn-carvalho-gonthier", "sphereRadius=0.05", "sphereRadius=0.0499"),
+    ("newton", "newton-semi-implicit", "-1.0, 0.0, 0.0", "-1.0, 0.3, 0.0"),
     ("kratos", "kratos-hertz", '"search_tolerance_against_walls": 0.01', '"search_tolerance_against_walls": 0.0'),
     (
         "simbody",

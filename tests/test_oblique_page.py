@@ -54,7 +54,10 @@ def test_the_impact_that_makes_energy() -> None:
     assert result["friction_loss"].item() < 0.0
 
 
-@pytest.mark.parametrize(("friction", "count"), [("coulomb-1785", 1), ("lammps-mindlin-force", 4250)])
+@pytest.mark.parametrize(
+    ("friction", "count"),
+    [("coulomb-1785", 1), pytest.param("lammps-mindlin-force", 4250, marks=pytest.mark.slow)],
+)
 def test_how_many_trajectories_a_sweep_over_angle_mu_and_spin_has(friction: str, count: int) -> None:
     sweep = {"v1": 3.9, "e": 0.9, "R1": 0.0025, "m2": math.inf, "material": "steel"}
     sweep |= {"angle": {"linspace": ["1 deg", "85 deg", 85]}, "mu": {"linspace": [0.1, 0.55, 10]}}

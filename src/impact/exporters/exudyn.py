@@ -39,12 +39,8 @@ def parameters(collision: Collision) -> dict[str, float | str]:
 
 
 def lines(collision: Collision, parameters: Parameters) -> list[str]:
-    return [
-        "contact = dict(",
-        *(f"    {name}={value!r}," for name, value in parameters.items()),
-        ")",
-        f"dt = {collision.dt!r}",
-    ]
+    values = ", ".join(f"{name}={value!r}" for name, value in parameters.items())
+    return [f"contact = dict({values})", f"dt = {collision.dt!r}"]
 
 
 def notes(collision: Collision) -> list[str]:
@@ -62,7 +58,6 @@ CODE = Code(
     name="exudyn",
     title="EXUDYN",
     laws={key: f"impactModel {number}" for key, number in IMPACT_MODELS.items()},
-    damping={"kelvin-voigt": "C"},
     newest="1.13.6",
     tested="scripts were run in EXUDYN 1.13.6, generalized alpha; read in jgerstmayr/EXUDYN @e44aca1b (2026)",
     parameters=parameters,
@@ -70,19 +65,12 @@ CODE = Code(
     notes=notes,
     template=TWO_BALLS,
     wall={
-        ", ({m2}, {x2}, {v2})": ",",
-        # a triangle takes no mass points
-        "import exudyn": "import exudyn\nfrom exudyn.utilities import InertiaSphere",
-        "CreateMassPoint": "CreateRigidBody",
-        "mass=m)": "inertia=InertiaSphere(m, {R1}))",
-        "mbs.CreateSphereSphereContact(itemNumbers=balls, spheresRadii=[{R1}, {R2}], **contact)": (
-            "corners = [[0, -{reach}, -{reach}], [0, 0, {reach}], [0, {reach}, -{reach}]]\n"
+        " ({m2}, {x2}, {v2})": "",
+        "mbs.CreateSphereSphereContact(itemNumbers=balls, spheresRadii=[{R1}, {R2}]": (
             "balls.append(mbs.CreateGround())\n"
-            "contact |= dict(sphereRadius={R1}, trianglePoints=exudyn.Vector3DList(corners))\n"
-            "mbs.CreateSphereTriangleContact(itemNumbers=balls, **contact)"
-        ),
-        "v1, v2 = (mbs.GetObjectOutputBody(ball, exudyn.OutputVariableType.Velocity)[0] for ball in balls)": (
-            "v1, v2 = mbs.GetObjectOutputBody(balls[0], exudyn.OutputVariableType.Velocity)[0], {v2}"
+            # the diagonal, along which the quad is split, is 4 radii away
+            "corners = [[0, y * {R1}, z * {R1}] for y, z in ((-9, -9), (-9, 27), (9, 27), (9, -9))]\n"
+            "mbs.CreateSphereQuadContact(itemNumbers=balls, sphereRadius={R1}, quadPoints=corners"
         ),
     },
     program="python",

@@ -51,8 +51,7 @@ def lines(collision: Collision, parameters: Parameters) -> list[str]:
 def notes(collision: Collision) -> list[str]:
     c = collision
     # the spacing of coordinates near a radius, over the peak indentation of the undamped spring
-    radius = c["R1"] if c.has_wall else max(c["R1"], c["R2"])
-    share = 2.0**-23 * radius / (c["v0"] * math.sqrt(c["m"] / c["K"]))
+    share = 2.0**-23 * c["R1"] / (c["v0"] * math.sqrt(c["m"] / c["K"]))
     return [
         "in SI, the same for both shapes: ke and kd of a contact are the means, not those of springs in series",
         "kd acts on approach only; the restitution depends on kd/(2 sqrt(ke m)), thus on the masses, not on speed",
@@ -68,7 +67,6 @@ CODE = Code(
     name="newton",
     title="Newton, SolverSemiImplicit",
     laws={"newton-semi-implicit": "ke and kd of ShapeConfig"},
-    damping={"newton-semi-implicit": "kd"},
     newest="1.8.0",
     tested="scripts were run in Newton 1.8.0 on a CPU; warp.sim has the same force and was not run",
     scheme="kick-drift",
@@ -79,12 +77,11 @@ CODE = Code(
     notes=notes,
     template=TWO_BALLS,
     wall={
-        ", ({m2}, {R2}, {x2})": ",",
-        "model = builder": "builder.add_shape_plane((-1.0, 0.0, 0.0, 0.0), cfg=contact)\nmodel = builder",
-        ", ({v2}, 0, 0, 0, 0, 0)": "",
-        "v1, v2 = (float(speed[0]) for speed in state.body_qd.numpy())": (
-            "v1, v2 = float(state.body_qd.numpy()[0][0]), {v2}"
-        ),
+        " ({m2}, {R2}, {x2})": "",
+        "model = builder": "builder.add_shape_plane((-1.0, 0.0, 0.0, 0.0), width=0, length=0, cfg=contact)\n"
+        "model = builder",
+        ", ({v2}, 0, 0, 0, 0, 0)]": "]",
+        "(float(speed[0]) for speed in state.body_qd.numpy())": "float(state.body_qd.numpy()[0, 0]), {v2}",
     },
     program="python",
     install="pip install newton",

@@ -20,10 +20,7 @@ CHRONO_MULTICORE = (
 )
 RIGID_BODY_DYNAMICS = "JuliaRobotics/RigidBodyDynamics.jl, src/contact.jl @d6df4ebe (2024)"
 RAILWAY = "sflabbe/railway-impact-simulator, src/railway_simulator/core/contact.py @9f35904 (2026)"
-EXUDYN = (
-    "jgerstmayr/EXUDYN, main/src/Objects/CObjectContactSphereSphere.cpp and "
-    "docs/RST/items/ObjectContactSphereSphere.rst @e44aca1b (2026)"
-)
+EXUDYN = "jgerstmayr/EXUDYN, main/src/Objects/CObjectContactSphereSphere.cpp @e44aca1b (2026)"
 LETHE = (
     "chaos-polymtl/lethe, include/dem/particle_particle_contact_force.h @0092035b and effective_properties.h "
     "@8bf81c3b, doc/source/theory/dem/dem.rst @023e4352"
