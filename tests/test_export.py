@@ -361,7 +361,7 @@ def test_every_law_of_a_code_is_in_the_list(cli: Run) -> None:
             ("--to", "lammps", "--script", "--at", "m2=inf", "--at", "R2=1"),
             "--script: m2: got inf, expected a finite value, or m2 = R2 = inf for a wall",
         ),
-        (("--to", "lammps", "--dt", "0"), "--dt: got 0, expected a finite number > 0"),
+        (("--to", "lammps", "--dt", "0"), "--dt: got 0.0, expected a number > 0 s"),
         (("--to", "lammps", "--code-version", "new"), '--code-version: got "new", expected the date of a release'),
         (
             ("--to", "lammps", "--model", "lammps-coeff-restitution-hertz", "--code-version", "29Aug2019"),
