@@ -369,3 +369,43 @@ def test_points_of_a_laboratory_table_are_drawn_with_a_note_of_what_is_left_out(
     (folder / "a.csv").write_text("v1 [cm/s];simga;e_out\n1;1;1\n", encoding="utf-8")
     with pytest.raises(ConfigError, match='simga: no such input or variable; did you mean "sigma"'):
         read_points("a.csv")
+
+
+def test_fit_true_is_the_natural_range_of_what_the_laws_lack() -> None:
+    """A parameter that the config has keeps its value or its bounds."""
+    laws = ["hunt-crossley-1975", "kuwabara-kono-1987", "lammps-viscoelastic-hertz"]
+    data = {"fit": True, "columns": {"v1": [0.1, 0.3, 1.0], "e_out": [0.9, 0.8, 0.7]}}
+    balls = {**SWEEP, "R1": 0.01, "R2": math.inf, "material": "steel"}
+    source = {"models": laws, "sweep": balls, "data": data, "model": {"lammps-viscoelastic-hertz": {"eta": 1e6}}}
+    config = read_config(source, purpose="calibrate")
+    assert list(config.fits) == ["e", "kuwabara-kono-1987.A"]
+    assert config.fits["e"] == (0.0, 1.0)
+    (line,) = problems_of(read_config, {**source, "sweep": {**balls, "m1": {"fit": True}}}, purpose="calibrate")
+    assert line == "config: sweep.m1: got fit = true, expected fit = [least, most]: it has no natural range"
+
+
+def test_the_natural_range_is_about_the_size_in_units_of_the_contact() -> None:
+    """A time of the law is of the order of v0^(-1/5) (m/K)^(2/5), in which the stiffness counts."""
+    from impact.engine.plugins import read_plugins
+    from impact.inverse.calibrate import NATURAL_RATIO, natural_bounds
+
+    data = {"fit": True, "columns": {"v1": [1.0, 2.0], "e_out": [0.9, 0.8]}}
+    sizes = []
+    for stiffness in (1e6, 1e11):
+        sweep = {**SWEEP, "m1": 1.0, "K": stiffness}
+        config = read_config({"models": "kuwabara-kono-1987", "sweep": sweep, "data": data}, purpose="calibrate")
+        ((lower, upper),) = natural_bounds(config, read_plugins([])).values()
+        assert upper / lower == pytest.approx(NATURAL_RATIO**2)
+        sizes.append(math.sqrt(lower * upper))
+    assert sizes[0] / sizes[1] == pytest.approx(100.0)
+
+
+@pytest.mark.slow
+def test_a_fit_over_the_natural_range_finds_what_bounds_of_the_user_find(folder: Path) -> None:
+    source = {"sweep": {**SWEEP, "m1": "2.7 g"}, "models": "kuwabara-kono-1987"}
+    columns = {"v1": [0.1, 0.3, 1.0, 3.0], "e_out": [0.9, 0.85, 0.8, 0.7], "sigma": [0.01] * 4}
+    natural = impact.calibrate({**source, "data": {"columns": columns, "fit": True}})
+    law = {"kuwabara-kono-1987": {"A": {"fit": ["1e-7 s", "1e-2 s"]}}}
+    given = impact.calibrate({**source, "data": {"columns": columns}, "model": law})
+    assert natural["estimate"].item() == pytest.approx(given["estimate"].item(), rel=1e-6)
+    assert natural["fit_status"].item() == given["fit_status"].item()

@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 import impact
 from impact.contact.fixed_step import collide_at_fixed_step
 from impact.contact.models import find
+from impact.errors import UsageError
+from impact.formatting import number
 
 from .conftest import Run, assert_refused, examples_of
 
@@ -101,7 +103,8 @@ def test_the_range_over_the_phase_is_of_third_order_without_damping() -> None:
     ],
 )
 def test_small_steps_deliver_what_the_continuous_law_delivers(model: str, parameters: dict[str, float]) -> None:
-    at = {"e": 0.6} | {f"{model}.{name}": value for name, value in parameters.items()}
+    at = {"e": 0.6} if "e" in find(model).quantities else {}
+    at |= {f"{model}.{name}": value for name, value in parameters.items()}
     overrides = [f"model.{model}.{name}={value}" for name, value in parameters.items()]
     overrides.append("materials.table1.yield_strength='1 GPa'")
     result = impact.timestep(model, at=at, overrides=overrides, steps_per_contact=[1000], phases=4)
@@ -181,7 +184,7 @@ def test_the_page_prints_what_the_commands_print(cli: Run) -> None:
     ("words", "message"),
     [
         (("--steps-per-contact", "0"), "--steps-per-contact: got 0, expected a finite number > 0"),
-        (("--dt", "-1e-6"), "--dt: got -1e-06, expected a finite number > 0"),
+        (("--dt", "-1e-6"), "--dt: got -1e-06, expected a number > 0 s"),
         (("--dt", "1e-12"), "steps per contact, expected at most 131,072"),
         (("--at", "e=0"), "has no rebound at these inputs"),
         (("--phases", "0"), "expected a whole number of at least 1"),
@@ -189,3 +192,73 @@ def test_the_page_prints_what_the_commands_print(cli: Run) -> None:
 )
 def test_bad_input_is_one_line(cli: Run, words: tuple[str, ...], message: str) -> None:
     assert_refused(cli("timestep", "--model", LINEAR, *words), message)
+
+
+def test_a_step_that_cannot_be_changed_needs_a_time_constant(cli: Run) -> None:
+    """At 2 ms MuJoCo delivers 0.7 at every phase from a time constant of about 0.225 s on, in 80 ms of contact."""
+    words = ("timestep", "--model", "mujoco-solref", "--at", "e=0.7", "--at", "v1=1", "--tol", "1%")
+    done = cli(*words, "--dt", "2 ms", "--for", "timeconst", "--json")
+    assert done.returncode == 0, done.stderr
+    data = json.loads(done.stdout)
+    assert data["e"] == 0.7
+    assert data["solved"] == {"dampratio": pytest.approx(0.1222, abs=1e-4)}
+    needed = data["for"]
+    assert list(needed) == ["parameter", "value", "contact_time", "peak_indentation", "tol"]
+    assert (needed["parameter"], needed["tol"]) == ("timeconst", 0.01)
+    assert needed["value"] == pytest.approx(0.225, rel=0.01)
+    assert needed["contact_time"] == pytest.approx(0.08, rel=1e-5)
+    # it is enough, and nine tenths of it are not
+    for factor, is_enough in ((1.0, True), (0.9, False)):
+        at = {"timeconst": factor * needed["value"], **data["solved"]}
+        (row,) = impact.timestep("mujoco-solref", at=at, dt=["2 ms"]).rows
+        assert (max(row.e_largest - 0.7, 0.7 - row.e_least) <= 0.007 * (1.0 + 1e-9)) == is_enough
+
+
+def test_without_an_e_nothing_is_solved_for() -> None:
+    data = impact.timestep("mujoco-solref", at={"dampratio": 0.12}, steps_per_contact=[20], phases=20).as_dict()
+    assert math.isnan(data["e"])
+    assert (data["solved"], data["for"]) == (None, None)
+    with pytest.raises(UsageError, match="--at: got e and dampratio, expected one of the two"):
+        impact.timestep("mujoco-solref", at={"e": 0.7, "dampratio": 0.12})
+    with pytest.raises(UsageError, match="--at e: hertz has no e, and no parameter that sets it"):
+        impact.timestep("hertz", at={"e": 0.7})
+
+
+@pytest.mark.parametrize(
+    ("model", "at", "parameter", "power"),
+    [
+        # the contact time of a linear spring falls with the root of its stiffness, that of a sphere with E^(2/5)
+        (LINEAR, {"e": 0.8, "K": 1e6}, "K", 0.5),
+        ("tsuji-1992", {"e": 0.8}, "materials.table1.E", 0.4),
+        ("kelvin-voigt", {"e": 0.8, "K": 1e6, "n": 1.0}, "K", 0.5),
+    ],
+)
+def test_a_softer_contact_lasts_long_enough(
+    model: str, at: dict[str, float], parameter: str, power: float
+) -> None:
+    result = impact.timestep(model, at=at, dt=[1e-3], tol=0.02, parameter=parameter, phases=50)
+    needed, steps = result.needed_parameter, result.needed
+    assert needed is not None
+    assert steps is not None
+    value = {"K": 1e6, "materials.table1.E": 56e9}[parameter]
+    assert needed.contact_time == pytest.approx(steps.steps_per_contact * 1e-3, rel=1e-5)
+    assert needed.contact_time / result.contact_time == pytest.approx((value / needed.value) ** power, rel=1e-4)
+    assert not needed.is_least
+    # e is kept where it was solved for: the damping constant falls with the root of the stiffness
+    if result.solved:
+        (constant,) = result.solved.values()
+        assert f"with C = {number(constant * (needed.value / value) ** 0.5, 4)} N s/m" in str(needed)
+
+
+def test_a_parameter_that_does_not_set_the_time_scale_is_refused(cli: Run) -> None:
+    words = ("timestep", "--model", "mujoco-solref", "--at", "dampratio=0.1", "--dt", "2ms")
+    for parameter, tol, message in (
+        ("timeconstant", "1%", '--for: mujoco-solref has no parameter "timeconstant"; did you mean "timeconst"?'),
+        ("timeconst", None, "--for: expected one --dt and --tol as well"),
+    ):
+        done = cli(*words, "--for", parameter, *(["--tol", tol] if tol else []))
+        assert_refused(done, message)
+    with pytest.raises(UsageError, match="--for: dampratio does not set the contact time of mujoco-solref"):
+        impact.timestep("mujoco-solref", at={"e": 0.7}, dt=[2e-3], tol=0.01, parameter="dampratio")
+    refused = cli("timestep", "--model", "mujoco-solref", "--dt", "2 m")
+    assert (refused.returncode, refused.stderr) == (2, '--dt: got "2 m", expected a unit of s, such as "1 s"\n')

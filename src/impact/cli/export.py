@@ -13,8 +13,7 @@ from ..display import Table, dump, print_blocks, show
 from ..errors import UsageError
 from . import exits
 from .completion import complete_code, complete_model
-from .options import AtOption, JsonOption, OverwriteOption, SetOption, SourceArgument
-from .parsing import parse_number
+from .options import AtOption, JsonOption, OverwriteOption, ParameterOption, SetOption, SourceArgument
 
 
 def export(
@@ -34,14 +33,14 @@ def export(
     ] = None,
     at: AtOption = None,
     dt: Annotated[
-        float | None,
+        str | None,
         typer.Option(
             "--dt",
             metavar="SECONDS",
-            parser=parse_number,
-            help="The time step \\[s]. \\[default: contact time/50]",
+            help='The time step \\[s], or with a unit, such as "2 us". \\[default: contact time/50]',
         ),
     ] = None,
+    parameter: ParameterOption = None,
     code_version: Annotated[
         str | None,
         typer.Option(
@@ -86,6 +85,7 @@ def export(
         source=source,
         at=dict(at or ()),
         dt=dt,
+        parameter=parameter,
         code_version=code_version,
         program=program,
         script=script,

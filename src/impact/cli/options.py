@@ -35,6 +35,15 @@ AtOption = Annotated[
 ModelKeyOption = Annotated[
     str, typer.Option("--model", metavar="KEY", autocompletion=complete_model, help="The model.")
 ]
+ParameterOption = Annotated[
+    str | None,
+    typer.Option(
+        "--for",
+        metavar="PARAMETER",
+        help="Find the value of this parameter of the law, of K or of materials.NAME.E, from which on every phase "
+        "is within the tolerance at the given --dt.",
+    ),
+]
 FrictionKeyOption = Annotated[
     str | None,
     typer.Option(

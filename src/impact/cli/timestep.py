@@ -11,7 +11,7 @@ import impact
 from ..display import show
 from . import exits
 from .completion import complete_scheme
-from .options import AtOption, JsonOption, ModelKeyOption, PluginOption, SetOption, SourceArgument
+from .options import AtOption, JsonOption, ModelKeyOption, ParameterOption, PluginOption, SetOption, SourceArgument
 from .parsing import parse_number, parse_whole_number
 
 
@@ -30,8 +30,12 @@ def timestep(
         ),
     ] = None,
     dt: Annotated[
-        list[float] | None,
-        typer.Option("--dt", metavar="SECONDS", parser=parse_number, help="A time step \\[s]; may be repeated."),
+        list[str] | None,
+        typer.Option(
+            "--dt",
+            metavar="SECONDS",
+            help='A time step \\[s], or with a unit, such as "2 us"; may be repeated.',
+        ),
     ] = None,
     phases: Annotated[
         int,
@@ -52,6 +56,7 @@ def timestep(
             "such as 0.01 or 1%.",
         ),
     ] = None,
+    parameter: ParameterOption = None,
     scheme: Annotated[
         str | None,
         typer.Option(
@@ -83,6 +88,7 @@ def timestep(
         dt=dt or (),
         phases=phases,
         tol=tol,
+        parameter=parameter,
         scheme=scheme,
         overrides=sets or (),
         plugins=plugins or (),

@@ -11,8 +11,6 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from ..errors import ConfigError, MissingFileError
 from ..formatting import safe_text
 from .lines import BARE_KEY
@@ -55,6 +53,8 @@ def read_text(path: Path, kind: str = "TOML", most: int = MAX_CONFIG_BYTES) -> s
             raise ConfigError(f"{name}: empty, expected a {kind} file")
         with path.open("rb") as file:
             content = file.read(most + 1)
+    except ConfigError:
+        raise
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         kind_of_error = MissingFileError if isinstance(error, FileNotFoundError) else ConfigError
@@ -164,9 +164,9 @@ def _from_library(value: Any) -> object:
     if hasattr(value, "iloc") and hasattr(value, "columns"):
         return value.to_dict("list")
     if not isinstance(value, str | Mapping) and hasattr(value, "values") and hasattr(value, "dtype"):
-        # a series, an index or a data array
+        # a series, an index or a data array; texts of pandas are in an array of its own
         value = value.values
-    if isinstance(value, np.ndarray | np.generic):
+    if hasattr(value, "tolist"):
         return value.tolist()
     if isinstance(value, range):
         return list(value)

@@ -51,7 +51,8 @@ class Config:
     text: str  # the TOML text verbatim, or a mapping as JSON, without settings
     # first the library materials that are used, then those of the caller, then the values of CSV files
     settings: tuple[Setting, ...] = field(repr=False, compare=False)
-    fits: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # bounds of the parameters to fit
+    # bounds of the parameters to fit; NaN where `fit = true` leaves them to the size of the contact
+    fits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     data: Measurements | None = None
     design: tables.Design | None = None
     distributions: Mapping[str, Distribution] = field(default_factory=dict)  # of the uncertain inputs
@@ -110,15 +111,18 @@ def build(draft: Draft, max_points: int = MAX_POINTS, purpose: Purpose = "sweep"
         draft = draft.with_problems(measurements.purpose_problems(draft.data))
     if draft.problems:
         raise draft.error()
-    for step in (inline_files, add_library_materials, expand_cases, measurements.read_measurements):
+    first = (inline_files, measurements.add_fits, add_library_materials)
+    for step in (*first, expand_cases, measurements.read_measurements):
         draft = step(draft)
     document, invalid_values = _validate(draft)
     draft = check_rules(draft.with_problems(invalid_values))
     if document is None:
         raise draft.error()
     values = _valid_values(document, draft)
-    fits = {name: value.fit for name, value in values.items() if isinstance(value, FitRange)}
-    values = {name: value.middle if isinstance(value, FitRange) else value for name, value in values.items()}
+    fits, unbounded = _fit_bounds(values, draft)
+    draft = draft.with_problems(unbounded)
+    for name, (least, most) in fits.items():
+        values[name] = 1.0 if math.isnan(least) else quantities.middle_of(least, most)
     if purpose == "calibrate":
         draft = draft.with_problems(_calibration_problems(draft.data, values, fits, are_valid=not invalid_values))
         values = {name: value for name, value in values.items() if isinstance(value, float | str)}
@@ -260,6 +264,28 @@ def _valid_values(document: tables.Document, draft: Draft) -> dict[str, quantiti
         if not isinstance(value, Column)
         and not (isinstance(value, Distribution) and isinstance(value.empirical, str))
     }
+
+
+def _fit_bounds(
+    values: Mapping[str, quantities.Numbers | quantities.Names], draft: Draft
+) -> tuple[dict[str, tuple[float, float]], list[ConfigProblem]]:
+    """Find the bounds of the parameters to fit; NaN for those that the size of the contact gives."""
+    fits: dict[str, tuple[float, float]] = {}
+    problems: list[ConfigProblem] = []
+    for name, value in values.items():
+        if not isinstance(value, FitRange):
+            continue
+        parsed = InputName.parse(name)
+        quantity = parsed.quantity(draft.known_models)
+        assert quantity is not None
+        if value.fit is not True:
+            fits[name] = value.fit
+            continue
+        is_bounded = math.isfinite(quantity.least) and math.isfinite(quantity.most)
+        fits[name] = (float(quantity.least), float(quantity.most)) if is_bounded else (math.nan, math.nan)
+        if not is_bounded and parsed.table not in ("model", "friction") and name not in ("K", "mu"):
+            problems.append((parsed.path, "got fit = true, expected fit = [least, most]: it has no natural range"))
+    return fits, problems
 
 
 def _values_by_key(table: quantities.Table | None) -> dict[str, Any]:

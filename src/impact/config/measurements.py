@@ -216,8 +216,8 @@ def derive_impacts(
     -------
     v1, e_out and sigma_e_out, as far as they follow, and the position of the row to which each value belongs
 
-    >>> derive_impacts({"flight_time": [0.5, 0.4, 0.32]}, [0, 1, 2], ["", "", ""], 10.0)
-    ({'v1': [2.5, 2.0], 'e_out': [0.8, 0.8]}, [0, 1])
+    >>> derive_impacts({"flight_time": [0.5, 0.4, 0.2]}, [0, 1, 2], ["", "", ""], 10.0)
+    ({'v1': [2.5, 2.0], 'e_out': [0.8, 0.5]}, [0, 1])
     """
     before = after = list(range(len(rows)))
     first, second, power = "drop_height", "rebound_height", 0.5
@@ -369,6 +369,28 @@ def _mapped(columns: Columns, headers: Mapping[str, str]) -> Columns:
         units={renamed[header]: unit for header, unit in units.items()},
         cells={renamed[header]: cells for header, cells in columns.cells.items()},
     )
+
+
+def add_fits(draft: Draft) -> Draft:
+    """Fit what the laws need and the config does not have, if [data] says so."""
+    if draft.table("data").get("fit") is not True:
+        return draft
+    uses_e = any("e" in with_base_quantities(model.quantities) for model in draft.models)
+    uses_e |= any(law.may_use_e for law in draft.frictions)
+    has_e = not {"e", "alpha"}.isdisjoint({*draft.table("sweep"), *as_table(draft.table("data").get("columns"))})
+    paths: list[KeyPath] = [("sweep", "e")] if uses_e and not has_e else []
+    for laws, table in ((draft.models, "model"), (draft.frictions, "friction")):
+        paths += [
+            (table, law.key, parameter.name)
+            for law in laws
+            for parameter in law.parameters
+            if parameter.default is None and not parameter.optional
+        ]
+    data = draft.data
+    for path in paths:
+        if not contains_path(data, path):
+            data, _ = set_value(data, path, {"fit": True})
+    return replace(draft, data=data)
 
 
 def read_measurements(draft: Draft) -> Draft:

@@ -327,12 +327,17 @@ class Range(_OneForm):
 
 
 class FitRange(Table):
-    """A parameter that is fitted to measurements, with the least and the largest value that it may have."""
+    """A parameter that is fitted to measurements, with the least and the largest value that it may have.
 
-    fit: tuple[float, float]
+    True is its natural range: all allowed values, or decades about its size in the contact's own units.
+    """
+
+    fit: tuple[float, float] | Literal[True]
 
     @model_validator(mode="after")
     def _check_order(self) -> FitRange:
+        if self.fit is True:
+            return self
         least, most = self.fit
         got = f"got {least:g} to {most:g}"
         if least >= most:
@@ -341,13 +346,12 @@ class FitRange(Table):
             raise located_errors([(("fit",), f"{got}, expected bounds that are closer together")])
         return self
 
-    @property
-    def middle(self) -> float:
-        """A value between the bounds: the geometric mean of positive bounds that are far apart, else the mean."""
-        least, most = self.fit
-        if least > 0.0 and most / least > WIDE_BOUNDS_RATIO:
-            return min(max(math.sqrt(least) * math.sqrt(most), least), most)
-        return 0.5 * least + 0.5 * most
+
+def middle_of(least: float, most: float) -> float:
+    """Find a value between bounds: the geometric mean of positive ones that are far apart, else the mean."""
+    if least > 0.0 and most / least > WIDE_BOUNDS_RATIO:
+        return min(max(math.sqrt(least) * math.sqrt(most), least), most)
+    return 0.5 * least + 0.5 * most
 
 
 class Distribution(_OneForm):
@@ -662,8 +666,12 @@ def numbers_type(quantity: Quantity) -> TypeAdapter[Any]:
     )
     distributions["empirical"] = Annotated[either, Field(description=DISTRIBUTION_FORMS["empirical"])], None
     distribution_type = create_model(f"Distribution of {of_quantity}", __base__=Distribution, **distributions)
-    bounds = Field(description=f"{FIT_FORM}, between which impact calibrate fits it", strict=False)
-    fit: Any = Annotated[cast(Any, tuple)[end, end], bounds, BeforeValidator(_list_of_length(2, FIT_FORM))]
+    bounds = Field(description=f"{FIT_FORM}, between which impact calibrate fits it, or true")
+    pair: Any = Annotated[
+        cast(Any, tuple)[end, end], Field(strict=False), BeforeValidator(_list_of_length(2, FIT_FORM)), Tag(LIST)
+    ]
+    natural: Any = Annotated[Literal[True], Tag(SCALAR)]
+    fit: Any = Annotated[natural | pair, Discriminator(lambda value: SCALAR if value is True else LIST), bounds]
     fit_type = create_model(f"Fit of {of_quantity}", __base__=FitRange, fit=(fit, ...))
     any_form: Any = Annotated[
         Annotated[number, Tag(SCALAR)]

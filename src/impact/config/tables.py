@@ -31,7 +31,7 @@ from ..contact.frictions import frictions
 from ..contact.model import ForceModel
 from ..contact.models import built_in, catalogue
 from ..contact.variables import OUTPUTS
-from ..errors import did_you_mean
+from ..errors import UsageError, did_you_mean
 from .quantities import (
     COLUMN,
     MAX_AXIS_VALUES,
@@ -217,6 +217,16 @@ SWEEP_QUANTITIES, MATERIAL_QUANTITIES = quantities_of(Sweep), quantities_of(Mate
 MATERIAL_KEYS = {
     name: str(Sweep.model_fields[name].description) for name in ("material", "material1", "material2")
 }
+
+
+def read_sweep_value(name: str, value: object, origin: str) -> float:
+    """Read one number of an input of [sweep], bare or with a unit."""
+    try:
+        return float(SWEEP_QUANTITIES[name].read(value))
+    except PydanticCustomError as error:
+        raise UsageError(f"{origin}: {error.message()}") from None
+
+
 SWEEP_DEFAULTS = {name: float(Sweep.model_fields[name].default) for name in ("v2", "n")}
 # inputs of an integrator with a fixed step only, and their defaults
 FIXED_STEP_INPUTS = ("steps_per_contact", "dt", "phase")
@@ -346,6 +356,11 @@ class Data(Table):
         Field(None, description="a row without a value is left out (skip, the default), or an error")
     )
     g: Annotated[float, GRAVITY] = STANDARD_GRAVITY
+    fit: Annotated[
+        bool,
+        Field(strict=True, description="fit all parameters of the laws, and e, that the config does not have"),
+        expected("true or false"),
+    ] = False
     lines: Annotated[
         Any, ReadAs(list[Annotated[int, bounded_int(1)]]), expected("a list of the numbers of lines")
     ] = Field(None, description="the line of each point in the file, if the values are in columns")

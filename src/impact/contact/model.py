@@ -69,7 +69,8 @@ class Parameter:
     `unit` is an SI unit, whose exponents may contain n ("N/m^n") and dimensionless parameters; `least` and `most`
     are the closed interval of its values; `default` is None where the user has to set it, unless it is `optional`;
     `typical` is a value in that unit for checks, where the contact's own units are no measure of it. A parameter
-    with `choices` is one of these words; its values, and its default, are their positions.
+    with `choices` is one of these words; its values, and its default, are their positions. `is_damping` marks the
+    parameter that sets the restitution of a law without an e.
 
     >>> Parameter("c", "N s/m", "damping constant", default=100.0, least=0.0).unit
     'N s/m'
@@ -84,6 +85,7 @@ class Parameter:
     typical: float | None = None
     optional: bool = False
     choices: tuple[str, ...] = ()
+    is_damping: bool = False
 
 
 class Law(Protocol):
@@ -315,6 +317,11 @@ class ForceModel:
         names = QUANTITIES.keys() | {parameter.name for parameter in self.parameters}
         formulas = (*self.motion_formulas, *self.coefficients.values())
         return frozenset(name for formula in formulas for name in argument_names(formula) if name in names)
+
+    @property
+    def damping(self) -> str:
+        """The name of the parameter that sets the restitution of a law without an e; "" without one."""
+        return next((parameter.name for parameter in self.parameters if parameter.is_damping), "")
 
     def unit_of(self, name: str) -> str:
         """Find the unit of a quantity or parameter."""

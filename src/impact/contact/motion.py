@@ -112,7 +112,7 @@ def restitution_problem(law: MotionLaw) -> Problem:
     rates = _rates(law, branch or law.model.force, UNLOADING_PARAMS if branch else ())
 
     def force_event(y: Array, k: Array, params: Params) -> tuple[Array, Array]:
-        s, force = y[0], k[4]
+        s, force = y[0], k[-1]
         small = RELEASE_STEP * np.clip(np.abs(s), MIN_RELEASE_S, 1.0)
         slope = (rates(y + small * k[:2], params)[4] - force) / small
         return release_event(s, k[0], force, slope)

@@ -31,16 +31,16 @@ from .velocity_coordinates import signed_power
 
 FrictionKind = Literal["coulomb", "spring", "dashpot", "regularized"]
 
-# rows of the joint state and its rates: s and v, Gamma and z; time, work on the spring while sticking and while
-# slipping, damping work, and memory work at the limit; the rates also have the normal force
-SLIP_ROW, SPRING_ROW, TIME_ROW, STICK_WORK_ROW, SLIP_WORK_ROW, DAMPING_ROW, LIMIT_MEMORY_ROW, FORCE_ROW = range(
-    2, 10
-)
+# rows of the joint state and its rates after s and v; the first four rows are components, those from time on the
+# quadratures of `TangentialForm.quadratures`; the last row of rates is the normal force
+SLIP_ROW, SPRING_ROW, TIME_ROW = range(2, 5)
 N_COMPONENTS = 4
 # those rows of the joint rates that a normal problem has; it does not use its work, the fourth
-NORMAL_ROWS = [0, 1, TIME_ROW, TIME_ROW, FORCE_ROW]
+NORMAL_ROWS = [0, 1, TIME_ROW, TIME_ROW, -1]
 # errors of Gamma and z are judged against 1
 JOINT_FLOOR = (*motion.ERROR_FLOOR, 1.0, 1.0)
+# the force of a dashpot that is not there
+NO_FORCE = np.zeros(1)
 # numbers of the margins: of the mode, and of the sign of the normal force
 MODE_MARGIN, SIGN_MARGIN = 0, 1
 # a margin counts as positive down to this part of the largest normal force, which is of the order of 1
@@ -77,6 +77,7 @@ class TangentialForm:
     cap : what mu N limits, the "total" force, or that of the "spring" alone
     coefficient : of kind "regularized": the coefficient of friction over mu as a formula of y, which is
         `SLIP_SCALE` abs(G), and of other values of the problem, by their names without `PREFIX`
+    has_dashpot : whether any trajectory has a dashpot
     """
 
     kind: FrictionKind
@@ -85,19 +86,50 @@ class TangentialForm:
     memory: tuple[float, float] = (0.0, 0.0)
     cap: Literal["total", "spring"] = "total"
     coefficient: Formula | None = None
+    has_dashpot: bool = True
+
+    @property
+    def has_modes(self) -> bool:
+        """Whether the contact sticks and slips."""
+        return self.kind in ("spring", "dashpot")
+
+    @property
+    def is_total(self) -> bool:
+        """Whether the limit caps spring and dashpot together."""
+        return self.cap == "total" and self.kind == "spring"
+
+    @property
+    def quadratures(self) -> dict[str, int]:
+        """What is integrated besides the components, with the numbers of its rows.
+
+        Time; with a spring whose stiffness varies, the work on it while sticking and its memory work at the limit;
+        "work", that of the dashpot, or all work of a regularized friction. The work against the limit follows from
+        impulses, see `Track.add_impulse`.
+        """
+        names = ["time"]
+        if self.kind == "spring" and self.stiffness_power:
+            names += ["stick_work", "limit_memory"]
+        if self.has_dashpot or self.kind == "regularized":
+            names += ["work"]
+        return {name: TIME_ROW + number for number, name in enumerate(names)}
+
+    def integral(self, name: str, y: Array) -> Array:
+        """Find a quadrature among the rows of a state; zero if it vanishes."""
+        row = self.quadratures.get(name)
+        return np.zeros(y.shape[1]) if row is None else y[row]
 
 
 class Columns(NamedTuple):
     """Params of a joint problem after those of the normal problem, shape (n,) each; modes change the first seven.
 
     `limit`, `spring` and `dashpot` are the factors of F, X^r z and x^q Gamma in the force, zero in other modes;
-    `memory_limit` is the factor of F in phi_e for the memory work. `press` is N/F: 1, and in tension -1 or 0;
-    `sign` is the sign of F. `root` is the root of kappa', and
-    `compliance` its inverse, zero without a spring.
+    `memory_limit` is the factor of F in phi_e for the memory work. `share` is N/F over G0: positive, and in
+    tension negative or zero; `sign` is the sign of F. `root` is the root of kappa', and `compliance` the inverse
+    of kappa', zero without a spring.
     """
 
     mode: Array
-    press: Array
+    share: Array
     sign: Array
     limit: Array
     memory_limit: Array
@@ -112,12 +144,12 @@ class Columns(NamedTuple):
 
     def changed(self, mode: Array, sign: Array) -> Columns:
         """Make the columns of other modes and signs of the normal force."""
-        press = np.where(sign > 0.0, 1.0, self.is_positive - 1.0)
-        limit = np.sign(mode) * press / self.G0
+        share = np.where(sign > 0.0, 1.0, self.is_positive - 1.0) / self.G0
+        limit = np.sign(mode) * share
         sticks = mode == 0.0
         return self._replace(
             mode=mode,
-            press=press,
+            share=share,
             sign=sign,
             limit=np.where(np.abs(mode) == 1.0, limit, 0.0),
             memory_limit=limit,
@@ -130,12 +162,12 @@ class Columns(NamedTuple):
 class Track:
     """What is known of each trajectory besides its integrated rows, in arrays of shape (n,) that are written to.
 
-    `force` and `energy` are phi_e and its energy at the end of the last part, `v` the velocity to which the
-    impulse of N is complete: `impulse`, and `signed` in the direction of the slip. `slip_work` and `damping_work`
-    complete the quadratures by what happens where a mode begins and ends; `stick_energy` is what the spring gains
-    while sticking, `held_memory` the memory work in the modes -2 and 2. `order` is the leading power of x in N
-    at first contact, and `touches` tells that the spring was at its limit at x = 0. `modes` has a bit for
-    sticking, slipping forwards and backwards.
+    `force` and `energy` are phi_e and its energy at the end of the last part, `v` and `slip` are v and Gamma to
+    which the impulse of N is complete: `impulse`, and `signed` in the direction of the slip. `slip_work` has the
+    work against the limit, and it and `damping_work` what happens where a mode begins and ends; `stick_energy`
+    is what the spring gains while sticking, `held_memory` the memory work in the modes -2 and 2. `order` is the
+    leading power of x in N at first contact, and `touches` tells that the spring was at its limit at x = 0.
+    `modes` has a bit for sticking, slipping forwards and backwards.
     """
 
     mode: Array
@@ -143,6 +175,7 @@ class Track:
     force: Array
     energy: Array
     v: Array
+    slip: Array
     impulse: Array
     signed: Array
     slip_work: Array
@@ -164,26 +197,39 @@ class Track:
             "changes": np.zeros(n, np.int32),
         }
         flags |= {"touches": np.zeros(n, bool), "is_slow": np.zeros(n, bool)}
-        return cls(**{**arrays, **flags, "sign": np.ones(n), "v": np.ones(n)})
+        return cls(**{**arrays, **flags, "sign": np.ones(n), "v": np.ones(n), "slip": np.ones(n)})
 
-    def add_impulse(self, index: NDArray[np.intp], columns: Columns, v: Array) -> None:
-        """Complete the impulses up to velocities v."""
-        impulse = columns.press * (self.v[index] - v)
+    def add_impulse(self, index: NDArray[np.intp], columns: Columns, v: Array, slip: Array) -> None:
+        """Complete the impulses, and the work against the limit, up to velocities v and Gamma.
+
+        While the contact slips Gamma changes by the impulse of N: times the mean Gamma it is the work.
+        """
+        change = self.v[index] - v
+        impulse = np.sign(columns.share) * change
         self.impulse[index] += impulse
         self.signed[index] += np.sign(columns.mode) * impulse
-        self.v[index] = v
+        self.slip_work[index] += columns.limit * change * (0.5 * (self.slip[index] + slip))
+        self.v[index], self.slip[index] = v, slip
 
     def set_mode(
-        self, index: NDArray[np.intp], old: Array, new: Array, y: Array, before: Array, after: Array
+        self,
+        form: TangentialForm,
+        index: NDArray[np.intp],
+        old: Array,
+        new: Array,
+        y: Array,
+        before: Array,
+        after: Array,
     ) -> None:
         """Change modes, with the energies of the spring before and after."""
         was_slip, is_slip = np.abs(old) == 1.0, np.abs(new) == 1.0
-        self.slip_work[index] += np.where(
-            is_slip, np.where(was_slip, 0.0, before), np.where(was_slip, -after, before - after)
-        )
+        # the work of a dashpot while slipping is a part of that against the limit
+        work = form.integral("work", y)
+        entered = np.where(was_slip, 0.0, before + work)
+        self.slip_work[index] += np.where(is_slip, entered, np.where(was_slip, -after - work, before - after))
         self.stick_energy[index] += np.where(old == 0.0, before, 0.0) - np.where(new == 0.0, after, 0.0)
         was_held, is_held = np.abs(old) == 2.0, np.abs(new) == 2.0
-        begins, ends, memory = is_held & ~was_held, was_held & ~is_held, y[LIMIT_MEMORY_ROW]
+        begins, ends, memory = is_held & ~was_held, was_held & ~is_held, form.integral("limit_memory", y)
         self.held_memory[index] += np.where(ends, memory, 0.0) - np.where(begins, memory, 0.0)
         rest = memory + 0.5 * y[SLIP_ROW] * y[SLIP_ROW]
         self.damping_work[index] += np.where(begins, rest + after, 0.0) - np.where(ends, rest + before, 0.0)
@@ -225,7 +271,6 @@ class SlipPhase:
     memory : r in this phase
     track : of all trajectories
     arguments : names of the params after the columns, besides y over Gamma: those of `TangentialForm.coefficient`
-    has_drag : whether any trajectory has a dashpot
     breakpoints : of the normal force, whose sides are the last params
     """
 
@@ -236,7 +281,6 @@ class SlipPhase:
     memory: float
     track: Track
     arguments: tuple[str, ...] = ()
-    has_drag: bool = True
     breakpoints: Sequence[Breakpoint] = ()
 
     @property
@@ -254,16 +298,6 @@ class SlipPhase:
         """Whether there is a tangential spring."""
         return self.form.kind == "spring"
 
-    @property
-    def has_modes(self) -> bool:
-        """Whether the contact sticks and slips."""
-        return self.form.kind in ("spring", "dashpot")
-
-    @property
-    def is_total(self) -> bool:
-        """Whether the limit caps spring and dashpot together."""
-        return self.form.cap == "total" and self.form.kind == "spring"
-
     def columns(self, params: Params) -> Columns:
         """Find the columns among the params."""
         return Columns(*params[self.first : self.first + len(Columns._fields)])
@@ -273,34 +307,39 @@ class SlipPhase:
         normal = self.normal
         return Problem(
             rates=self.rates,
-            event=lambda y, k, params: normal.event(y[:2], k[NORMAL_ROWS], params),
-            unreachable=lambda y, k, params: normal.unreachable(y[:2], k[NORMAL_ROWS], params),
+            event=lambda y, k, params: normal.event(y[:2], self._normal_rates(k), params),
+            unreachable=lambda y, k, params: normal.unreachable(y[:2], self._normal_rates(k), params),
             floor=JOINT_FLOOR,
             step_at_unit_error=normal.step_at_unit_error,
             n_components=N_COMPONENTS,
-            n_quadratures=FORCE_ROW - N_COMPONENTS,
+            n_quadratures=len(self.form.quadratures),
             switch=self,
         )
 
+    def _normal_rates(self, k: Array) -> Array:
+        """Choose the rates that a normal problem uses; a coordinate for strong damping uses that of time."""
+        return k[NORMAL_ROWS] if self.law.coordinate.strength else k
+
     def rates(self, y: Array, params: Params, out: Array | None = None) -> Array:
         """Compute the rates of the joint problem, see `Problem`."""
-        n, columns, p = y.shape[1], self.columns(params), self.law.model.coordinate_power
-        out = np.empty((FORCE_ROW + 1, n)) if out is None else out
+        form, columns, n = self.form, self.columns(params), y.shape[1]
+        rows = form.quadratures
+        out = np.empty((TIME_ROW + len(rows) + 1, n)) if out is None else out
         v, out[1], weight, _, force = self.normal.rates(y[:2], params, np.empty((5, n)))
-        s, slip, z = y[0], y[SLIP_ROW], y[SPRING_ROW]
+        s, slip = y[0], y[SLIP_ROW]
         out[0] = v
-        phi = slip_force = columns.limit * force * self._coefficient(slip, params)
+        phi = slip_spring = columns.limit * force
+        if form.coefficient is not None:
+            phi = phi * self._coefficient(slip, params)
         if self.has_spring:
-            spring_force = columns.spring * self._power(s, self.memory * self.stiffness_power) * z
-            phi = slip_force + spring_force
-            weighted_slip = columns.spring * slip
-            out[SPRING_ROW] = (
-                weighted_slip * p * self._power(s, p - 1.0 + (1.0 - self.memory) * self.stiffness_power)
-            )
+            spring_force = self._times(columns.spring * y[SPRING_ROW], s, self.memory * self.stiffness_power)
+            phi = phi + spring_force
+            np.multiply(columns.spring, slip, out[SPRING_ROW])
+            out[SPRING_ROW] *= self._stretch(s, weight)
         else:
             out[SPRING_ROW] = 0.0
-        if self.has_drag:
-            drag = self._power(s, self.drag_power) * slip
+        if form.has_dashpot:
+            drag = self._times(slip, s, self.drag_power)
             stick_drag = columns.dashpot * drag
             phi = phi + stick_drag
         np.multiply(weight, phi, out[SLIP_ROW])
@@ -308,61 +347,64 @@ class SlipPhase:
         if len(out) == N_COMPONENTS:
             return out
         out[TIME_ROW] = weight
-        slip_spring = columns.memory_limit * force if self.has_spring else slip_force
-        out[DAMPING_ROW] = 0.0
-        power = weight * slip
-        if self.has_drag:
-            # the dashpot works on while a cap of the total force slips, and takes from what the spring does
-            working_drag = columns.damping * drag if self.is_total else stick_drag
-            slip_drag = working_drag - stick_drag
-            slip_force, slip_spring = slip_force - slip_drag, slip_spring - slip_drag
-            out[DAMPING_ROW] = power * working_drag
-        out[SLIP_WORK_ROW] = power * slip_force
-        out[STICK_WORK_ROW] = power * spring_force if self.has_spring else 0.0
-        if self.has_spring and self.stiffness_power and self.memory != 0.5:
-            safe = _away_from_zero(s)
+        if form.cap == "spring":
+            slip_spring = columns.memory_limit * force
+        if form.has_dashpot:
+            # it works on while a cap of the total force slips, and takes from what the spring does
+            working_drag = columns.damping * drag if form.is_total else stick_drag
+            slip_spring = slip_spring - (working_drag - stick_drag)
+            np.multiply(weight * slip, working_drag, out[rows["work"]])
+        elif "work" in rows:
+            np.multiply(weight * slip, phi, out[rows["work"]])
+        if "limit_memory" in rows:
+            np.multiply(weight * slip, spring_force, out[rows["stick_work"]])
             fading = (0.5 - self.memory) * self.stiffness_power * columns.compliance * v
-            fading /= self._power(safe, self.stiffness_power + 1.0)
-            np.multiply(fading, slip_spring * slip_spring, out[LIMIT_MEMORY_ROW])
-        else:
-            out[LIMIT_MEMORY_ROW] = 0.0
-        if len(out) > FORCE_ROW:
-            out[FORCE_ROW] = force
+            fading /= signed_power(_away_from_zero(s), self.stiffness_power + 1.0)
+            np.multiply(fading, slip_spring * slip_spring, out[rows["limit_memory"]])
+        if len(out) > TIME_ROW + len(rows):
+            out[-1] = force
         return out
 
-    def _coefficient(self, slip: Array, params: Params) -> Array | float:
-        """Compute the coefficient of friction over mu, with the sign of the slip where it depends on that."""
-        if self.form.coefficient is None:
-            return 1.0
+    def _coefficient(self, slip: Array, params: Params) -> Array:
+        """Compute the coefficient of friction over mu, with the sign of the slip."""
+        assert self.form.coefficient is not None
         first = self.first + len(Columns._fields)
         arguments = dict(zip(("y", *self.arguments), params[first:], strict=False))
         arguments["y"] = arguments["y"] * np.abs(slip)
-        return np.sign(slip) * call_by_name(self.form.coefficient, arguments)
+        return np.asarray(np.sign(slip) * call_by_name(self.form.coefficient, arguments))
 
-    def _power(self, s: Array, exponent: float) -> Array | float:
-        power: Array | float = signed_power(s, exponent) if exponent else 1.0
-        return power
+    def _times(self, factor: Array, s: Array, exponent: float) -> Array:
+        """Multiply by a power of s."""
+        return factor * signed_power(s, exponent) if exponent else factor
+
+    def _stretch(self, s: Array, weight: Array) -> Array:
+        """Compute w X^(1-r)."""
+        exponent = (1.0 - self.memory) * self.stiffness_power
+        if exponent >= 0.0:
+            return self._times(weight, s, exponent)
+        p = self.law.model.coordinate_power
+        return p * signed_power(s, p - 1.0 + exponent)
 
     def _energy(self, s: Array, force: Array, columns: Columns) -> Array:
         """Compute the energy of a spring of this force, over G0^2; zero without a spring."""
         half = 0.5 * columns.compliance * force * force
-        return np.asarray(half / self._power(_away_from_zero(s), self.stiffness_power))
+        return half / signed_power(_away_from_zero(s), self.stiffness_power)
 
     def local(self, y: Array, k: Array, params: Params) -> Local:
         """Compute the state of friction at components y with rates k."""
-        columns, s, force = self.columns(params), y[0], k[FORCE_ROW]
+        form, columns, s = self.form, self.columns(params), y[0]
         d_force = self._rate_of_force(y, k, params)
-        share = columns.press / columns.G0
-        N = share * force
-        drag = columns.damping * self._power(s, self.drag_power) * y[SLIP_ROW]
-        capped_drag = drag if self.is_total else np.zeros_like(drag)
+        N, drag = columns.share * k[-1], NO_FORCE
+        if form.has_dashpot:
+            drag = self._times(columns.damping * y[SLIP_ROW], s, self.drag_power)
+        capped_drag = drag if form.is_total else NO_FORCE
         spring_force = np.where(
             columns.mode == 0.0,
-            columns.root * self._power(s, self.memory * self.stiffness_power) * y[SPRING_ROW],
+            self._times(columns.root * y[SPRING_ROW], s, self.memory * self.stiffness_power),
             np.sign(columns.mode) * N - capped_drag,
         )
-        trial = drag if self.form.kind == "dashpot" else spring_force + capped_drag
-        return Local(N, share * d_force, d_force, k[TIME_ROW], spring_force, drag, trial)
+        trial = drag if form.kind == "dashpot" else spring_force + capped_drag
+        return Local(N, columns.share * d_force, d_force, k[TIME_ROW], spring_force, drag, trial)
 
     def _rate_of_force(self, y: Array, k: Array, params: Params) -> Array:
         """Compute the rate of the normal force by a difference quotient."""
@@ -370,8 +412,9 @@ class SlipPhase:
         reach = np.clip(np.abs(y[0]), MIN_REACH, 1.0)
         if self.form.cap == "total":
             small = motion.RELEASE_STEP * reach
-            small = np.where(self._crosses(y[:2] + small * k[:2], params), -small, small)
-            return np.asarray((self.normal.rates(y[:2] + small * k[:2], params)[4] - k[FORCE_ROW]) / small)
+            if self.breakpoints:
+                small = np.where(self._crosses(y[:2] + small * k[:2], params), -small, small)
+            return np.asarray((self.normal.rates(y[:2] + small * k[:2], params)[4] - k[-1]) / small)
         # the friction force jumps where a slip ends, which makes the time of it matter
         small = RATE_OF_LIMIT_STEP * reach
         is_end, is_start = (self._crosses(y[:2] + step * k[:2], params) for step in (small, -small))
@@ -390,17 +433,17 @@ class SlipPhase:
         self, y: Array, k: Array, columns: Columns, local: Local, spring_force: Array, phi: Array
     ) -> Array:
         """Compute the rate of the trial force if the contact sticks, at a force phi and one of the spring."""
-        s = _away_from_zero(y[0])
-        growth = k[0] / s
-        drag_rate: Array = -columns.damping * self._power(y[0], self.drag_power) * (local.weight * phi)
-        if self.drag_power:
-            growing = self.drag_power * self._power(y[0], self.drag_power - 1.0) * k[0]
-            drag_rate = drag_rate + columns.damping * growing * y[SLIP_ROW]
-        if self.form.kind == "dashpot":
-            return drag_rate
-        stiffness = columns.root * columns.root * local.weight * self._power(y[0], self.stiffness_power)
-        rate: Array = self.memory * self.stiffness_power * growth * spring_force + stiffness * y[SLIP_ROW]
-        return rate + drag_rate if self.is_total else rate
+        form, s, slip, rate = self.form, y[0], y[SLIP_ROW], NO_FORCE
+        if self.has_spring:
+            rate = self._times(columns.root * columns.root * local.weight * slip, s, self.stiffness_power)
+            if self.memory and self.stiffness_power:
+                rate = rate + self.memory * self.stiffness_power * k[0] / _away_from_zero(s) * spring_force
+        if form.has_dashpot and (form.is_total or form.kind == "dashpot"):
+            rate = rate - self._times(columns.damping * (local.weight * phi), s, self.drag_power)
+            if self.drag_power:
+                growing = self._times(columns.damping * (self.drag_power * k[0]), s, self.drag_power - 1.0)
+                rate = rate + growing * slip
+        return rate
 
     # ---- the switch
 
@@ -408,12 +451,14 @@ class SlipPhase:
         """Compute the margin of the mode and that of the sign of the normal force, see `Switch`."""
         columns, local = self.columns(params), self.local(y, k, params)
         tolerance = MARGIN_TOLERANCE / columns.G0
-        sign_margin, sign_rate = columns.sign * k[FORCE_ROW] + MARGIN_TOLERANCE, columns.sign * local.dF
-        if not self.has_modes:
+        sign_margin, sign_rate = columns.sign * k[-1] + MARGIN_TOLERANCE, columns.sign * local.dF
+        if not self.form.has_modes:
             return sign_margin[None], sign_rate[None]
         sticks = columns.mode == 0.0
         direction = np.where(sticks, np.sign(local.trial), np.sign(columns.mode))
-        phi = -k[SLIP_ROW] / np.where(local.weight == 0.0, 1.0, local.weight)
+        phi = NO_FORCE
+        if self.form.has_dashpot:
+            phi = -k[SLIP_ROW] / np.where(local.weight == 0.0, 1.0, local.weight)
         rate = self.trial_rate(y, k, columns, local, local.spring_force, phi)
         growth = direction * rate - local.dN
         room = local.N - np.abs(local.trial)
@@ -426,9 +471,11 @@ class SlipPhase:
         if held.size:
             margin[held], margin_rate[held] = self._held_margin(y[:, held], _taken(params, held))[0], np.nan
         # without a limit the mode does not matter, nor without a force; and where the contact ends growth vanishes
-        free = (columns.press == 0.0) | self._without_force(columns)
-        free |= (k[0] < 0.0) & (y[0] < np.where(sticks, -END_S, END_S))
-        margin, margin_rate = np.where(free, 1.0, margin), np.where(free, 0.0, margin_rate)
+        is_free = (columns.share == 0.0) | self._without_force(columns)
+        ends = np.flatnonzero((y[0] < END_S) & (k[0] < 0.0))
+        is_free[ends] |= y[0, ends] < np.where(sticks[ends], -END_S, END_S)
+        free = np.flatnonzero(is_free)
+        margin[free], margin_rate[free] = 1.0, 0.0
         return np.array([margin, sign_margin]), np.array([margin_rate, sign_rate])
 
     def rates_of_margins(self, y: Array, k: Array, params: Params) -> Array:
@@ -445,10 +492,10 @@ class SlipPhase:
         """Change the modes and signs of trajectories where margins vanish, see `Switch`."""
         y, columns = self._released(y, params), self.columns(params)
         local = self.local(y, k, params)
-        if not self.has_modes:
+        if not self.form.has_modes:
             which = np.full_like(which, SIGN_MARGIN)
         index = columns.row.astype(np.intp)
-        self.track.add_impulse(index, columns, k[0])
+        self.track.add_impulse(index, columns, k[0], y[SLIP_ROW])
         turned = which == SIGN_MARGIN
         sign = np.where(turned, -columns.sign, columns.sign)
         self.track.sign[index] = sign
@@ -456,16 +503,16 @@ class SlipPhase:
         # at a change of the sign there is neither a limit nor a force
         spring_force = np.where(turned, local.spring_force - local.trial, local.spring_force)
         # the rate of N changes its sign with the sign of the force
-        dN = other.press / other.G0 * local.dF
+        dN = other.share * local.dF
         phi = np.where(turned, 0.0, np.where(old == 0.0, local.trial, np.sign(old) * local.N))
         rate = self.trial_rate(y, k, other, local, spring_force, phi)
         direction = np.sign(np.where(turned, rate, local.trial))
         new = self._mode_at_limit(direction * rate - dN, direction, y, other, turned)
         new = np.where(~turned & (np.abs(old) == 1.0), 0.0, new)
         # a held force that goes through zero is at the limit of both slip and stick from there
-        new = np.where(turned & (np.abs(old) == 2.0) & (other.press != 0.0), 0.0, new)
+        new = np.where(turned & (np.abs(old) == 2.0) & (other.share != 0.0), 0.0, new)
         new = self._held_mode(~turned & (old != 0.0), np.abs(old) == 2.0, np.sign(old), new, y, params)
-        capped_drag = local.drag if self.is_total else 0.0
+        capped_drag = local.drag if self.form.is_total else NO_FORCE
         spring_force = np.where(~turned & (old == 0.0), direction * local.N - capped_drag, spring_force)
         return self._enter(index, old, new, sign, local.spring_force, spring_force, y, params)
 
@@ -477,10 +524,10 @@ class SlipPhase:
         self, growth: Array, direction: Array, y: Array, columns: Columns, turned: Mask | bool = False
     ) -> Array:
         """Find the modes at the limit, where the trial force grows by this more; where `turned` it is zero."""
-        if not self.has_modes:
+        if not self.form.has_modes:
             return columns.mode
         # without a limit the mode does not matter
-        free = columns.press == 0.0
+        free = columns.share == 0.0
         forwards = np.where(y[SLIP_ROW] < 0.0, -1.0, 1.0)
         kept = np.where(columns.mode == 0.0, forwards, np.sign(columns.mode))
         slips = (columns.mode == 0.0) | turned if self.form.kind == "dashpot" else growth > 0.0
@@ -501,8 +548,8 @@ class SlipPhase:
         """Go on in other modes, with a force of the spring if the contact sticks."""
         columns = self.columns(params)
         before, after = self._energy(y[0], force_before, columns), self._energy(y[0], force, columns)
-        self.track.set_mode(index, old, new, y, before, after)
-        scale = columns.root * self._power(_away_from_zero(y[0]), self.memory * self.stiffness_power)
+        self.track.set_mode(self.form, index, old, new, y, before, after)
+        scale = self._times(columns.root, _away_from_zero(y[0]), self.memory * self.stiffness_power)
         z = np.where(columns.root > 0.0, force / scale, 0.0)
         y = y.copy()
         y[SPRING_ROW] = np.where(new == 0.0, z, y[SPRING_ROW])
@@ -518,9 +565,8 @@ class SlipPhase:
         least = HELD_X ** (1.0 / self.law.model.coordinate_power)
         y = np.array([np.where(np.abs(y[0]) < least, least, y[0]), *y[1:]])
         k, columns = self.rates(y, params), self.columns(params)
-        share = columns.press / columns.G0
-        N, dN = share * k[FORCE_ROW], share * self._rate_of_force(y, k, params)
-        stiffness = columns.root * columns.root * k[TIME_ROW] * self._power(y[0], self.stiffness_power)
+        N, dN = columns.share * k[-1], columns.share * self._rate_of_force(y, k, params)
+        stiffness = self._times(columns.root * columns.root * k[TIME_ROW], y[0], self.stiffness_power)
         fading = self.memory * self.stiffness_power * k[0] / _away_from_zero(y[0]) * N
         return direction * (dN - fading) / stiffness, N
 
@@ -548,7 +594,7 @@ class SlipPhase:
         direction = np.sign(columns.mode) if direction is None else direction
         slip, N = self._held_slip(y, params, direction)
         force = self._held_force(y, params, direction)
-        drag = columns.damping * self._power(y[0], self.drag_power) * slip
+        drag = self._times(columns.damping * slip, y[0], self.drag_power)
         above_slip = (force - direction * N) * np.sign(drag)
         return np.minimum(above_slip, np.abs(drag) - above_slip), above_slip < 0.5 * np.abs(drag)
 
@@ -559,7 +605,7 @@ class SlipPhase:
         if self.form.cap == "total" or self.form.kind != "spring":
             return new
         rows = np.flatnonzero(
-            at_limit & (self.columns(params).damping > 0.0) & (self.columns(params).press != 0.0)
+            at_limit & (self.columns(params).damping > 0.0) & (self.columns(params).share != 0.0)
         )
         if rows.size:
             ahead = direction[rows]
@@ -582,7 +628,7 @@ class SlipPhase:
 
     def begin(self, start: Array, params: Params) -> tuple[Array, Params]:
         """Find the rows and params at the start of a part of the phase, where its formulas may change."""
-        y = np.zeros((FORCE_ROW, start.shape[1]))
+        y = np.zeros((N_COMPONENTS + len(self.form.quadratures), start.shape[1]))
         y[: len(start)] = start
         index = self.columns(params).row.astype(np.intp)
         is_contact = self.track.modes[index[0]] == 0
@@ -593,15 +639,15 @@ class SlipPhase:
         columns = self.columns(params)
         old, force_before = self.track.mode[index], self.track.force[index]
         k = self.rates(y[:N_COMPONENTS], params)
-        force = k[FORCE_ROW]
+        force = k[-1]
         sign = np.where(np.abs(force) > MARGIN_TOLERANCE, np.sign(force), self.track.sign[index])
         self.track.sign[index] = sign
         columns = columns.changed(old, sign)
         params = self._replaced(params, columns)
         local = self.local(y, k, params)
-        if not self.has_modes:
+        if not self.form.has_modes:
             return self._enter(index, old, old, sign, force_before, force_before, y, params)
-        capped_drag = local.drag if self.is_total else 0.0
+        capped_drag = local.drag if self.form.is_total else NO_FORCE
         trial = local.drag if self.form.kind == "dashpot" else force_before + capped_drag
         at_limit = np.abs(trial) >= local.N * (1.0 - CAP_TOLERANCE) - MARGIN_TOLERANCE / columns.G0
         direction = np.where(trial < 0.0, -1.0, 1.0)
@@ -624,13 +670,13 @@ class SlipPhase:
         form, columns, n = self.form, self.columns(params), y.shape[1]
         near, twice = (self._rows_near_contact(y, params, s) for s in (START_S, 2.0 * START_S))
         k = self.rates(near[:N_COMPONENTS], params)
-        force, twice_force = k[FORCE_ROW], self.rates(twice[:N_COMPONENTS], params)[FORCE_ROW]
+        force, twice_force = k[-1], self.rates(twice[:N_COMPONENTS], params)[-1]
         self.track.order[index] = np.log2(twice_force / force) / self.law.model.coordinate_power
         sign = np.where(force < 0.0, -1.0, 1.0)
         self.track.sign[index] = sign
         columns = columns.changed(np.zeros(n), sign)
         params = self._replaced(params, columns)
-        if not self.has_modes:
+        if not self.form.has_modes:
             mode = np.full(n, 1.0 if form.kind == "regularized" else 0.0)
             return self._enter(index, mode, mode, sign, np.zeros(n), np.zeros(n), y, params)
         local = self.local(near, k, params)
@@ -640,7 +686,7 @@ class SlipPhase:
             * START_S ** (self.law.model.coordinate_power * (kp + 1.0))
             / (kp + 1.0 - self.memory * kp)
         )
-        capped_drag = local.drag if self.is_total else 0.0
+        capped_drag = local.drag if self.form.is_total else NO_FORCE
         trial = local.drag if form.kind == "dashpot" else spring_force + capped_drag
         below = trial < local.N
         spring_force = np.where(below, 0.0, local.N - capped_drag)
@@ -648,11 +694,11 @@ class SlipPhase:
             new = np.where(below, 0.0, 1.0)
         else:
             growth = self._growth_at_contact(y, params)
-            if self.is_total and kp * self.memory == form.damping_power > 0.0:
+            if self.form.is_total and kp * self.memory == form.damping_power > 0.0:
                 # the leading powers cancel
                 growth = np.where(capped_drag >= local.N, columns.root**2 * columns.G0 - 1.0, growth)
             new = np.where(below, 0.0, np.where(growth > 0.0, 1.0, 0.0))
-            if self.is_total and self.memory == 1.0 and form.damping_power < kp:
+            if self.form.is_total and self.memory == 1.0 and form.damping_power < kp:
                 self.track.is_slow[index] = is_slow = local.drag > local.N
                 new = np.where(is_slow, -1.0, new)
         self.track.touches[index] = (new != 0.0) | ~below
@@ -671,10 +717,10 @@ class SlipPhase:
         near = self._rows_near_contact(y, params, RATE_S)
         columns, k = self.columns(params), self.rates(near[:N_COMPONENTS], params)
         small = RATE_STEP * RATE_S * k[:N_COMPONENTS]
-        ahead, behind = (self.rates(near[:N_COMPONENTS] + step, params)[FORCE_ROW] for step in (small, -small))
-        dN: Array = columns.press / columns.G0 * (ahead - behind) / (2.0 * RATE_STEP * RATE_S)
+        ahead, behind = (self.rates(near[:N_COMPONENTS] + step, params)[-1] for step in (small, -small))
+        dN: Array = columns.share * (ahead - behind) / (2.0 * RATE_STEP * RATE_S)
         local = self.local(near, k, params)
-        spring_force = local.N - (local.drag if self.is_total else 0.0)
+        spring_force = local.N - (local.drag if self.form.is_total else NO_FORCE)
         return self.trial_rate(near, k, columns, local, spring_force, local.N) - dN
 
     def finish(self, y: Array, params: Params) -> None:
@@ -693,7 +739,7 @@ class SlipPhase:
         is_finite = 2.0 * self.track.order[index] > self.form.stiffness_power - ORDER_TOLERANCE
         is_finite |= (np.abs(columns.mode) != 1.0) | (y[0] > END_S)
         self.track.energy[index] = np.where(is_finite, self._energy(near[0], force, columns), 0.0)
-        self.track.add_impulse(index, columns, k[0])
+        self.track.add_impulse(index, columns, k[0], y[SLIP_ROW])
 
 
 def _taken(params: Params, rows: NDArray[np.intp]) -> Params:

@@ -33,12 +33,8 @@ from .simulate import (
     solve_phases,
 )
 from .slip_motion import (
-    DAMPING_ROW,
-    LIMIT_MEMORY_ROW,
     ORDER_TOLERANCE,
     SLIP_ROW,
-    SLIP_WORK_ROW,
-    STICK_WORK_ROW,
     TIME_ROW,
     Columns,
     FrictionKind,
@@ -212,7 +208,7 @@ def _integrate(
     law = problems.law
     slip, stiffness, damping, is_positive, *coefficient = (np.array(column, float) for column in problems.columns)
     n, names = slip.size, _coefficient_arguments(form)
-    track = Track.of(n)
+    track, form = Track.of(n), replace(form, has_dashpot=bool(damping.any()))
     unset, compliance = np.zeros(n), np.where(stiffness > 0.0, 1.0 / stiffness, 0.0)
     base = Columns(
         *(unset,) * 7, np.arange(n, dtype=float), np.sqrt(stiffness), compliance, damping, slip, is_positive
@@ -229,8 +225,8 @@ def _integrate(
             rows = np.vstack([start, states[0][2:, recovery.rows]])
         residual = None if recovery is None else recovery.residual
         params, breakpoints = motion.breakpoints(law, params, rows, residual)
-        memory, has_drag = form.memory[recovery is not None], bool(damping.any())
-        phase = SlipPhase(form, law, problem, len(params), memory, track, names, has_drag, breakpoints)
+        memory = form.memory[recovery is not None]
+        phase = SlipPhase(form, law, problem, len(params), memory, track, names, breakpoints)
 
         def run(problem: Problem, start: Array, params: Params) -> Solution:
             y, params = phase.begin(start, params)
@@ -255,7 +251,7 @@ def _integrate(
     status = phases.status.copy()
     # at a limit the balls stop, sooner or later
     stopped = status == LIMIT
-    press = base.changed(track.mode, track.sign).press
+    press = np.sign(base.changed(track.mode, track.sign).share)
     result.sliding_impulse[stopped] = (track.impulse + press * track.v)[stopped]
     if form.kind == "coulomb":
         status[stopped] = LIMIT
@@ -270,16 +266,22 @@ def _integrate(
 def _result(form: TangentialForm, n: float, base: Columns, track: Track, state: Array) -> TangentialResult:
     """Compute what trajectories come to from their last rows, NaN where they have not ended."""
     scale, G0 = base.G0 * base.G0, base.G0
-    mode, left, at_limit = np.abs(track.mode), track.energy, state[LIMIT_MEMORY_ROW]
+    mode, left = np.abs(track.mode), track.energy
+    at_limit, work = form.integral("limit_memory", state), form.integral("work", state)
     held_memory = track.held_memory + np.where(mode == 2.0, at_limit, 0.0)
-    stick_memory = state[STICK_WORK_ROW] - track.stick_energy - np.where(mode == 0.0, left, 0.0)
-    slip_work = state[SLIP_WORK_ROW] + track.slip_work - np.where(mode == 1.0, left, 0.0)
+    slip_work = track.slip_work - np.where(mode == 1.0, left + work, 0.0) + held_memory - at_limit
     rest = 0.5 * state[SLIP_ROW] ** 2 + left + at_limit
-    damping_work = state[DAMPING_ROW] + track.damping_work - np.where(mode == 2.0, rest, 0.0)
-    # where N vanishes so slowly with x that slip and memory work are infinite at x = 0, the slip work is their sum
-    is_infinite = track.touches & (2.0 * track.order < form.stiffness_power + ORDER_TOLERANCE)
-    slip_work = slip_work + np.where(is_infinite, stick_memory + held_memory, held_memory - at_limit)
-    memory_work = np.where(is_infinite, 0.0, stick_memory + at_limit) if form.stiffness_power else 0.0 * slip_work
+    damping_work = work + track.damping_work - np.where(mode == 2.0, rest, 0.0)
+    memory_work = np.zeros_like(slip_work)
+    if form.stiffness_power:
+        stick_work = form.integral("stick_work", state)
+        memory_work = stick_work - track.stick_energy - np.where(mode == 0.0, left, 0.0) + at_limit
+        # where N vanishes so slowly with x that both works are infinite at x = 0, the slip work is their sum
+        is_infinite = track.touches & (2.0 * track.order < form.stiffness_power + ORDER_TOLERANCE)
+        slip_work += np.where(is_infinite, memory_work, 0.0)
+        memory_work = np.where(is_infinite, 0.0, memory_work)
+    if form.kind == "regularized":
+        slip_work, damping_work = work, memory_work
     ended = np.isfinite(state[SLIP_ROW])
     nan = np.full(ended.size, np.nan)
     result = replace(TangentialResult.blank(ended.size), sliding_impulse=np.where(ended, track.impulse, np.nan))

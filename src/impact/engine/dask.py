@@ -143,6 +143,8 @@ def _connect(
             client = Client(scheduler_file=str(scheduler), set_as_default=False, timeout=timeout)
         else:
             client = Client(scheduler, set_as_default=False, timeout=timeout)
+    except UsageError:
+        raise
     except (OSError, ValueError, TypeError, ImportError) as error:
         raise UsageError(f"{scheduler_name}: {error}; expected {ADDRESS_EXPECTED}") from None
     try:

@@ -101,7 +101,8 @@ class ModelDescription(Displayed):
 
 def parameter_record(parameter: Parameter) -> dict[str, Any]:
     """The declaration of a parameter as plain data; what few parameters have is left out elsewhere."""
-    return {name: value for name, value in vars(parameter).items() if value or name not in ("optional", "choices")}
+    rare = ("optional", "choices", "is_damping")
+    return {name: value for name, value in vars(parameter).items() if value or name not in rare}
 
 
 def parameter_rows(table: str, parameters: Sequence[Parameter]) -> dict[str, str]:

@@ -207,6 +207,8 @@ def _read_source(path: Path) -> PythonFile:
         if path.exists() and not path.is_file():
             raise UsageError(f"{path}: not a regular file, expected a Python file")
         return PythonFile(str(path), path.read_bytes())
+    except UsageError:
+        raise
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         raise UsageError(f"{path}: cannot be read: {reason}") from None

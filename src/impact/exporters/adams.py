@@ -51,7 +51,6 @@ CODE = Code(
     name="adams",
     title="Adams, IMPACT",
     laws={"adams-impact": "IMPACT"},
-    damping={"adams-impact": "c"},
     newest="MD R2",
     tested="not run by us; read in the help of Adams/Solver MD R2 (IMPACT, CONTACT), Adams/View (contact modify)",
     comment=("! ", ""),

@@ -190,7 +190,6 @@ CODE = Code(
         key: f"{system}, {force}" + ("" if of_material else ", kn and gn")
         for key, (system, force, of_material) in SETTINGS.items()
     },
-    damping={"kelvin-voigt-no-tension": "C", "kuwabara-kono-1987": "A"},
     newest="10.0.0",
     tested=f"not run by us; read in {CHRONO}",
     read_version=read_version,

@@ -104,7 +104,6 @@ class Code:
     newest : the newest release whose laws were seen, taken where the code is not installed
     tested : what was run, or what was read instead
     parameters : in the units and conventions of the code, by the code's own names
-    damping : the parameter that sets the restitution, of laws without an e
     scheme : see `impact.contact.fixed_step.SCHEMES`; None if its restitution at a time step is not predicted
     uncertainty : largest difference of e between the code and the map of its scheme
     rough : the same by law, where the code itself finds the damping only roughly
@@ -131,7 +130,6 @@ class Code:
     tested: str
     parameters: Callable[[Collision], dict[str, float | str]]
     lines: Callable[[Collision, Parameters], list[str]]
-    damping: Mapping[str, str] = field(default_factory=dict)
     scheme: str | None = None
     uncertainty: float = 1e-9
     rough: Mapping[str, float] = field(default_factory=dict)

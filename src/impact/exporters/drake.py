@@ -97,7 +97,6 @@ CODE = Code(
         "drake-point-contact": "point contact, one material",
         "drake-point-contact-mixed": "point contact, two materials",
     },
-    damping={"drake-point-contact": "d", "drake-point-contact-mixed": "d1"},
     newest="1.51.1",
     tested="scripts were run in Drake 1.51.1, TAMSI",
     scheme="drake-tamsi",

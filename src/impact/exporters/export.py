@@ -13,9 +13,20 @@ from .._version import __version__
 from ..atomic import check_outputs, write_file
 from ..contact.status import Status
 from ..display import Block, Displayed
+from ..engine.plugins import Plugins
 from ..errors import UsageError
 from ..formatting import decimals, number, quantity, safe_text
-from ..inverse.timestep import TimestepRow, needed_steps, time_steps, timestep_rows
+from ..inverse.timestep import (
+    NeededParameter,
+    NeededSteps,
+    TimestepRow,
+    needed_parameter,
+    needed_steps,
+    read_step,
+    time_parameter,
+    time_steps,
+    timestep_rows,
+)
 from ..results.single_impact import ConfigSource
 from .code import Collision, Parameters
 from .problem import ExportProblem, prepare_export
@@ -45,6 +56,8 @@ class Export(Displayed):
     scheme : name of the code's fixed-step scheme, see `impact.contact.fixed_step.SCHEMES`; None if unknown here
     e : the requested e; NaN for a law without one
     e_continuous, contact_time : of the continuous law [-, s]
+    needed : the value of a parameter from which on every phase is within 1 % at the step, where it was asked for
+        or a given step is too large; None where there is none
     at_dt : what the code delivers at its time step; its restitutions are NaN without a scheme, and where a
         collision fails
     parameters : by the code's own names, in its units and conventions
@@ -63,6 +76,7 @@ class Export(Displayed):
     e_continuous: float
     contact_time: float
     at_dt: TimestepRow
+    needed: NeededParameter | None
     parameters: Parameters
     header: tuple[str, ...]
     lines: tuple[str, ...]
@@ -85,6 +99,7 @@ class Export(Displayed):
             **{name: getattr(self, name) for name in EXPORT_FIELDS},
             "e_at_dt": {"dt": row.dt, "mean": row.e_mean, "least": row.e_least, "largest": row.e_largest},
             "e_to_ask": row.e_to_ask,
+            "for": self.needed and self.needed.as_dict(),
             "parameters": dict(self.parameters),
             "lines": list(self.lines),
             "header": list(self.header),
@@ -128,7 +143,8 @@ def export(
     *,
     source: ConfigSource = None,
     at: Mapping[str, float | str] | None = None,
-    dt: float | None = None,
+    dt: float | str | None = None,
+    parameter: str | None = None,
     code_version: str | None = None,
     script: bool = False,
     verify: bool = False,
@@ -147,7 +163,9 @@ def export(
         parameters, begin with the best one
     source, overrides : see `solve`
     at : values of inputs by config name; an e for a law that takes none is reached by its damping parameter
-    dt : time step [s]; by default the contact time of the continuous law over 50
+    dt : time step [s], or a text such as "2 us"; by default the contact time of the continuous law over 50
+    parameter : see `timestep`; by default what sets the time scale of the law, where a given `dt` is too large
+        for every phase to be within 1 %
     code_version : release of the code, letters, digits, spaces and `._+()-`; by default that of the program, or
         else the newest known one
     script : write a complete input with two balls that prints the e that it measures
@@ -181,15 +199,28 @@ def export(
     code = find_code(to)
     program_path, version = choose_version(code, program, code_version, verify=verify)
     problem = prepare_export(code, model, version, source, at or {}, overrides)
-    check_outputs([output], [source, *problem.config.files], overwrite=overwrite)
+    check_outputs([output], [source, *problem.point.config.files], overwrite=overwrite)
     if (script or verify) and not code.template:
         raise UsageError(f"--script: there is none for {code.title}: {code.tested}")
     contact_time = problem.law.contact_time
-    (dt,) = time_steps(contact_time, [STEPS_PER_CONTACT] if dt is None else [], [] if dt is None else [dt])
+    given = [] if dt is None else [read_step(dt)]
+    (dt,) = time_steps(contact_time, [] if given else [STEPS_PER_CONTACT], given)
     collision = problem.collision(dt, 0.5)
     parameters = code.parameters(collision)
     at_dt = _row(problem, dt)
-    header = _header(problem, collision, at_dt)
+    advised = None
+    if code.scheme is not None and problem.requested_e > 0.0:
+        advised = needed_steps(problem.law, ADVISED_TOL, problem.e_continuous)
+    if parameter is None and given and advised is not None and advised.dt < dt:
+        parameter = time_parameter(problem.point.config, problem.model)
+    needed = None
+    if parameter:
+        if code.scheme is None:
+            raise UsageError(f"--for: what {code.title} delivers at a time step is not predicted")
+        needed = needed_parameter(
+            problem.point, Plugins(), parameter, dt, ADVISED_TOL, problem.law, problem.outputs
+        )
+    header = _header(problem, collision, at_dt, advised, needed)
     lines = [*comment_lines(header), code.script(collision, parameters)] if script else []
     result = Export(
         code=code.name,
@@ -200,6 +231,7 @@ def export(
         e_continuous=problem.e_continuous,
         contact_time=contact_time,
         at_dt=at_dt,
+        needed=needed,
         parameters=parameters,
         header=tuple(header),
         lines=tuple(code.lines(collision, parameters)),
@@ -276,7 +308,13 @@ def _failure(problem: ExportProblem, row: TimestepRow) -> str:
     return f"{status} at {row.failed} of {problem.law.phases} phases, {Status[row.status.upper()].meaning}"
 
 
-def _header(problem: ExportProblem, collision: Collision, row: TimestepRow) -> list[str]:
+def _header(
+    problem: ExportProblem,
+    collision: Collision,
+    row: TimestepRow,
+    advised: NeededSteps | None,
+    needed: NeededParameter | None,
+) -> list[str]:
     """Write what a comment above the lines says."""
     code, law = problem.code, problem.law
     header = [
@@ -286,16 +324,15 @@ def _header(problem: ExportProblem, collision: Collision, row: TimestepRow) -> l
     if problem.missing_law:
         header.append(f"release {problem.version} lacks the default law of {code.newest}, {problem.missing_law}")
     header += [*([_better_fit(problem)] if problem.better_fit else []), *problem.fit_notes]
-    if problem.defaulted_axes:
-        header.append(f"first value of each axis of the source: {', '.join(problem.defaulted_axes)}")
+    if problem.point.defaulted_axes:
+        header.append(f"first value of each axis of the source: {', '.join(problem.point.defaulted_axes)}")
     if problem.has_wall:
         radius = float(law.impact.R_eff[0])
         known = "" if math.isnan(radius) else f", R* = {quantity(radius, 'm')}"
         moving = "; in a script it is at rest, and ball 1 has v1 - v2" if collision["v2"] else ""
         header.append(f"ball 2 is a plane wall: m = m1{known}{moving}")
-    if problem.solved_parameter:
-        value = collision[problem.solved_parameter]
-        header.append(f"{problem.solved_parameter} = {value!r} gives the e that is wanted")
+    for name, value in (problem.point.solved or {}).items():
+        header.append(f"{name} = {value!r} gives the e that is wanted")
     asked = f"e = {number(law.e)} is asked for; " if law.has_e else ""
     contact_time = quantity(law.contact_time, "s")
     header.append(
@@ -312,10 +349,9 @@ def _header(problem: ExportProblem, collision: Collision, row: TimestepRow) -> l
             header.append(
                 f"a mean of {number(problem.requested_e)} at this dt: ask for e = {decimals(row.e_to_ask)}"
             )
-        # where the continuous law delivers another e, no step does what is advised
-        reachable = abs(problem.e_continuous - problem.requested_e) < ADVISED_TOL * problem.requested_e
-        needed = needed_steps(law, ADVISED_TOL, problem.e_continuous) if reachable else None
-        if needed is not None:
+        if advised is not None:
             within = f"within {number(100.0 * ADVISED_TOL)} % of {number(problem.requested_e)}"
-            header.append(f"advised: dt <= {quantity(needed.dt, 's', 3)}, where every phase is {within}")
+            header.append(f"advised: dt <= {quantity(advised.dt, 's', 3)}, where every phase is {within}")
+        if needed is not None:
+            header.append(str(needed))
     return [*header, *code.notes(collision), code.tested]

@@ -58,7 +58,6 @@ CODE = Code(
     name="exudyn",
     title="EXUDYN",
     laws={key: f"impactModel {number}" for key, number in IMPACT_MODELS.items()},
-    damping={"kelvin-voigt": "C"},
     newest="1.13.6",
     tested="scripts were run in EXUDYN 1.13.6, generalized alpha; read in jgerstmayr/EXUDYN @e44aca1b (2026)",
     parameters=parameters,

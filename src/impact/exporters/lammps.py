@@ -197,7 +197,6 @@ CODE = Code(
     name="lammps",
     title="LAMMPS, pair style granular",
     laws={key: f"{spring}, damping {damping}{limit}" for key, (spring, damping, limit) in OPTIONS.items()},
-    damping={key: STRENGTH[damping] for key, (_, damping, _) in OPTIONS.items() if STRENGTH[damping] != "e"},
     newest="20250722",
     tested="scripts were run in LAMMPS 22 July 2025",
     scheme="kick-drift",

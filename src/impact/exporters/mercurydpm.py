@@ -65,7 +65,6 @@ CODE = Code(
     name="mercurydpm",
     title="MercuryDPM",
     laws=SPECIES,
-    damping={"kuwabara-kono-1987": "A"},
     newest="1.0 (trunk of July 2024)",
     tested="not run by us; read in kuwt/MercuryDPM_fork, Kernel @fb0ebf1d (2024)",
     comment=("// ", ""),

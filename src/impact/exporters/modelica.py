@@ -33,7 +33,6 @@ CODE = Code(
     name="modelica",
     title="Modelica Standard Library, ElastoGap",
     laws={"modelica-elastogap": "ElastoGap"},
-    damping={"modelica-elastogap": "d"},
     newest="4.1.0",
     tested=f"not run by us; read in {MODELICA_ELASTOGAP.evidence.source}",
     comment=("// ", ""),

@@ -57,7 +57,9 @@ def lines(collision: Collision, parameters: Parameters) -> list[str]:
 
 
 def notes(collision: Collision) -> list[str]:
+    is_standard = collision.model.key == "mujoco-solref"
     return [
+        *(["timeconst >= 2 dt: MuJoCo raises a smaller one to 2 dt (flag refsafe)"] if is_standard else []),
         "solref is per effective mass: the restitution does not depend on the masses, nor on the speed",
         "unset, solref is 0.02 1, critical damping: e is 0.135 at any speed; a timeconst below 2 dt is raised",
         "solimp is constant here; with the default one, 0.9 0.95 0.001 0.5 2, the restitution is another",
@@ -70,7 +72,6 @@ CODE = Code(
     name="mujoco",
     title="MuJoCo",
     laws={"mujoco-solref": "solref, standard format", "mujoco-solref-direct": "solref, direct format"},
-    damping={"mujoco-solref": "dampratio", "mujoco-solref-direct": "b"},
     newest="4.0.0",
     tested="scripts were run in MuJoCo 4.0.0, integrator Euler",
     scheme="kick-drift",

@@ -67,7 +67,6 @@ CODE = Code(
     name="newton",
     title="Newton, SolverSemiImplicit",
     laws={"newton-semi-implicit": "ke and kd of ShapeConfig"},
-    damping={"newton-semi-implicit": "kd"},
     newest="1.8.0",
     tested="scripts were run in Newton 1.8.0 on a CPU; warp.sim has the same force and was not run",
     scheme="kick-drift",

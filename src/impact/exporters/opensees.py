@@ -95,7 +95,6 @@ CODE = Code(
     name="opensees",
     title="OpenSees",
     laws={key: f'uniaxialMaterial "{name}"' for key, name in MATERIALS.items()},
-    damping={"kelvin-voigt": "C"},
     newest="3.7.1.2",
     tested="scripts were run in openseespy 3.7.1.2, Newmark with 0.5 and 0.25",
     parameters=parameters,

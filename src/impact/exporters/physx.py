@@ -40,7 +40,6 @@ CODE = Code(
     name="physx",
     title="PhysX, Isaac Sim and Isaac Lab",
     laws={"kelvin-voigt-no-tension": "compliant contact"},
-    damping={"kelvin-voigt-no-tension": "C"},
     newest="5.6.1",
     tested="not run by us; read in NVIDIA-Omniverse/PhysX @a3d8a641 (2026), DyContactPrepShared.h, PxMaterial.h, "
     "PxShape.h, PxSceneDesc.h and isaac-sim/IsaacLab @046b71b8, physics_materials_cfg.py",

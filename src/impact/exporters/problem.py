@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from ..config.load import Config
 from ..contact.impacts import INPUTS, Impacts
@@ -13,12 +13,11 @@ from ..contact.models import find
 from ..engine.build_impacts import build_impacts
 from ..engine.plan import Plan
 from ..engine.plugins import Plugins
-from ..errors import UsageError
 from ..formatting import number
-from ..inverse.solve import placeholder, solve_input, unknown_of
+from ..inverse.solve import PointWithE, point_with_e
 from ..inverse.timestep import FixedStepLaw, fixed_step_law
 from ..results.calibration import position_of_law, unidentified_notes
-from ..results.single_impact import Calibration, ConfigSource, open_source, single_point
+from ..results.single_impact import Calibration, ConfigSource, open_source
 from .code import Code, Collision
 from .releases import first_law, has_law, law_of_code
 
@@ -37,10 +36,8 @@ class ExportProblem:
     Parameters
     ----------
     law : the law, the impact and the contact time of the continuous law
-    e_continuous, peak_indentation : [-] and [m], of the continuous law
-    solved_parameter : what was solved for, with the requested e; "" for none
-    defaulted_axes : names of axes of the source that are at their first value
-    has_wall : ball 2 is a plane wall
+    outputs : of the continuous law, by name, in SI
+    point : the config, the axes of the source that are at their first value, and the damping that was solved for
     fit_notes : of a calibration, the rank of the law and its weight, and other laws that were fitted
     better_fit : the law of a calibration that fits best, where it is none of the code; else ""
     missing_law : the default law of the newest release, where this one lacks it and none was requested; else ""
@@ -49,12 +46,8 @@ class ExportProblem:
     code: Code
     version: str
     law: FixedStepLaw
-    e_continuous: float
-    peak_indentation: float
-    config: Config
-    solved_parameter: str
-    defaulted_axes: tuple[str, ...]
-    has_wall: bool
+    outputs: Mapping[str, float]
+    point: PointWithE
     fit_notes: tuple[str, ...]
     better_fit: str
     missing_law: str
@@ -62,6 +55,15 @@ class ExportProblem:
     @property
     def model(self) -> ForceModel:
         return self.law.model
+
+    @property
+    def has_wall(self) -> bool:
+        """Whether ball 2 is a plane wall."""
+        return self.point.replaced is not None
+
+    @property
+    def e_continuous(self) -> float:
+        return self.outputs["e_out"]
 
     @property
     def requested_e(self) -> float:
@@ -74,8 +76,8 @@ class ExportProblem:
         for name in ("R1", "R2"):
             if math.isnan(values[name]):
                 is_wall = name == "R2" and self.has_wall
-                values[name] = math.inf if is_wall else RADIUS_PER_PEAK * self.peak_indentation
-        names = self.config.scalars
+                values[name] = math.inf if is_wall else RADIUS_PER_PEAK * self.outputs["peak_indentation"]
+        names = self.point.config.scalars
         material1, material2 = (
             str(names.get(f"material{ball}", names.get("material", ""))) for ball in ("1", "2")
         )
@@ -98,13 +100,12 @@ def input_values(impact: Impacts) -> dict[str, float]:
     return {name: float(impact.quantity(name)[0]) for name in names}
 
 
-def with_wall(config: Config, code: Code, version: str) -> tuple[Config, bool]:
-    """Set the inputs that a plane wall acts with in a code, and return whether ball 2 is such a wall."""
+def wall_inputs(config: Config, code: Code, version: str) -> Mapping[str, float] | None:
+    """Find the inputs that a plane wall acts with in a code; None if ball 2 is no such wall."""
     values = input_values(build_impacts(Plan(config).inputs, config.models[0], ()))
     if math.isfinite(values["m2"]) or math.isfinite(values["R2"]):
-        return config, False
-    inputs = code.wall_inputs(config.models[0].key, version, values)
-    return replace(config, scalars={**config.scalars, **inputs}), True
+        return None
+    return code.wall_inputs(config.models[0].key, version, values)
 
 
 def prepare_export(
@@ -116,8 +117,7 @@ def prepare_export(
     overrides: Sequence[str],
 ) -> ExportProblem:
     """Choose the law, and reduce the source to one impact; the damping of a law without e is solved for."""
-    plugins, missing = Plugins(()), ""
-    point_source = open_source(source, overrides, plugins)
+    missing, point_source = "", open_source(source, overrides, Plugins(()))
     if model is not None:
         key = law_of_code(code, model, version)
     elif models := point_source.models:
@@ -125,39 +125,16 @@ def prepare_export(
     else:
         key, newest = (first_law(code, tuple(code.laws), release) for release in (version, code.newest))
         missing = "" if key == newest else newest
-    law = find(key)
-    at, solved = dict(at), ""
-    if "e" in at and "e" not in law.quantities:
-        solved = code.damping.get(key, "")
-        if not solved:
-            raise UsageError(f"--at e: {key} has no e, and no parameter that sets it")
-        name, unknown = f"{key}.{solved}", unknown_of(law, solved)
-        if name in at:
-            raise UsageError(f"--at: got e and {name}, expected one of the two")
-        config, defaulted_axes = single_point(point_source, key, {**at, **placeholder(law, unknown)})
-        config, has_wall = with_wall(config, code, version)
-        requested_e = float(config.scalars["e"])
-        result = solve_input(config, plugins, unknown, {"e_out": requested_e})
-        if not result.roots:
-            lower, upper = map(number, result.attainable)
-            raise UsageError(f"--at e={number(requested_e)}: {key} delivers {lower} to {upper} at any {solved}")
-        config = replace(config, scalars={**config.scalars, name: result.roots[0].value})
-    else:
-        config, defaulted_axes = single_point(point_source, key, at)
-        config, has_wall = with_wall(config, code, version)
-    fixed, collision = fixed_step_law(config, PHASES, code.scheme)
+    point = point_with_e(point_source, find(key), at, lambda config: wall_inputs(config, code, version))
+    fixed, outputs = fixed_step_law(point.config, PHASES, code.scheme)
     calibration = point_source.calibration
     better_fit, fit_notes = _fit_notes(code, version, key, calibration) if calibration else ("", ())
     return ExportProblem(
         code=code,
         version=version,
         law=fixed,
-        e_continuous=collision["e_out"],
-        peak_indentation=collision["peak_indentation"],
-        config=config,
-        solved_parameter=solved,
-        defaulted_axes=defaulted_axes,
-        has_wall=has_wall,
+        outputs=outputs,
+        point=point,
         fit_notes=fit_notes,
         better_fit=better_fit,
         missing_law=missing,

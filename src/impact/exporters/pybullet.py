@@ -58,7 +58,6 @@ CODE = Code(
     name="pybullet",
     title="PyBullet",
     laws={"kelvin-voigt-no-tension": "contactStiffness and contactDamping"},
-    damping={"kelvin-voigt-no-tension": "C"},
     newest="3.2.7",
     tested="scripts were run in PyBullet 3.2.7; read in bulletphysics/bullet3 @6c888f4a (2025)",
     # both have the force at the end of a step in which the balls overlap at the start

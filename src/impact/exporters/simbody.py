@@ -101,7 +101,6 @@ CODE = Code(
     name="simbody",
     title="Simbody in OpenSim",
     laws=LAWS,
-    damping={"simbody-hunt-crossley": "c", "simbody-hunt-crossley-mixed": "c1"},
     newest="4.6",
     tested="scripts were run in OpenSim 4.6, RungeKutta3 with a fixed step",
     parameters=parameters,

@@ -62,7 +62,6 @@ CODE = Code(
     name="simscape",
     title="Simscape Multibody, Spatial Contact Force",
     laws={"simscape-contact": "Smooth Spring-Damper"},
-    damping={"simscape-contact": "b"},
     newest="R2019b",
     tested="not run by us; read in the MathWorks page of the block; names of parameters of public scripts",
     comment=("% ", ""),

@@ -151,11 +151,6 @@ CODE = Code(
     name="yade",
     title="YADE",
     laws=LAWS,
-    damping={
-        "yade-betan-direct": "betan",
-        "yade-viscoelastic": "C",
-        "yade-viscoelastic-pulling": "C",
-    },
     newest="2023.02a",
     tested="scripts were run in YADE 2023.02a",
     scheme="kick-drift",

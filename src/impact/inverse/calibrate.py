@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
@@ -20,7 +20,7 @@ from ..config.grid import Axis
 from ..config.input_names import InputName
 from ..config.load import Config, parse_config, read_config
 from ..config.measurements import fitted_parameters
-from ..config.quantities import Quantity
+from ..config.quantities import Quantity, middle_of
 from ..config.tables import Solver
 from ..contact.friction import Pair
 from ..contact.interpolant import InterpolatedCollisions, motion_key
@@ -41,11 +41,14 @@ from ..results.schema import FIT_STATUSES
 from ..results.xarray_backend import save
 from .batched_solvers import VectorFunction
 from .fit import Bounds, DataPoints, Fit, FitProblem, fit_all
+from .solve import SolveProblem, unknown_of
 
 # points of the curve of each law over an input
 CURVE_POINTS = 101
 # the curve is spaced logarithmically if the largest value of the input is larger by this factor
 LOG_CURVE_RATIO = 30.0
+# ratio of a bound of a natural range to the size of a parameter in the contact's own units
+NATURAL_RATIO = 1e4
 # variables of a calibration that are fields of a fit
 FIT_VARIABLES = ("chi2_reduced", "p_value", "excess", "aicc", "loo", "predicted", "residual", "loo_residual")
 # denominators of the exponents of a group of parameters
@@ -133,15 +136,39 @@ def calibrate(
 
 def calibrate_config(config: Config, plugins: Plugins, jobs: int = 1) -> xr.Dataset:
     """Fit the laws of a config to its measurements; see `calibrate`."""
+    natural = natural_bounds(config, plugins)
+    config = replace(config, fits={**config.fits, **natural})
     keys = list(laws_to_fit(config))
     if jobs > 1 and len(keys) > 1:
         context = context_of(Plan(config, plugins))
         with choose_executor(jobs).start() as executor:
-            fit = partial(_fit_remotely, text=config.text, overrides=config.overrides, context=context)
+            bounds = [override_text(InputName.parse(name).path, {"fit": list(natural[name])}) for name in natural]
+            overrides = (*config.overrides, *bounds)
+            fit = partial(_fit_remotely, text=config.text, overrides=overrides, context=context)
             laws = dict(zip(keys, executor.map(fit, keys), strict=True))
     else:
         laws = fit_laws(config)
     return _calibration_dataset(config, plugins, laws)
+
+
+def natural_bounds(config: Config, plugins: Plugins) -> dict[str, tuple[float, float]]:
+    """Find the bounds of parameters with `fit = true`: decades about the size of which `solve` tries values."""
+    bounds: dict[str, tuple[float, float]] = {}
+    scalars = dict(config.scalars)
+    names = [name for name, (least, _) in config.fits.items() if math.isnan(least)]
+    # that of the stiffness gives the sizes of others
+    for name in sorted(names, key=lambda name: (not name.endswith("K"), names.index(name))):
+        parsed = InputName.parse(name)
+        model = next((model for model in config.models if model.key == parsed.model), config.models[0])
+        others = {other: value for other, value in scalars.items() if name != "K" or other != "K"}
+        one = replace(config, models=(model,), scalars=others, axes=())
+        friction = next((law for law in config.frictions if parsed.friction in ("", law.key)), None)
+        unknown = unknown_of(model, name if parsed.friction else parsed.key, friction)
+        size = SolveProblem(one, plugins, unknown, "e_out").natural_size()
+        quantity = _quantity(config, name)
+        bounds[name] = (max(size / NATURAL_RATIO, quantity.least), min(size * NATURAL_RATIO, quantity.most))
+        scalars[name] = middle_of(*bounds[name])
+    return bounds
 
 
 def prediction(

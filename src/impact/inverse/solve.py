@@ -10,7 +10,7 @@ a range of conditions the largest distance from the target is minimized instead,
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Literal, NoReturn, TypeAlias
@@ -40,7 +40,7 @@ from ..engine.plan import Plan
 from ..engine.plugins import Plugins, read_plugins
 from ..errors import UsageError, did_you_mean
 from ..formatting import number, quantity
-from ..results.single_impact import open_source, single_point
+from ..results.single_impact import PointSource, open_source, single_point
 from ..results.sweep import sweep_in_memory
 
 # values that are tried before roots are refined: powers of ten times the contact's own unit of the parameter
@@ -220,7 +220,7 @@ def unknown_of(model: ForceModel, name: str, friction: FrictionLaw | None = None
     return unknowns[name]
 
 
-def _config_name(model: ForceModel, unknown: Parameter) -> str:
+def config_name(model: ForceModel, unknown: Parameter) -> str:
     """Write the config name of the unknown."""
     name = unknown.name
     is_shared = name in ("e", "mu") or (name == "K" and model.exponent is None)
@@ -232,7 +232,52 @@ def placeholder(model: ForceModel, unknown: Parameter) -> dict[str, float]:
     if unknown.name == "K":
         return {}
     value = next((v for v in (unknown.default, unknown.typical) if v is not None), 1.0)
-    return {_config_name(model, unknown): min(max(value, unknown.least), unknown.most)}
+    return {config_name(model, unknown): min(max(value, unknown.least), unknown.most)}
+
+
+@dataclass(frozen=True)
+class PointWithE:
+    """A config without axes, the damping that gives an e to a law without one, and inputs that were replaced."""
+
+    config: Config
+    defaulted_axes: tuple[str, ...]
+    solved: Mapping[str, float] | None
+    replaced: Mapping[str, float] | None
+
+
+def point_with_e(
+    source: PointSource,
+    law: ForceModel,
+    at: Mapping[str, float | str],
+    replacing: Callable[[Config], Mapping[str, float] | None] = lambda config: None,
+) -> PointWithE:
+    """Reduce a source to one impact, and replace inputs; an e for a law without one is reached by its damping."""
+    is_solved = "e" in at and "e" not in law.quantities
+    if is_solved:
+        if not law.damping:
+            raise UsageError(f"--at e: {law.key} has no e, and no parameter that sets it")
+        if not {law.damping, f"{law.key}.{law.damping}"}.isdisjoint(at):
+            raise UsageError(f"--at: got e and {law.damping}, expected one of the two")
+        at = {**at, **placeholder(law, unknown_of(law, law.damping))}
+    config, defaulted_axes = single_point(source, law.key, at)
+    replaced = replacing(config)
+    config = replace(config, scalars={**config.scalars, **(replaced or {})})
+    if not is_solved:
+        return PointWithE(config, defaulted_axes, None, replaced)
+    config = solve_damping(config, source.plugins, float(config.scalars["e"]))
+    solved = {law.damping: float(config.scalars[f"{law.key}.{law.damping}"])}
+    return PointWithE(config, defaulted_axes, solved, replaced)
+
+
+def solve_damping(config: Config, plugins: Plugins, e: float) -> Config:
+    """Set the damping parameter of a law without an e to the value that gives an e."""
+    law = config.models[0]
+    unknown = unknown_of(law, law.damping)
+    result = solve_input(config, plugins, unknown, {"e_out": e})
+    if not result.roots:
+        lower, upper = map(number, result.attainable)
+        raise UsageError(f"--at e={number(e)}: {law.key} delivers {lower} to {upper} at any {law.damping}")
+    return replace(config, scalars={**config.scalars, config_name(law, unknown): result.roots[0].value})
 
 
 def solve_input(config: Config, plugins: Plugins, unknown: Parameter, target: Mapping[str, float]) -> SolveResult:
@@ -248,12 +293,12 @@ def solve_input(config: Config, plugins: Plugins, unknown: Parameter, target: Ma
     Plan(config, plugins).pair_notes("frictions")
     if not (isinstance(value, int | float) and math.isfinite(value)):
         raise UsageError(f"--target {name}: got {value}, expected a finite number")
-    problem = _SolveProblem(config, plugins, unknown, name)
+    problem = SolveProblem(config, plugins, unknown, name)
     return _best_over_axis(problem, float(value)) if config.axes else _all_roots(problem, float(value))
 
 
 @dataclass(frozen=True)
-class _SolveProblem:
+class SolveProblem:
     """The target variable as a function of the unknown and of the condition, a position on the axis."""
 
     config: Config
@@ -267,7 +312,7 @@ class _SolveProblem:
 
     @property
     def name(self) -> str:
-        return _config_name(self.model, self.unknown)
+        return config_name(self.model, self.unknown)
 
     @property
     def friction(self) -> str:
@@ -319,7 +364,7 @@ class _SolveProblem:
         """List the allowed values that are tried first, in ascending order."""
         lower, upper = self.unknown.least, self.unknown.most
         decades = np.arange(-SCAN_DECADES * SCAN_PER_DECADE, SCAN_DECADES * SCAN_PER_DECADE + 1) / SCAN_PER_DECADE
-        sizes = self._scale() * 10.0**decades
+        sizes = self.natural_size() * 10.0**decades
         values = [sizes, np.array([bound for bound in (0.0, lower, upper) if math.isfinite(bound)])]
         if lower < 0.0:
             values.append(-sizes)
@@ -336,7 +381,7 @@ class _SolveProblem:
         exponent = {} if self.model.exponent is None else {"n": self.model.exponent}
         return with_numbers(self.unknown.unit, {**numbers, **exponent})
 
-    def _scale(self) -> float:
+    def natural_size(self) -> float:
         """Find the size of the unknown that is 1 in the contact's own units, or that of its typical value."""
         if self.unknown.typical:
             return abs(self.unknown.typical)
@@ -356,7 +401,7 @@ class _SolveProblem:
         return unit if 0.0 < unit < math.inf else 1.0
 
 
-def _all_roots(problem: _SolveProblem, target: float) -> SolveResult:
+def _all_roots(problem: SolveProblem, target: float) -> SolveResult:
     """Find all values that give the target."""
     scan = problem.scan_values()
     values = problem.evaluate(scan, is_scan=True)[problem.variable].values
@@ -402,7 +447,7 @@ def _all_roots(problem: _SolveProblem, target: float) -> SolveResult:
     return _result(problem, target, status, map(Root, roots, e_out), values)
 
 
-def _with_extrema(problem: _SolveProblem, scan: Array, values: Array, reached: Mask) -> tuple[Array, Array]:
+def _with_extrema(problem: SolveProblem, scan: Array, values: Array, reached: Mask) -> tuple[Array, Array]:
     """Add each refined interior extremum to a scan, except those that reach the target."""
     size = np.ones_like(values) if problem.is_of_order_one else np.abs(values)
     minima, maxima = _minima(values, size), _minima(-values, size)
@@ -446,7 +491,7 @@ def _runs(reached: Mask, scan: Array, bounds: set[float]) -> tuple[list[float], 
     return roots, ends
 
 
-def _best_over_axis(problem: _SolveProblem, target: float) -> SolveResult:
+def _best_over_axis(problem: SolveProblem, target: float) -> SolveResult:
     """Find the value for which the largest distance from the target over the axis of the config is least."""
     (axis,) = problem.config.axes
     conditions = np.arange(axis.size)
@@ -490,7 +535,7 @@ def _best_over_axis(problem: _SolveProblem, target: float) -> SolveResult:
 
 
 def _result(
-    problem: _SolveProblem,
+    problem: SolveProblem,
     target: float,
     status: SolveStatus,
     roots: Iterable[Root],

@@ -3,14 +3,17 @@
 A collision is integrated at every phase, the part of a step in which the contact begins, by the scheme of a code
 (`impact.contact.fixed_step`), in one batch over all steps and phases. The e to ask for is a root of the mean over
 the phases: a scan over e brackets it, and the method of Chandrupatla (1997), Advances in Engineering Software 28,
-145-149, refines it. The number of steps needed is found by bisection.
+145-149, refines it. The number of steps needed is found by bisection. A parameter with which a contact lasts that
+many steps of a given size is found by the secant method in the logarithms of the parameter and the contact time:
+one is a power of the other for laws with a single time scale.
 """
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +22,9 @@ from numpy.typing import NDArray
 from scipy.optimize import elementwise
 
 from ..array_types import Array
+from ..config.input_names import InputName
 from ..config.load import Config
+from ..config.tables import read_sweep_value
 from ..contact.dimensionless import dimensionless_values
 from ..contact.fixed_step import (
     KICK_DRIFT,
@@ -30,17 +35,21 @@ from ..contact.fixed_step import (
     collide_at_fixed_step,
     default_scheme,
 )
+from ..contact.formula_calls import argument_names
 from ..contact.impacts import Impacts
-from ..contact.model import ForceModel
+from ..contact.model import ForceModel, Parameter
+from ..contact.models import find
 from ..contact.output_formulas import collide
 from ..contact.status import FIRST_FAILURE, Status
+from ..contact.units import with_numbers
 from ..display import Block, Displayed, Table
 from ..engine.build_impacts import build_impacts
 from ..engine.plan import Plan
-from ..engine.plugins import read_plugins
+from ..engine.plugins import Plugins, read_plugins
 from ..errors import UsageError
 from ..formatting import decimals, number, quantity
-from ..results.single_impact import open_source, single_point
+from ..results.single_impact import open_source
+from .solve import PointWithE, config_name, point_with_e, solve_damping, unknown_of
 
 # steps per contact if none are given
 STEPS_PER_CONTACT = (10.0, 20.0, 50.0, 100.0)
@@ -48,6 +57,17 @@ STEPS_PER_CONTACT = (10.0, 20.0, 50.0, 100.0)
 MIN_E, N_SCAN = 1e-6, 33
 # largest jump of the mean over the phases that is taken for a root
 MAX_JUMP = 1e-2
+# the effect of a parameter on the contact time is taken from a value larger by this factor; a smaller power of it
+# than this is none
+NEARBY, MIN_SLOPE = 1.1, 1e-2
+# the secant method for a parameter ends at this relative distance from the contact time, or after so many values
+SECANT_TOLERANCE, MAX_SECANTS = 1e-6, 20
+# a contact of more steps than this is none that a parameter is looked for
+MAX_SECANT_STEPS = 4096
+# e is kept within this distance
+HELD_E = 1e-8
+# largest logarithm of the factor by which a parameter changes
+MAX_LOGARITHM = 50.0
 
 
 @dataclass(frozen=True)
@@ -91,17 +111,58 @@ class NeededSteps:
 
 
 @dataclass(frozen=True)
+class NeededParameter:
+    """The value of a parameter from which on every phase is within `tol` at a step, and the contact there.
+
+    Parameters
+    ----------
+    parameter, unit : its name, and its SI unit
+    is_least : whether larger values are within the tolerance too, and not smaller ones
+    damping : the damping parameter there with its value, where it was solved for; else ""
+    dt, contact_time : [s]
+    peak_indentation : [m]
+    """
+
+    parameter: str
+    unit: str
+    value: float
+    is_least: bool
+    damping: str
+    dt: float
+    contact_time: float
+    peak_indentation: float
+    tol: float
+
+    def as_dict(self) -> dict[str, Any]:
+        """Convert to plain data."""
+        names = ("parameter", "value", "contact_time", "peak_indentation", "tol")
+        return {name: getattr(self, name) for name in names}
+
+    def __str__(self) -> str:
+        side = "from" if self.is_least else "up to"
+        damping = f" with {self.damping}" if self.damping else ""
+        contact_time, indentation = quantity(self.contact_time, "s", 4), quantity(self.peak_indentation, "m", 4)
+        return (
+            f"at dt = {quantity(self.dt, 's')} every phase is within {number(100.0 * self.tol)} % {side} "
+            f"{self.parameter} = {quantity(self.value, self.unit, 4)}{damping}: contact of {contact_time}, "
+            f"indentation of {indentation}"
+        )
+
+
+@dataclass(frozen=True)
 class TimestepResult(Displayed):
     """What a law delivers at fixed time steps.
 
     Parameters
     ----------
     scheme : name of the scheme, see `impact.contact.fixed_step.SCHEMES`
-    e : the requested e; NaN for a law without one
+    e : the requested e; NaN for a law without one, unless its damping was solved for
+    solved : the value of the damping parameter that gives the e of a law without one; None if none was asked for
     e_continuous, contact_time : of the continuous law [s]
     rows : one for each step
     needed : for `tol`; None without one, or if no number of steps up to `MAX_STEPS_PER_CONTACT` is enough
     phases : number of phases of each row
+    parameter, needed_parameter : what `tol` needs at a step, None if no value of the parameter is enough
     """
 
     model: str
@@ -113,10 +174,15 @@ class TimestepResult(Displayed):
     needed: NeededSteps | None
     phases: int
     tol: float | None
+    solved: Mapping[str, float] | None = None
+    parameter: str = ""
+    needed_parameter: NeededParameter | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """Convert to plain data; numbers that do not apply are NaN."""
-        return {name: value for name, value in asdict(self).items() if name not in ("phases", "tol")}
+        options = ("phases", "tol", "parameter", "needed_parameter")
+        data = {name: value for name, value in asdict(self).items() if name not in options}
+        return {**data, "for": self.needed_parameter and self.needed_parameter.as_dict()}
 
     def records(self) -> Sequence[Mapping[str, Any]]:
         """List the rows, one for each step."""
@@ -125,6 +191,7 @@ class TimestepResult(Displayed):
     def sections(self, width: int) -> Iterator[Block]:
         """Write the continuous law, a row for each step, the steps that fail, and the number of steps needed."""
         e = f"e = {number(self.e)}, " if self.e == self.e else ""
+        e = "".join(f"{name} = {value!r}, " for name, value in self.solved.items()) if self.solved else e
         contact_time = quantity(self.contact_time, "s")
         yield f"{self.model}: {e}e_out = {number(self.e_continuous)} in a contact time of {contact_time}"
         yield f"scheme: {self.scheme}"
@@ -148,6 +215,9 @@ class TimestepResult(Displayed):
         else:
             steps, dt = self.needed.steps_per_contact, quantity(self.needed.dt, "s")
             yield f"within {percent} at every phase: {steps} steps per contact, dt <= {dt}"
+        if self.parameter:
+            missing = f"no value of {self.parameter} keeps every phase within {percent} at the step"
+            yield str(self.needed_parameter or missing)
 
 
 def timestep(
@@ -156,9 +226,10 @@ def timestep(
     source: str | Path | Mapping[str, object] | None = None,
     at: Mapping[str, float | str] | None = None,
     steps_per_contact: Sequence[float] = (),
-    dt: Sequence[float] = (),
+    dt: Sequence[float | str] = (),
     phases: int = 400,
     tol: float | None = None,
+    parameter: str | None = None,
     scheme: str | None = None,
     overrides: Sequence[str] = (),
     plugins: Sequence[ForceModel | str | Path] = (),
@@ -172,11 +243,14 @@ def timestep(
     Parameters
     ----------
     model : key of the law
-    source, at, overrides, plugins : see `solve`
+    source, overrides, plugins : see `solve`
+    at : values of inputs by config name; an e for a law that takes none is reached by its damping parameter
     steps_per_contact : contact times of the continuous law over dt; by default 10, 20, 50 and 100
-    dt : further time steps [s]
+    dt : further time steps [s], or texts such as "2 us"
     phases : number of phases, (i + 1/2)/phases
     tol : relative tolerance for which the smallest number of steps per contact is found
+    parameter : a parameter of the law, "K" or "materials.NAME.E", whose value from which on `tol` holds at the
+        only `dt` is found, for a step that cannot be changed
     scheme : its name; by default "drake-tamsi" for the laws of Drake, "kick-drift" for all others
 
     Returns
@@ -199,21 +273,29 @@ def timestep(
     """
     if phases < 1:
         raise UsageError(f"--phases: got {phases}, expected a whole number >= 1")
-    config, _ = single_point(open_source(source, overrides, read_plugins(plugins)), model, at)
-    law, collision = fixed_step_law(config, phases, scheme)
-    if not steps_per_contact and not dt:
-        steps_per_contact = STEPS_PER_CONTACT
-    steps = time_steps(law.contact_time, steps_per_contact, dt)
+    if parameter is not None and (tol is None or len(dt) != 1):
+        raise UsageError("--for: expected one --dt and --tol as well")
+    plugin_set = read_plugins(plugins)
+    point_source = open_source(source, overrides, plugin_set)
+    point = point_with_e(point_source, find(model, plugin_set.models), at or {})
+    law, collision = fixed_step_law(point.config, phases, scheme)
+    given = [read_step(step) for step in dt]
+    steps = time_steps(law.contact_time, steps_per_contact or (() if given else STEPS_PER_CONTACT), given)
     return TimestepResult(
         model=law.model.key,
         scheme=law.scheme,
-        e=law.e,
+        e=law.e if point.solved is None else float(point.config.scalars["e"]),
         e_continuous=collision["e_out"],
         contact_time=law.contact_time,
         rows=timestep_rows(law, steps),
         needed=None if tol is None else needed_steps(law, tol, collision["e_out"]),
         phases=phases,
         tol=tol,
+        solved=point.solved,
+        parameter=parameter or "",
+        needed_parameter=None
+        if parameter is None or tol is None
+        else needed_parameter(point, plugin_set, parameter, given[0], tol, law, collision),
     )
 
 
@@ -307,11 +389,16 @@ def compensated_e(law: FixedStepLaw, dt: Array) -> Array:
     return np.where(is_root, solution.x, np.nan)
 
 
-def needed_steps(law: FixedStepLaw, tol: float, e_continuous: float) -> NeededSteps | None:
+def needed_steps(
+    law: FixedStepLaw, tol: float, e_continuous: float, most: int = MAX_STEPS_PER_CONTACT
+) -> NeededSteps | None:
     """Bisect for the smallest number of steps per contact with which every phase is within a tolerance."""
     target = law.e if law.has_e else e_continuous
     if not target > 0.0:
         raise UsageError("--tol is relative to e, expected e > 0")
+    if abs(e_continuous - target) >= tol * target:
+        # no step does what the continuous law does not
+        return None
 
     def is_within(steps: int) -> bool:
         e = law.restitution(np.array([law.contact_time / steps]))
@@ -320,12 +407,112 @@ def needed_steps(law: FixedStepLaw, tol: float, e_continuous: float) -> NeededSt
     lower, upper = 1, 2
     while not is_within(upper):
         lower, upper = upper, 2 * upper
-        if upper > MAX_STEPS_PER_CONTACT:
+        if upper > most:
             return None
     while upper - lower > 1:
         middle = (lower + upper) // 2
         lower, upper = (lower, middle) if is_within(middle) else (middle, upper)
     return NeededSteps(tol, upper, law.contact_time / upper)
+
+
+def needed_parameter(
+    point: PointWithE,
+    plugins: Plugins,
+    name: str,
+    dt: float,
+    tol: float,
+    law: FixedStepLaw,
+    collision: Mapping[str, float],
+) -> NeededParameter | None:
+    """Find the value of a parameter from which on every phase is within a tolerance at a step dt [s].
+
+    The law and the collision are those of the point. Where its damping was solved for, e is kept by the damping in
+    the contact's own units, which is enough where the law has a single time scale, else by solving again.
+    """
+    config, model = point.config, law.model
+    e = None if point.solved is None else float(config.scalars["e"])
+    unknown, path, value = _seek(config, law, name)
+    base, damping_path = law, f"{model.key}.{model.damping}"
+
+    def damping_of(impact: Impacts) -> float:
+        return float(impact.dimensionless(model, model.damping)[0])
+
+    def collide_at(value: float) -> tuple[Config, FixedStepLaw, dict[str, float]]:
+        changed = replace(config, scalars={**config.scalars, path: value})
+        if e is None:
+            return changed, *fixed_step_law(changed, base.phases, base.scheme)
+        damping = damping_of(build_impacts(Plan(changed).inputs, model, ()))
+        scaled = float(changed.scalars[damping_path]) * (damping_of(base.impact) / damping if damping else 1.0)
+        changed = replace(changed, scalars={**changed.scalars, damping_path: scaled})
+        law, collision = fixed_step_law(changed, base.phases, base.scheme)
+        if abs(collision["e_out"] - e) < HELD_E:
+            return changed, law, collision
+        changed = solve_damping(changed, plugins, e)
+        return changed, *fixed_step_law(changed, base.phases, base.scheme)
+
+    nearby = collide_at(NEARBY * value)[1]
+    slope = math.log(nearby.contact_time / law.contact_time) / math.log(NEARBY)
+    if abs(slope) < MIN_SLOPE:
+        raise UsageError(f"--for: {name} does not set the contact time of {model.key}")
+    changed = config
+    for _ in range(MAX_SECANTS):
+        needed = needed_steps(law, tol, collision["e_out"], MAX_SECANT_STEPS)
+        if needed is None:
+            return None
+        distance = math.log(law.contact_time / (needed.steps_per_contact * dt))
+        if abs(distance) < SECANT_TOLERANCE:
+            return NeededParameter(
+                parameter=name,
+                value=value,
+                unit=with_numbers(unknown.unit, {"n": float(law.impact.n[0])}),
+                is_least=slope > 0.0,
+                damping="" if e is None else _named(model, float(changed.scalars[damping_path])),
+                dt=dt,
+                contact_time=law.contact_time,
+                peak_indentation=collision["peak_indentation"],
+                tol=tol,
+            )
+        logarithm = -distance / slope
+        if not abs(logarithm) < MAX_LOGARITHM or not unknown.least <= value * math.exp(logarithm) <= unknown.most:
+            return None
+        before, value = law.contact_time, value * math.exp(logarithm)
+        try:
+            changed, law, collision = collide_at(value)
+        except UsageError:
+            # no rebound there
+            return None
+        slope = math.log(law.contact_time / before) / logarithm or slope
+    return None
+
+
+def _named(model: ForceModel, damping: float) -> str:
+    """Write the damping parameter of a law with a value."""
+    unit = with_numbers(model.unit_of(model.damping), {"n": model.exponent or math.nan})
+    return f"{model.damping} = {quantity(damping, unit, 4)}"
+
+
+def _seek(config: Config, law: FixedStepLaw, name: str) -> tuple[Parameter, str, float]:
+    """Describe a parameter that may set the time scale: its bounds, its config name and its value."""
+    parsed = InputName.parse(name)
+    if parsed.material in config.materials and parsed.key == "E":
+        modulus = config.materials[parsed.material].E
+        return Parameter(name, "Pa", "Young's modulus"), name, float(config.scalars.get(name, modulus))
+    unknown = unknown_of(law.model, name)
+    path = config_name(law.model, unknown)
+    return unknown, path, float(law.impact.K[0] if name == "K" else config.scalars[path])
+
+
+def time_parameter(config: Config, model: ForceModel) -> str:
+    """Name the parameter that sets the time scale of a law, as `timestep` takes it; "" where two materials do."""
+    if not {"K", f"{model.key}.K"}.isdisjoint(config.scalars):
+        return "K"
+    arguments = argument_names(model.stiffness)
+    names = [parameter.name for parameter in model.parameters if parameter.name in arguments]
+    materials = {str(config.scalars.get(f"material{ball}", config.scalars.get("material"))) for ball in "12"}
+    if model.stiffness is None or "E_eff" in arguments:
+        return f"materials.{materials.pop()}.E" if len(materials) == 1 else ""
+    names = [name for name in names if name != model.damping]
+    return names[0] if len(names) == 1 else "K"
 
 
 def fixed_step_law(
@@ -345,12 +532,22 @@ def fixed_step_law(
     return FixedStepLaw(model, impact, collision["contact_time"], phases, scheme), collision
 
 
+def read_step(dt: float | str) -> float:
+    """Read a time step [s], a number or a text with a unit.
+
+    >>> read_step("2 us"), read_step("1e-3")
+    (2e-06, 0.001)
+    """
+    with contextlib.suppress(ValueError):
+        dt = float(dt)
+    return read_sweep_value("dt", dt, "--dt")
+
+
 def time_steps(contact_time: float, steps_per_contact: Sequence[float], dt: Sequence[float]) -> list[float]:
     """List time steps [s], from numbers of steps per contact and from themselves."""
-    for name, values in (("--steps-per-contact", steps_per_contact), ("--dt", dt)):
-        for value in values:
-            if not (math.isfinite(value) and value > 0.0):
-                raise UsageError(f"{name}: got {number(value)}, expected a finite number > 0")
+    for value in steps_per_contact:
+        if not (math.isfinite(value) and value > 0.0):
+            raise UsageError(f"--steps-per-contact: got {number(value)}, expected a finite number > 0")
     steps = [*(contact_time / steps for steps in steps_per_contact), *dt]
     largest = contact_time / min(steps)
     if largest > MAX_STEPS_PER_CONTACT:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..array_types import Array, Mask
-from .problem import Problem, Termination
+from .problem import Params, Problem, Termination
 from .state import State, TrialStep
 
 # an offset up to NEAR_EVENT of a step is bridged by a step of order two, forwards or backwards; the event is
@@ -112,11 +112,15 @@ def _step_to_event(
     problem: Problem, state: State, trial: TrialStep, positions: NDArray[np.intp], offset: Array
 ) -> tuple[Array, Array]:
     """Compute the rows at the event, by steps of order two and one, and the offset of the linear step."""
-    components, integrated = problem.n_components, problem.n_integrated
     params = tuple(column[positions] for column in state.params)
-    y, k = trial.y[:, positions], trial.k[:, positions]
+    y, k = step_of_order_two(problem, trial.y[:, positions], trial.k[:, positions], offset, params)
+    remaining = linear_offset(*problem.event(y[: problem.n_components], k, params))
+    return y + remaining * k[: problem.n_integrated], remaining
+
+
+def step_of_order_two(problem: Problem, y: Array, k: Array, offset: Array, params: Params) -> tuple[Array, Array]:
+    """Take a short step, forwards or backwards, from rows y with rates k: rows and rates at its end."""
+    components = problem.n_components
     k_end = problem.rates(y[:components] + offset * k[:components], params)
-    y = y + trapezoid(offset, k, k_end)[:integrated]
-    k = problem.rates(y[:components], params)
-    remaining = linear_offset(*problem.event(y[:components], k, params))
-    return y + remaining * k[:integrated], remaining
+    y = y + trapezoid(offset, k, k_end)[: problem.n_integrated]
+    return y, problem.rates(y[:components], params)

@@ -122,10 +122,12 @@ def _advance(problem: Problem, state: State, rtol: float, record: bool) -> Step 
     ended, offset = locate_event(problem, state, trial, accepted)
     accepted &= trial.is_accurate
     if problem.switch is not None:
-        locate_switches(problem, problem.switch, state, trial, accepted)
+        beyond = locate_switches(problem, problem.switch, state, trial, accepted)
         accepted &= trial.is_accurate
         remain = accepted[ended]
         ended, offset = ended[remain], offset[remain]
+        if step is not None and beyond.size:
+            step = replace(step, end=1.0 + beyond)
 
     if problem.watch:
         update_peaks(problem, state, trial, accepted, ended)

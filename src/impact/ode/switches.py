@@ -11,71 +11,96 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..array_types import Array, Mask
-from .events import event_offset, is_event_ahead
+from .events import event_offset, is_event_ahead, step_of_order_two
 from .problem import Problem, Switch, Termination
 from .state import RUNNING, State, TrialStep
 
-# a mode changes at the end of a step within this part of the last two steps, or within this time, of the zero
-SWITCH_RTOL, SWITCH_ATOL = 1e-8, 3e-10
+# a mode changes at the end of a step within this part of the last two steps, or within this time, of the zero; or
+# within the larger part, if the rate of the margin is known: a step of order two bridges it
+SWITCH_RTOL, SWITCH_ATOL, NEAR_SWITCH = 1e-8, 3e-10, 1e-4
 # a step ends at the least value of a margin in its inside if that is less than this part of those at its ends, and
 # not as near to the start as the second number, in steps
 LOW_MARGIN, NEAR_START = 0.05, 0.01
 # the rates of a margin are computed at both ends of a step over which it changes by more than this part
 LARGE_CHANGE = 0.5
+# parts of the margin before beyond which a margin of unknown rate is looked at: it vanishes within the next step,
+# of three steps at most, by its secant only below the first; it changes much also above the second
+FAR_BELOW, FAR_ABOVE = 0.75, 2.0
 
 
-def locate_switches(problem: Problem, switch: Switch, state: State, trial: TrialStep, accepted: Mask) -> None:
+def locate_switches(problem: Problem, switch: Switch, state: State, trial: TrialStep, accepted: Mask) -> Array:
     """Change the modes of trajectories whose step ends where a margin vanishes; shorten steps to such an end.
 
     A step across the zero of a margin, or across a low minimum, is rejected and tried again with the length to it.
+    Returns the offsets of the changes from the ends of the steps, as fractions of them.
     """
     assert state.margins is not None
-    assert state.h_free is not None
     # the end of a trajectory is not the end of the step
     ended = (state.termination == Termination.EVENT_REACHED).nonzero()[0]
     if ended.size:
         params = tuple(column[ended] for column in state.params)
         trial.k[:, ended] = problem.rates(trial.y[: problem.n_components, ended], params)
-    before, rates_before = state.margins
     margins, rates = switch.margins(trial.y, trial.k, state.params)
-    secant, unknown = (margins - before) / state.h, np.isnan(rates)
+    before, rates_before = state.margins
+    # most margins are far from zero, and by a glance: one of an unknown rate may vanish soon, or change much, only
+    # where it is not of the order of that before
+    may_vanish = np.fmin(trial.h_next * rates + margins, margins) < 0.0
+    may_vanish |= (rates_before < 0.0) & (rates > 0.0)
+    may_vanish |= np.isnan(rates) & ((margins < FAR_BELOW * before) | (margins > FAR_ABOVE * before))
+    positions = (may_vanish.any(axis=0) & accepted).nonzero()[0]
+    reached = which = positions[:0]
+    offset = np.zeros(0)
+    if positions.size:
+        reached, which, offset = _locate(
+            switch, state, trial, positions, margins[:, positions], rates[:, positions]
+        )
+    stay = (~trial.is_accurate).nonzero()[0]
+    margins[:, stay], rates[:, stay] = before[:, stay], rates_before[:, stay]
+    state.margins = margins, rates
+    if reached.size:
+        _change_modes(problem, switch, state, trial, reached, which, offset)
+    return offset / state.h[reached]
+
+
+def _locate(
+    switch: Switch, state: State, trial: TrialStep, positions: NDArray[np.intp], margins: Array, rates: Array
+) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
+    """Shorten steps to zeros of margins; returns where a zero is reached, of which margin, and its offset."""
+    assert state.margins is not None
+    assert state.h_free is not None
+    before, rates_before = (values[:, positions] for values in state.margins)
+    h, h_next = state.h[positions], trial.h_next[positions]
+    secant, unknown = (margins - before) / h, np.isnan(rates)
     slopes = np.where(unknown, secant, rates)
     slopes_before = np.where(np.isnan(rates_before), secant, rates_before)
     changes = np.abs(margins - before) > LARGE_CHANGE * np.maximum(np.abs(margins), np.abs(before))
-    steep = ((unknown & changes).any(axis=0) & accepted).nonzero()[0]
+    steep = np.flatnonzero((unknown & changes).any(axis=0))
     if steep.size:
-        params = tuple(column[steep] for column in state.params)
-        for rows, (y, k) in ((slopes, (trial.y, trial.k)), (slopes_before, (state.y, state.k))):
-            exact = switch.rates_of_margins(y[:, steep], k[:, steep], params)
-            rows[:, steep] = np.where(unknown[:, steep] & np.isfinite(exact), exact, rows[:, steep])
+        at = positions[steep]
+        params = tuple(column[at] for column in state.params)
+        for values, (y, k) in ((slopes, (trial.y, trial.k)), (slopes_before, (state.y, state.k))):
+            exact = switch.rates_of_margins(y[:, at], k[:, at], params)
+            values[:, steep] = np.where(unknown[:, steep] & np.isfinite(exact), exact, values[:, steep])
             unknown[:, steep] &= ~np.isfinite(exact)
     # a trajectory that has ended has no next step, and its end may lie beyond where its rates are smooth
-    goes_on = state.termination == RUNNING
-    h_ahead = np.where(goes_on, trial.h_next, 0.0)
+    goes_on = state.termination[positions] == RUNNING
+    h_ahead = np.where(goes_on, h_next, 0.0)
     slopes = np.where(goes_on, slopes, np.fmin(slopes, 0.0))
     turns = (slopes_before < 0.0) & (slopes > 0.0)
-    falls = is_event_ahead(margins, slopes, h_ahead) | turns
-    positions = (falls.any(axis=0) & accepted).nonzero()[0]
-    if positions.size:
-        g, dg, g_before, dg_before = (values[:, positions] for values in (margins, slopes, before, slopes_before))
-        # the secant of a step that was shortened before has half the height at its start, so that steps across a
-        # zero do not approach it from beyond for ever (the Illinois rule)
-        height = np.where(state.h_free[positions] > 0.0, 0.5, 1.0) * g_before
-        which, offset = _first_zero(
-            g, dg, g_before, dg_before, state.h[positions], np.where(unknown[:, positions], height, np.nan)
-        )
-        near = SWITCH_RTOL * (state.h[positions] + state.h_last[positions]) + SWITCH_ATOL
-        reached = (np.abs(offset) <= near) & (state.termination[positions] == RUNNING)
-        crossed = (offset < -near) & ~reached
-        _shorten(
-            state, trial, positions, offset, crossed, crossed | ((offset > near) & (offset < h_ahead[positions]))
-        )
-    state.margins = (
-        np.where(trial.is_accurate, margins, before),
-        np.where(trial.is_accurate, rates, rates_before),
-    )
-    if positions.size and reached.any():
-        _change_modes(problem, switch, state, trial, positions[reached], which[reached])
+    falls = (is_event_ahead(margins, slopes, h_ahead) | turns).any(axis=0)
+    # the secant of a step that was shortened before has half the height at its start, so that steps across a
+    # zero do not approach it from beyond for ever (the Illinois rule)
+    height = np.where(state.h_free[positions] > 0.0, 0.5, 1.0) * before
+    height = np.where(unknown, height, np.nan)
+    which, offset = _first_zero(margins, slopes, before, slopes_before, h, height)
+    picked = which, np.arange(which.size)
+    rtol = np.where(unknown[picked] | turns[picked], SWITCH_RTOL, NEAR_SWITCH)
+    near = rtol * (h + state.h_last[positions]) + SWITCH_ATOL
+    reached = falls & (np.abs(offset) <= near) & goes_on
+    crossed = falls & (offset < -near) & ~reached
+    is_ahead = falls & (offset > near) & (offset < h_ahead)
+    _shorten(state, trial, positions, offset, crossed, crossed | is_ahead)
+    return positions[reached], which[reached], offset[reached]
 
 
 def _first_zero(
@@ -131,12 +156,14 @@ def _change_modes(
     trial: TrialStep,
     positions: NDArray[np.intp],
     which: NDArray[np.intp],
+    offset: Array,
 ) -> None:
-    """Change the modes of trajectories at the ends of their steps; they go on with the step of before."""
+    """Change the modes of trajectories next to the ends of their steps; they go on with the step of before."""
     assert state.h_free is not None
     assert state.margins is not None
     params = tuple(column[positions] for column in state.params)
-    y, params = switch.change(which, trial.y[:, positions], trial.k[:, positions], params)
+    y, k = step_of_order_two(problem, trial.y[:, positions], trial.k[:, positions], offset, params)
+    y, params = switch.change(which, y, k, params)
     for column, values in zip(state.params, params, strict=True):
         column[positions] = values
     k = problem.rates(y[: problem.n_components], params)

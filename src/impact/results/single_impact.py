@@ -563,25 +563,27 @@ def single_point(
     ----------
     source : the config
     model : key of the model; by default the config's first
-    at : values by config name, which need not be on the grid. Inputs that vary together, in a zip group or in a
-        table of cases, are an exception: their values, or the number of a case, select one of its points
+    at : values by config name, in which a parameter of the law needs no key of it; they need not be on the grid.
+        Inputs that vary together, in a zip group or in a table of cases, are an exception: their values, or the
+        number of a case, select one of its points
     over : values of an input, as in a config, that stay an axis
     friction : key of the friction law; by default the config's first, if it has any
     """
-    draft, fixed = (
-        source.draft(model, friction),
-        {str(InputName.parse(name)): value for name, value in (at or {}).items()},
-    )
+    draft = source.draft(model, friction)
+    law = None if model is None else find(model, source.plugins.models)
+    friction_law = None if friction is None else find_friction(friction)
+    laws = (law or next(iter(draft.models), None), friction_law or next(iter(draft.frictions), None))
+    fixed = {str(_input_name(name, *laws)): value for name, value in (at or {}).items()}
     for name, value in fixed.items():
         if isinstance(value, Mapping) or np.ndim(value):
             raise UsageError(f"--at {name}={value}: got several values, expected one")
     if {"e", "alpha"} <= fixed.keys():
         raise UsageError("--at alpha: got alpha and e, expected one of the two")
-    law = None if model is None else find(model, source.plugins.models)
     settings = [] if law is None else [Setting(("models",), [law.key], f"--model {law.key}")]
-    if friction is not None:
-        settings.append(Setting(("frictions",), [find_friction(friction).key], f"--friction {friction}"))
-    settings += [Setting(InputName.parse(k).path, values, f"--over {k}") for k, values in (over or {}).items()]
+    if friction_law is not None:
+        settings.append(Setting(("frictions",), [friction_law.key], f"--friction {friction}"))
+    over = {str(_input_name(name, *laws)): values for name, values in (over or {}).items()}
+    settings += [Setting(InputName.parse(name).path, values, f"--over {name}") for name, values in over.items()]
     draft = draft.with_settings(settings)
     if isinstance(draft.table("sweep").get("cases"), str):
         # the inputs that vary together are the columns of the file
@@ -597,7 +599,18 @@ def single_point(
     for name in fixed:
         if is_case(name) and name not in {axis.numbered for axis in config.axes}:
             raise _unknown_input(draft, name)
-    return _without_axes(config, {**labels, **fixed}, over or {})
+    return _without_axes(config, {**labels, **fixed}, over)
+
+
+def _input_name(name: str, model: ForceModel | None, friction: FrictionLaw | None) -> InputName:
+    """Read a config name, in which a parameter of the chosen law needs no key of it."""
+    parsed = InputName.parse(name)
+    if parsed.owner or parsed.key in SWEEP_INPUTS:
+        return parsed
+    for table, law in (("model", model), ("friction", friction)):
+        if law is not None and parsed.key in law_quantities(law):
+            return InputName(table, law.key, parsed.key)
+    return parsed
 
 
 def _joint_inputs(draft: Draft) -> set[str]:

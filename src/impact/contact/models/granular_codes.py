@@ -225,7 +225,9 @@ YADE_BETAN_DIRECT = of_code(
         equation=f"{TANGENT_DASHPOT}, to F = 0",
         reference=f"{HERTZ_MINDLIN}, betan",
         evidence=Evidence("seen", MINDLIN_SOURCE),
-        parameters=(Parameter("betan", "1", "damping ratio β of the tangent stiffness", least=0.0),),
+        parameters=(
+            Parameter("betan", "1", "damping ratio β of the tangent stiffness", least=0.0, is_damping=True),
+        ),
         zeta=lambda betan: np.sqrt(1.2) * betan,
         release="force",
         exponent=1.5,

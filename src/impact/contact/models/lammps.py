@@ -35,8 +35,10 @@ DAMPING_SOURCE = "lammps/lammps, src/GRANULAR/gran_sub_mod_damping.cpp @07b704ca
 DAMPING_SOURCE_2024 = "LAMMPS release of 29 August 2024, src/GRANULAR/gran_sub_mod_damping.cpp"
 # limit_damping: pull request 2698, first in patch_8Apr2021
 LIMIT_YEAR = 2021
-MASS_VELOCITY = (Parameter("gamma", "1/s", "damping γ per effective mass", least=0.0),)
-VISCOELASTIC = (Parameter("eta", "1/m/s", "damping η per effective mass and contact radius", least=0.0),)
+MASS_VELOCITY = (Parameter("gamma", "1/s", "damping γ per effective mass", least=0.0, is_damping=True),)
+VISCOELASTIC = (
+    Parameter("eta", "1/m/s", "damping η per effective mass and contact radius", least=0.0, is_damping=True),
+)
 
 # (key, release="gap" or "force", fields of ForceModel) -> law that ends at zero indentation or at zero force
 MakeLaw = Callable[..., ForceModel]

@@ -65,7 +65,7 @@ ADAMS_IMPACT = ForceModel(
         "seen",
     ),
     parameters=(
-        Parameter("c", "N s/m", "largest damping", least=0.0),
+        Parameter("c", "N s/m", "largest damping", least=0.0, is_damping=True),
         Parameter("d", "m", "penetration at which the damping is full", least=1e-9),
     ),
     # below n = 2 the damping vanishes faster than the spring as δ goes to zero, which then pushes once more
@@ -89,7 +89,7 @@ RECURDYN = of_code(
         equation=f"{LINEAR_DAMPING},  χ = c v₀/K",
         reference="FunctionBay RecurDyn, standard contact, with the damping exponents m₂ = 1 and m₃ = m₁",
         evidence=RECURDYN_EVIDENCE,
-        parameters=(Parameter("c", "N s/m^(n+1)", "damping coefficient", least=0.0),),
+        parameters=(Parameter("c", "N s/m^(n+1)", "damping coefficient", least=0.0, is_damping=True),),
         chi=lambda c, v0, K: c * v0 / K,
     )
 )
@@ -103,7 +103,11 @@ RECURDYN_EXPONENTS = ForceModel(
     evidence=RECURDYN_EVIDENCE,
     parameters=(
         Parameter(
-            "c", "N s^damping_exponent/m^(damping_exponent+indentation_exponent)", "damping coefficient", least=0.0
+            "c",
+            "N s^damping_exponent/m^(damping_exponent+indentation_exponent)",
+            "damping coefficient",
+            least=0.0,
+            is_damping=True,
         ),
         Parameter("damping_exponent", "1", "damping exponent m₂, of δ̇", 1.0, 1.0, 4.0),
         Parameter("indentation_exponent", "1", "indentation exponent m₃, of δ", 1.0, 0.0, 10.0),
@@ -143,7 +147,13 @@ SIMBODY_HUNT_CROSSLEY = of_code(
         doi="10.1016/j.piutam.2011.04.023",
         evidence=SIMBODY_EVIDENCE,
         parameters=(
-            Parameter("c", "s/m", "dissipation of the pair, the slope of e over a small speed", least=0.0),
+            Parameter(
+                "c",
+                "s/m",
+                "dissipation of the pair, the slope of e over a small speed",
+                least=0.0,
+                is_damping=True,
+            ),
         ),
         exponent=1.5,
         chi=lambda c, v0: 1.5 * c * v0,
@@ -162,7 +172,7 @@ SIMBODY_HUNT_CROSSLEY_MIXED = of_code(
         doi="10.1016/j.piutam.2011.04.023",
         evidence=SIMBODY_EVIDENCE,
         parameters=(
-            Parameter("c1", "s/m", "dissipation of the material of ball 1", least=0.0),
+            Parameter("c1", "s/m", "dissipation of the material of ball 1", least=0.0, is_damping=True),
             Parameter("c2", "s/m", "dissipation of the material of ball 2", least=0.0),
         ),
         exponent=1.5,
@@ -194,7 +204,9 @@ DRAKE_POINT_CONTACT = of_code(
         reference=DRAKE_REFERENCE,
         evidence=DRAKE_EVIDENCE,
         parameters=(
-            Parameter("d", "s/m", "Hunt-Crossley dissipation of the pair", default=50.0, least=0.0),
+            Parameter(
+                "d", "s/m", "Hunt-Crossley dissipation of the pair", default=50.0, least=0.0, is_damping=True
+            ),
             *POINT_STIFFNESS,
         ),
         exponent=1.0,
@@ -212,7 +224,9 @@ DRAKE_POINT_CONTACT_MIXED = of_code(
         reference=DRAKE_REFERENCE,
         evidence=DRAKE_EVIDENCE,
         parameters=(
-            Parameter("d1", "s/m", "Hunt-Crossley dissipation d₁ of ball 1", default=50.0, least=0.0),
+            Parameter(
+                "d1", "s/m", "Hunt-Crossley dissipation d₁ of ball 1", default=50.0, least=0.0, is_damping=True
+            ),
             Parameter("d2", "s/m", "Hunt-Crossley dissipation d₂ of ball 2", default=50.0, least=0.0),
             *POINT_STIFFNESS,
         ),
@@ -234,7 +248,7 @@ MODELICA_ELASTOGAP = ForceModel(
         "(2026)",
         note="its first year was not seen",
     ),
-    parameters=(Parameter("d", "N s/m", "damping constant", least=0.0),),
+    parameters=(Parameter("d", "N s/m", "damping constant", least=0.0, is_damping=True),),
     force=lambda elastic, v, d: elastic + np.minimum(d * v, elastic),
     breakpoints=(lambda elastic, v, d: np.where(v > 0, elastic - d * v, np.nan),),
     release="force",
@@ -259,7 +273,7 @@ MAPLESIM_LIMITED = ForceModel(
     equation="F = max(0, K δ + min(d δ̇, K δ))",
     reference="MapleSim, contact of the linear spring with a limited damper, its default",
     evidence=Evidence("seen", MAPLESIM_HELP, note="its first year was not seen"),
-    parameters=(Parameter("d", "N s/m", "damping constant", least=0.0),),
+    parameters=(Parameter("d", "N s/m", "damping constant", least=0.0, is_damping=True),),
     force=lambda elastic, v, d: elastic + np.minimum(d * v, elastic),
     breakpoints=(lambda elastic, v, d: np.where(v > 0, elastic - d * v, np.nan),),
     oracle=lambda d, m, K: limited_restitution(d / (2 * np.sqrt(m * K))),
@@ -362,7 +376,7 @@ MUJOCO_SOLREF = ForceModel(
     evidence=MUJOCO_EVIDENCE,
     parameters=(
         Parameter("timeconst", "s", "time constant τ", default=0.02, least=1e-9),
-        Parameter("dampratio", "1", "damping ratio ζ", default=1.0, least=1e-3),
+        Parameter("dampratio", "1", "damping ratio ζ", default=1.0, least=1e-3, is_damping=True),
     ),
     # the spring does not depend on K: a K set by the user only changes the contact's own units
     stiffness=lambda m, timeconst, dampratio: m / (timeconst * timeconst * dampratio * dampratio),
@@ -385,7 +399,9 @@ MUJOCO_SOLREF_DIRECT = ForceModel(
     evidence=MUJOCO_EVIDENCE,
     parameters=(
         Parameter("k", "1/s^2", "stiffness per effective mass, the negative first number of solref", least=1e-9),
-        Parameter("b", "1/s", "damping per effective mass, the negative second number", least=0.0),
+        Parameter(
+            "b", "1/s", "damping per effective mass, the negative second number", least=0.0, is_damping=True
+        ),
     ),
     stiffness=lambda m, k: m * k,
     force=lambda x, v, m, k, b: m * (k * x + b * v),
@@ -407,7 +423,7 @@ SIMSCAPE_CONTACT = ForceModel(
         note="the cubic and the limit at zero are ours",
     ),
     parameters=(
-        Parameter("b", "N s/m", "damping", least=0.0),
+        Parameter("b", "N s/m", "damping", least=0.0, is_damping=True),
         Parameter("w", "m", "transition region width", least=1e-9),
     ),
     force=lambda elastic, x, v, b, w: smooth_step(x / w) * (elastic + b * v),
@@ -465,7 +481,11 @@ NEWTON_SEMI_IMPLICIT = of_code(
             "newton 1.8.0, newton/_src/solvers/semi_implicit/kernels_contact.py",
             note="its year is that of the licence; of warp.sim a copy of its kernel was seen",
         ),
-        parameters=(Parameter("kd", "N s/m", "damping on approach, the mean of kd of both shapes", least=0.0),),
+        parameters=(
+            Parameter(
+                "kd", "N s/m", "damping on approach, the mean of kd of both shapes", least=0.0, is_damping=True
+            ),
+        ),
         zeta=lambda kd, m, K: kd / (2 * np.sqrt(m * K)),
         exponent=1.0,
     )
