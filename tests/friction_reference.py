@@ -31,8 +31,6 @@ MAX_STEP, SAMPLES = 0.02, np.linspace(0.0, 1.0, 8)[1:]
 LIMIT_TOLERANCE = 1e-12
 # a state so close to x = 0 that its energy is that of the limit
 TINY_S = 1e-8
-# s on the way back below which limit and force are rounding, and changes of the mode are not counted
-END_S = 1e-3
 # positions between samples at which a margin is looked for that is positive only shortly
 NEAR_START = 10.0 ** np.arange(-9.0, 0.0)
 STICK, FREE, THIRD = 0, 9, 2
@@ -379,12 +377,10 @@ class Trajectory:
 
     def enter(self, mode: int, spring: float, counts: bool = True) -> None:
         """Go on in a mode; `spring` is f_e there."""
-        is_end = self.is_back and self.y[S] < END_S
-        if counts and mode != self.mode and not is_end:
+        if counts and mode != self.mode:
             self.outcome.slip_changes += (mode == STICK) != (self.mode == STICK)
         self.mode = mode
-        if not is_end:
-            self.outcome.modes.append((float(self.y[S]), mode))
+        self.outcome.modes.append((float(self.y[S]), mode))
         if mode == STICK:
             k = self.phase.stiffness(self.y[S])
             self.y[Z] = spring / k**self.phase.r if spring else 0.0

@@ -12,17 +12,19 @@ from impact.contact.status import FrictionStatus
 from impact.contact.tangential import TangentialResult
 
 from .friction_cases import COMBINATIONS, Batch, random_batches
-from .friction_reference import THIRD, Friction, Outcome
+from .friction_reference import THIRD, TINY_S, Friction, Outcome, P
 
 # of the integration, and the difference allowed from the reference, relative to the larger of G0 and Lambda
 RTOL, TOLERANCE = 1e-9, 1e-7
+# s in the reference at an indentation of 1e-7
+SHORT_S = 1e-7 ** (1.0 / P)
 WORKS = ("slip_work", "memory_work", "elastic_left", "damping_work")
-# further cases, in a hundred, of the same kinds
-RARE = 3
+# cases of each law that may differ, in a hundred
+RARE = 1
 # cases of each law
-QUICK, MANY = 2, 200
-# the difference of the slip, the case, and the names of the results that differ
-Difference = tuple[float, str, list[str]]
+MANY = 200
+# the differences by the name of the result, the case, and the names of the results that differ
+Difference = tuple[dict[str, float], str, list[str]]
 
 
 def test_every_law_has_random_cases() -> None:
@@ -48,7 +50,7 @@ def differences(batch: Batch) -> Iterator[Difference]:
         wrong += [name for name, error in errors.items() if not error <= TOLERANCE]
         status = FrictionStatus.SLOW_LIMIT if outcome.slow else FrictionStatus.OK
         wrong += ["status"] if result.status[row] != status else []
-        yield max(errors.get("slip", 0.0), errors["sliding_impulse"]), batch.describe(row), wrong
+        yield errors, batch.describe(row), wrong
 
 
 def work_errors(
@@ -70,9 +72,12 @@ def work_errors(
 def wrong_counts(result: TangentialResult, row: int, outcome: Outcome, friction: Friction) -> list[str]:
     """Name what differs of the regime and of the slip changes.
 
-    The third regime is neither stick nor slip, and a dashpot without damping has no friction.
+    The third regime is neither stick nor slip, a dashpot without damping has no friction, and a mode that lasts
+    for an indentation of 1e-7 at first contact or at the end may be passed over.
     """
     if any(abs(mode) == THIRD for _, mode in outcome.modes) or (friction.kind == "dashpot" and not friction.c_t):
+        return []
+    if any(TINY_S < s < SHORT_S for s, _ in outcome.modes):
         return []
     wrong = ["regime"] if result.regime[row] != outcome.regime else []
     return wrong + (["slip_changes"] if result.slip_changes[row] != outcome.slip_changes else [])
@@ -80,20 +85,22 @@ def wrong_counts(result: TangentialResult, row: int, outcome: Outcome, friction:
 
 @pytest.mark.parametrize("key", COMBINATIONS)
 def test_random_cases(key: str) -> None:
-    assert differing(key, QUICK, seed=1) == []
+    # of two models, which are others for each law
+    first = 5 * list(COMBINATIONS).index(key)
+    models = {COMBINATIONS[key][number % len(COMBINATIONS[key])] for number in (first, first + 2)}
+    batches = [batch for batch in random_batches(key, 1, seed=1) if batch.pair.model.key in models]
+    assert len(batches) == len(models)
+    assert differing(batches) == []
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("key", COMBINATIONS)
 def test_many_random_cases(key: str) -> None:
-    assert len(differing(key, MANY, seed=2)) <= math.ceil(MANY * RARE / 100)
+    batches = list(random_batches(key, MANY, seed=2))
+    assert sum(len(batch.g0) for batch in batches) >= MANY
+    assert len(differing(batches)) <= MANY * RARE / 100
 
 
-def differing(key: str, count: int, seed: int) -> list[tuple[str, list[str]]]:
-    """List the cases of a law that differ from the reference, and what differs."""
-    found = []
-    batches = list(random_batches(key, count, seed))
-    assert sum(len(batch.g0) for batch in batches) >= count
-    for batch in batches:
-        found += [(name, wrong) for _, name, wrong in differences(batch) if wrong]
-    return found
+def differing(batches: list[Batch]) -> list[tuple[str, list[str]]]:
+    """List the cases that differ from the reference, and what differs."""
+    return [(name, wrong) for batch in batches for _, name, wrong in differences(batch) if wrong]

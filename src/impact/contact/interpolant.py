@@ -36,6 +36,10 @@ AT_CHECKS = chebyshev.chebvander(CHECKS, DEGREE)
 LAST_COEFFICIENTS, COEFFICIENT_TOLERANCE, CHECK_TOLERANCE = 3, 5e-11, 1e-10
 # an interval is divided into so many parts, and that of a group so many times
 PARTS, MAX_DIVISIONS = 8, 2
+# divided intervals from which on a function counts as noise, which no polynomial fits
+MAX_INTERVALS = 250
+# real parts of a pair of roots this near to each other are a double root; coefficients that are left out are noise
+REAL_ROOT, NOISE = 1e-6, 1e-13
 # the intervals of a dimensionless group; other values are integrated
 GROUP_EDGES = np.concatenate([[0.0], 10.0 ** np.arange(-4, 9)])
 # the columns of a collision that are interpolated, and their sizes where their values are smaller
@@ -114,8 +118,12 @@ class Interval:
 
     @property
     def is_divisible(self) -> bool:
-        """Whether parts may be accurate: the interval is not, and the function has a value somewhere in it."""
-        return not self.is_accurate and self.values is not None and bool(np.isfinite(self.values).any())
+        """Whether parts may be accurate: the interval is not, and the function has values in it."""
+        if self.is_accurate or self.values is None:
+            return False
+        is_finite = np.isfinite(self.values)
+        # what fails near its ends is not worth many divisions
+        return bool(is_finite.all() or (is_finite.any() and self.divisions < MAX_DIVISIONS))
 
     def tried(self, values: Array, floors: Array) -> Interval:
         """Interpolate the values of the function at all nodes."""
@@ -191,6 +199,35 @@ class Interpolant:
         values: Array = np.full((x.size, self.floors.size), np.nan)
         values[inside] = self._polynomials(x[inside], number[inside])
         return values
+
+    def resolve(self) -> None:
+        """Divide all intervals until each is accurate or divided enough."""
+        while self._refine(np.arange(len(self.intervals))):
+            if len(self.intervals) > MAX_INTERVALS:
+                self.max_divisions = 0
+
+    def samples(self) -> tuple[Array, Array]:
+        """List the nodes and extrema of a resolved function of one column, ascending, with its values.
+
+        Between neighbours in accurate intervals it is monotonic: their extrema are roots of the derivatives, which
+        are eigenvalues of companion matrices. A value that fails is left out.
+        """
+        x, values = [], []
+        for interval in self.intervals:
+            assert interval.values is not None
+            x.append(interval.nodes[: DEGREE + 1])
+            values.append(interval.values[:, 0])
+            if interval.is_accurate and interval.coefficients is not None:
+                coefficients = interval.coefficients[:, 0]
+                kept = chebyshev.chebtrim(coefficients, NOISE * np.abs(coefficients).max())
+                roots = chebyshev.chebroots(chebyshev.chebder(kept)) if kept.size > 2 else np.zeros(0)
+                t = roots.real[(np.abs(roots.imag) < REAL_ROOT) & (np.abs(roots.real) < 1.0)]
+                x.append(from_unit(t, interval.lower, interval.upper))
+                values.append(np.asarray(chebyshev.chebval(t, coefficients), float))
+        all_x, first = np.unique(np.concatenate(x), return_index=True)
+        all_values = np.concatenate(values)[first]
+        is_finite = np.isfinite(all_values)
+        return all_x[is_finite], all_values[is_finite]
 
     def _interval_of(self, x: Array) -> NDArray[np.intp]:
         """Find the number of the interval of each value; -1 outside."""

@@ -47,6 +47,8 @@ MODE_MARGIN, SIGN_MARGIN = 0, 1
 MARGIN_TOLERANCE = 1e-12
 # a force within this part of the limit is at the limit where the formulas change
 CAP_TOLERANCE = 1e-9
+# errors of the growth of a trial force near the end of the contact, relative to the rate of the limit
+GROWTH_TOLERANCE = 1e-6
 # least s to which steps of difference quotients are relative
 MIN_REACH = 1e-2
 # powers of x that differ by less are the same
@@ -58,8 +60,8 @@ RATE_OF_LIMIT_STEP, RATE_OF_SLIP_STEP = 1e-5, 1e-3
 START_S, RATE_S, LEAST_S = 1e-7, 1e-4, 1e-10
 # s below which a mode does not change any more
 END_S = 1e-6
-# x below which the slip in the modes -2 and 2 is the same
-HELD_X = 1e-7
+# x below which the slip in the modes -2 and 2, and the growth of a trial force, are the same
+END_X = 1e-7
 # step of the central difference quotient there, relative to s; it sees the rate of N beside a force that jumps
 RATE_STEP = 1e-2
 
@@ -294,6 +296,11 @@ class SlipPhase:
         return self.law.model.coordinate_power * self.form.damping_power
 
     @property
+    def end(self) -> float:
+        """The s that belongs to END_X."""
+        return float(END_X ** (1.0 / self.law.model.coordinate_power))
+
+    @property
     def has_spring(self) -> bool:
         """Whether there is a tangential spring."""
         return self.form.kind == "spring"
@@ -450,10 +457,23 @@ class SlipPhase:
     def margins(self, y: Array, k: Array, params: Params) -> Margins:
         """Compute the margin of the mode and that of the sign of the normal force, see `Switch`."""
         columns, local = self.columns(params), self.local(y, k, params)
-        tolerance = MARGIN_TOLERANCE / columns.G0
+        # at the end of the contact limit and force vanish together, up to errors of the integration
+        is_end = (k[0] < 0.0) & (y[0] < END_S)
+        tolerance = np.where(is_end, CAP_TOLERANCE, MARGIN_TOLERANCE) / columns.G0
         sign_margin, sign_rate = columns.sign * k[-1] + MARGIN_TOLERANCE, columns.sign * local.dF
+        if self.law.model.release == "force":
+            # the contact ends where the force vanishes: it does not pull
+            apart = k[0] < 0.0
+            sign_margin, sign_rate = np.where(apart, 1.0, sign_margin), np.where(apart, 0.0, sign_rate)
         if not self.form.has_modes:
             return sign_margin[None], sign_rate[None]
+        # where the contact ends growth vanishes, too, but its sign shows whether the slip has ended before
+        ending = np.flatnonzero((k[0] < 0.0) & (y[0] < self.end) & (np.abs(columns.mode) == 1.0))
+        if ending.size:
+            y, k = y.copy(), k.copy()
+            y[0, ending] = self.end
+            k[:, ending] = self.rates(y[:N_COMPONENTS, ending], _taken(params, ending))
+            local = self.local(y, k, params)
         sticks = columns.mode == 0.0
         direction = np.where(sticks, np.sign(local.trial), np.sign(columns.mode))
         phi = NO_FORCE
@@ -465,15 +485,16 @@ class SlipPhase:
         if self.form.kind == "dashpot":
             margin, margin_rate = np.where(sticks, room, -room) + tolerance, np.where(sticks, -growth, growth)
         else:
-            margin = np.where(sticks, room + tolerance, growth)
+            near_end = (k[0] < 0.0) & (y[0] <= max(self.end, MIN_REACH))
+            slack = np.where(near_end, GROWTH_TOLERANCE * np.abs(local.dN), 0.0)
+            margin = np.where(sticks, room + tolerance, growth + slack)
             margin_rate = np.where(sticks, -growth, np.nan)
         held = np.flatnonzero(np.abs(columns.mode) == 2.0)
         if held.size:
             margin[held], margin_rate[held] = self._held_margin(y[:, held], _taken(params, held))[0], np.nan
-        # without a limit the mode does not matter, nor without a force; and where the contact ends growth vanishes
+        # without a limit the mode does not matter, nor without a force, nor after the end of the contact
         is_free = (columns.share == 0.0) | self._without_force(columns)
-        ends = np.flatnonzero((y[0] < END_S) & (k[0] < 0.0))
-        is_free[ends] |= y[0, ends] < np.where(sticks[ends], -END_S, END_S)
+        is_free |= is_end & (y[0] < np.where(sticks, -END_S, END_S))
         free = np.flatnonzero(is_free)
         margin[free], margin_rate[free] = 1.0, 0.0
         return np.array([margin, sign_margin]), np.array([margin_rate, sign_rate])
@@ -562,8 +583,7 @@ class SlipPhase:
     def _held_slip(self, y: Array, params: Params, direction: Array) -> tuple[Array, Array]:
         """Compute Gamma for which the trial force of the spring grows as its limit does, and N."""
         # at s = 0 the slip is 0/0; a force that vanishes there is known relative to s
-        least = HELD_X ** (1.0 / self.law.model.coordinate_power)
-        y = np.array([np.where(np.abs(y[0]) < least, least, y[0]), *y[1:]])
+        y = np.array([np.where(np.abs(y[0]) < self.end, self.end, y[0]), *y[1:]])
         k, columns = self.rates(y, params), self.columns(params)
         N, dN = columns.share * k[-1], columns.share * self._rate_of_force(y, k, params)
         stiffness = self._times(columns.root * columns.root * k[TIME_ROW], y[0], self.stiffness_power)

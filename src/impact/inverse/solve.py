@@ -1,10 +1,13 @@
 """Solve for an input of a law: the value of a parameter, of K, or the e to ask for, that gives a target.
 
-The output is scanned at logarithmically spaced values of the input. Interior extrema of the scan are refined by
-the method of Chandrupatla (1998), Computer Methods in Applied Mechanics and Engineering 152, 211-217, and roots
-between neighbours on different sides of the target by that of Chandrupatla (1997), Advances in Engineering
-Software 28, 145-149. Both are those of `scipy.optimize.elementwise`, which refines all brackets in one batch. Over
-a range of conditions the largest distance from the target is minimized instead, by Brent's bounded search.
+Chebyshev polynomials replace the output between powers of ten of the input, see `impact.contact.interpolant`.
+Their extrema are roots of the derivatives, so that between neighbouring nodes and extrema is one root or none.
+Each root is corrected by integration. Where no polynomial is accurate, the output is scanned at logarithmically
+spaced values. So are outputs with friction and of schemes with a fixed step; interior extrema of their scan are
+refined by the method of Chandrupatla (1998), Computer Methods in Applied Mechanics and Engineering 152, 211-217.
+Brackets of roots are refined by that of Chandrupatla (1997), Advances in Engineering Software 28, 145-149; both
+are those of `scipy.optimize.elementwise`. Over a range of conditions the largest distance from the target is
+minimized instead, by Brent's bounded search.
 """
 
 from __future__ import annotations
@@ -28,6 +31,7 @@ from ..config.tables import Output
 from ..contact.fixed_step import EXACT
 from ..contact.friction import FrictionLaw
 from ..contact.frictions import find_friction
+from ..contact.interpolant import NODE_MAX_STEPS, Interpolant
 from ..contact.model import ForceModel, Parameter
 from ..contact.models import find
 from ..contact.status import FrictionStatus, Status
@@ -45,6 +49,8 @@ from ..results.sweep import sweep_in_memory
 
 # values that are tried before roots are refined: powers of ten times the contact's own unit of the parameter
 SCAN_DECADES, SCAN_PER_DECADE = 8, 16
+# polynomials are tried on the intervals between these powers of ten, each divided so many times
+MAX_DIVISIONS = 7
 # values that are tried between two finite bounds
 SCAN_BETWEEN_BOUNDS = 201
 # the scan is coarse, and gives up integrations that take more steps
@@ -57,6 +63,10 @@ TARGET_TOLERANCE = 10.0
 SCAN_NOISE = 1e-6
 # an extremum is refined until the output differs by less, relative to itself; absolute for a restitution
 EXTREMUM_TOLERANCE = 1e-10
+# values that give the target this near to each other, relative to themselves, are one root
+ONE_ROOT = 1e-5
+# relative step of the slope at a root, and the largest one of its correction
+SLOPE_STEP = 1e-6
 # a refined root is a jump of the output if it is farther from the target
 REFINED_TOLERANCE = 1e-7
 
@@ -360,20 +370,43 @@ class SolveProblem:
         laws = _laws(self.model.key, self.friction)
         raise UsageError(f"{laws}: no {self.variable} at any value of {self.unknown.name}: {reason}")
 
-    def scan_values(self) -> Array:
+    def scan_values(self, per_decade: int = SCAN_PER_DECADE, between_bounds: int = SCAN_BETWEEN_BOUNDS) -> Array:
         """List the allowed values that are tried first, in ascending order."""
         lower, upper = self.unknown.least, self.unknown.most
-        decades = np.arange(-SCAN_DECADES * SCAN_PER_DECADE, SCAN_DECADES * SCAN_PER_DECADE + 1) / SCAN_PER_DECADE
+        decades = np.arange(-SCAN_DECADES * per_decade, SCAN_DECADES * per_decade + 1) / per_decade
         sizes = self.natural_size() * 10.0**decades
         values = [sizes, np.array([bound for bound in (0.0, lower, upper) if math.isfinite(bound)])]
         if lower < 0.0:
             values.append(-sizes)
         if math.isfinite(lower) and math.isfinite(upper):
-            values.append(np.linspace(lower, upper, SCAN_BETWEEN_BOUNDS))
+            values.append(np.linspace(lower, upper, between_bounds))
         all_values: Array = np.unique(np.concatenate(values))
         # with a stiffness of zero there is no contact
         is_allowed = (all_values > 0.0) | (self.unknown.name != "K")
         return all_values[is_allowed & (all_values >= lower) & (all_values <= upper)]
+
+    @property
+    def is_smooth(self) -> bool:
+        """Whether polynomials are tried; friction has kinks, and schemes where the number of steps changes."""
+        return not self.config.frictions and self.config.solver.integrator == EXACT
+
+    def interpolant(self, conditions: NDArray[np.intp] | None = None) -> Interpolant:
+        """Interpolate the target variable between the powers of ten of the scan, under each condition."""
+        conditions = np.zeros(1, np.intp) if conditions is None else conditions
+        scan = self.scan_values(per_decade=1, between_bounds=2)
+        config = replace(self.config, solver=replace(self.config.solver, max_steps=self.node_steps))
+        limited = replace(self, config=config)
+
+        def function(x: Array) -> Array:
+            outputs = limited.evaluate(np.repeat(x, conditions.size), np.tile(conditions, x.size))
+            return np.asarray(outputs[self.variable].values, float).reshape(x.size, conditions.size)
+
+        floors = np.full(conditions.size, float(self.is_of_order_one))
+        return Interpolant(function, scan, floors, MAX_DIVISIONS)
+
+    @property
+    def node_steps(self) -> int:
+        return min(self.config.solver.max_steps, NODE_MAX_STEPS)
 
     def unit(self) -> str:
         """Write the SI unit of the unknown, with numbers for the names in its exponents."""
@@ -403,19 +436,30 @@ class SolveProblem:
 
 def _all_roots(problem: SolveProblem, target: float) -> SolveResult:
     """Find all values that give the target."""
-    scan = problem.scan_values()
-    values = problem.evaluate(scan, is_scan=True)[problem.variable].values
-    if np.isnan(values).all():
-        problem.raise_failure(scan)
+    scan, interpolant = problem.scan_values(), None
+    known_scan, known_values = np.zeros((2, 0))
+    if problem.is_smooth:
+        interpolant = problem.interpolant()
+        interpolant.resolve()
+        known_scan, known_values = interpolant.samples()
+        scan = scan[np.isnan(interpolant(scan)[:, 0])]
+    values = problem.evaluate(scan, is_scan=True)[problem.variable].values if scan.size else np.zeros(0)
     # a value at which the integration fails, often for want of steps, hides no root between its neighbours
     scan, values = scan[~np.isnan(values)], values[~np.isnan(values)]
-    scale = 1.0 if problem.is_of_order_one else abs(target) or float(np.abs(values).max())
+    if not scan.size + known_scan.size:
+        problem.raise_failure(problem.scan_values())
+    scale = 1.0 if problem.is_of_order_one else abs(target) or float(np.abs(np.append(values, known_values)).max())
     tolerance = TARGET_TOLERANCE * problem.config.solver.rtol * scale
     is_exact = np.abs(values - target) <= SCAN_TOLERANCE * scale
-    is_exact[[values.argmin(), values.argmax()]] = True
-    exact = problem.evaluate(scan[is_exact])[problem.variable].values
-    values[is_exact] = np.where(np.isnan(exact), values[is_exact], exact)
-    scan, values = _with_extrema(problem, scan, values, np.abs(values - target) <= tolerance)
+    if scan.size:
+        is_exact[[values.argmin(), values.argmax()]] = True
+        exact = problem.evaluate(scan[is_exact])[problem.variable].values
+        values[is_exact] = np.where(np.isnan(exact), values[is_exact], exact)
+    if interpolant is None:
+        scan, values = _with_extrema(problem, scan, values, np.abs(values - target) <= tolerance)
+    else:
+        scan, first = np.unique(np.append(known_scan, scan), return_index=True)
+        values = np.append(known_values, values)[first]
     distance = values - target
     reached = np.abs(distance) <= tolerance
     bounds = {problem.unknown.least, problem.unknown.most}
@@ -426,7 +470,7 @@ def _all_roots(problem: SolveProblem, target: float) -> SolveResult:
         is_end = np.arange(left.size) >= between.size
 
         def function(x: Array, is_end: Mask) -> Array:
-            of_x = problem.evaluate(x)[problem.variable].values - target
+            of_x = _known(problem, interpolant, x)[:, 0] - target
             return np.where(is_end, np.abs(of_x) - tolerance, of_x)
 
         refined = elementwise.find_root(
@@ -438,13 +482,41 @@ def _all_roots(problem: SolveProblem, target: float) -> SolveResult:
         # where the output jumps across the target there is no root; an end of an interval may be a jump
         is_root = np.abs(refined.f_x) <= max(tolerance, REFINED_TOLERANCE * scale)
         inside = np.where(refined.f_bracket[0] <= 0.0, *refined.bracket)
-        roots += refined.x[is_root & ~is_end].tolist() + inside[is_end].tolist()
+        polished = _polished(problem, interpolant, refined.x[is_root & ~is_end], target)
+        roots += polished.tolist() + inside[is_end].tolist()
     roots.sort()
     e_out = problem.evaluate(np.array(roots))["e_out"].values.tolist() if roots else []
     status: SolveStatus = "no_root" if not roots else "several_roots" if len(roots) > 1 else "ok"
     if status == "ok" and roots[0] in bounds:
         status = "at_bound"
     return _result(problem, target, status, map(Root, roots, e_out), values)
+
+
+def _known(
+    problem: SolveProblem, interpolant: Interpolant | None, x: Array, conditions: NDArray[np.intp] | None = None
+) -> Array:
+    """Compute the target variable by polynomials, and integrate where none is accurate; shape (k, conditions)."""
+    conditions = np.zeros(1, np.intp) if conditions is None else conditions
+    known = np.full((x.size, conditions.size), np.nan) if interpolant is None else interpolant(x)
+    unknown = np.flatnonzero(np.isnan(known).any(axis=1))
+    if unknown.size:
+        integrated = problem.evaluate(np.repeat(x[unknown], conditions.size), np.tile(conditions, unknown.size))
+        known[unknown] = integrated[problem.variable].values.reshape(unknown.size, conditions.size)
+    return known
+
+
+def _polished(problem: SolveProblem, interpolant: Interpolant | None, roots: Array, target: float) -> Array:
+    """Correct roots of polynomials by one step of Newton's method from the integrated value."""
+    if interpolant is None or not roots.size:
+        return roots
+    distance = problem.evaluate(roots)[problem.variable].values - target
+    near = np.concatenate([roots * (1.0 - SLOPE_STEP), roots * (1.0 + SLOPE_STEP)])
+    below, above = np.split(interpolant(near)[:, 0], 2)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        step = distance * 2.0 * SLOPE_STEP * roots / (above - below)
+    is_small = np.abs(step) <= SLOPE_STEP * np.abs(roots)
+    polished: Array = np.clip(roots - np.where(is_small, step, 0.0), problem.unknown.least, problem.unknown.most)
+    return polished
 
 
 def _with_extrema(problem: SolveProblem, scan: Array, values: Array, reached: Mask) -> tuple[Array, Array]:
@@ -480,8 +552,9 @@ def _runs(reached: Mask, scan: Array, bounds: set[float]) -> tuple[list[float], 
     for first, after in edges.tolist():
         at_bound = sorted({float(scan[first]), float(scan[after - 1])} & bounds)
         # of a run at a bound the bound alone is a root
-        if at_bound or after - first == 1:
-            roots.append(at_bound[0] if at_bound else float(scan[first]))
+        # neighbours beside an extremum that touches the target are one root
+        if at_bound or scan[after - 1] - scan[first] <= ONE_ROOT * abs(scan[first]):
+            roots.append(at_bound[0] if at_bound else float(scan[(first + after - 1) // 2]))
             continue
         for end, left in ((first, first - 1), (after - 1, after - 1)):
             if 0 <= left < scan.size - 1:
@@ -496,11 +569,17 @@ def _best_over_axis(problem: SolveProblem, target: float) -> SolveResult:
     (axis,) = problem.config.axes
     conditions = np.arange(axis.size)
 
+    interpolant = problem.interpolant(conditions) if problem.is_smooth else None
+
     def largest_distance(values: Array, *, is_scan: bool = False) -> Array:
         """Find the largest distance over all conditions; infinite where an integration fails."""
-        trials = np.repeat(values, axis.size)
-        outputs = problem.evaluate(trials, np.tile(conditions, values.size), is_scan=is_scan)
-        distances = np.abs(outputs[problem.variable].values - target).reshape(values.size, axis.size)
+        if is_scan:
+            trials = np.repeat(values, axis.size)
+            outputs = problem.evaluate(trials, np.tile(conditions, values.size), is_scan=True)
+            of_values = outputs[problem.variable].values.reshape(values.size, axis.size)
+        else:
+            of_values = _known(problem, interpolant, values, conditions)
+        distances = np.abs(of_values - target)
         return np.where(np.isnan(distances).any(axis=1), np.inf, distances.max(axis=1))
 
     scan = problem.scan_values()
