@@ -262,3 +262,11 @@ def test_a_parameter_that_does_not_set_the_time_scale_is_refused(cli: Run) -> No
         impact.timestep("mujoco-solref", at={"e": 0.7}, dt=[2e-3], tol=0.01, parameter="dampratio")
     refused = cli("timestep", "--model", "mujoco-solref", "--dt", "2 m")
     assert (refused.returncode, refused.stderr) == (2, '--dt: got "2 m", expected a unit of s, such as "1 s"\n')
+
+
+def test_a_step_longer_than_the_contact_is_a_warning(cli: Run) -> None:
+    done = cli("timestep", "--model", LINEAR, "--at", "e=0.5", "--dt", "1 ms", "--dt", "1 us", "--phases", "9")
+    expected = "warning: dt = 0.001 s: longer than the contact of 0.000290209 s"
+    assert [line for line in done.stderr.splitlines() if "warning" in line] == [expected]
+    exported = impact.export("lammps", dt="1 ms", code_version="22Jul2025")
+    assert any(warning.startswith("dt = 0.001 s: longer than the contact of ") for warning in exported.warnings)

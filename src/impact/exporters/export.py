@@ -283,6 +283,8 @@ def _warnings(problem: ExportProblem, collision: Collision, row: TimestepRow) ->
             f"{key} delivers {number(problem.e_continuous)} where e = {requested} is asked for; impact solve "
             f"--model {key} --for e --target e_out={requested} finds the e to ask for"
         )
+    if row.is_too_long:
+        warnings.append(row.too_long_text)
     if row.failed:
         warnings.append(f"dt = {quantity(row.dt, 's')}: {_failure(problem, row)}")
     return warnings

@@ -94,6 +94,17 @@ class TimestepRow:
     failed: int = 0
 
     @property
+    def is_too_long(self) -> bool:
+        """Whether a contact ends within a step."""
+        return self.steps_per_contact < 1.0
+
+    @property
+    def too_long_text(self) -> str:
+        """Say that the step is longer than the contact."""
+        contact_time = self.steps_per_contact * self.dt
+        return f"dt = {quantity(self.dt, 's')}: longer than the contact of {quantity(contact_time, 's')}"
+
+    @property
     def cells(self) -> tuple[str, ...]:
         """Format the row of a table; a step at which a collision fails has its status."""
         mean = self.status if self.failed else decimals(self.e_mean)
