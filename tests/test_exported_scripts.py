@@ -158,7 +158,7 @@ PLANTED_WALLS = (
     ("mujoco", "mujoco-solref", 'zaxis="-1 0 0"', 'zaxis="-1 1 0"'),
     ("drake", "drake-point-contact", "world_body(), pose", "world_body(), RigidTransform()"),
     ("pybullet", "kelvin-voigt-no-tension", "contactProcessingThreshold=0", "contactProcessingThreshold=1"),
-    ("exudyn", "exudyn-carvalho-gonthier", "sphereRadius=0.05", "sphereRadius=0.0499"),
+    ("exudyn", "exudyn-carvalho-gonthier", "[[0, y", "[[0.01 * y, y"),
     ("newton", "newton-semi-implicit", "-1.0, 0.0, 0.0", "-1.0, 0.3, 0.0"),
     ("kratos", "kratos-hertz", '"search_tolerance_against_walls": 0.01', '"search_tolerance_against_walls": 0.0'),
     (
