@@ -21,7 +21,7 @@ from impact.exporters.programs import run_program
 from impact.exporters.registry import CODES
 from impact.exporters.releases import first_law, installed_version
 
-from .conftest import Run, assert_refused, default_law, examples_of, write_program
+from .conftest import Run, assert_refused, assert_same_output, default_law, examples_of, write_program
 
 # two balls whose effective mass is 0.75 kg and whose effective radius is 0.03 m
 BALLS = {"v1": 1.0, "v2": 0.0, "m1": 1.0, "m2": 3.0, "R1": 0.04, "R2": 0.12}
@@ -311,7 +311,7 @@ def test_an_unstable_step_delivers_no_restitution(cli: Run) -> None:
     assert "steps per contact: unstable at 400 of 400 phases, the step is too long for the scheme" in done.stdout
     assert "mean e" not in done.stdout
     assert "advised: dt <= 1" in done.stdout
-    assert done.stderr.startswith("warning: dt = 0.1 s: unstable at 400 of 400 phases")
+    assert "warning: dt = 0.1 s: unstable at 400 of 400 phases" in done.stderr
     row = impact.export("lammps", at={"e": 0.6}, dt=0.1).at_dt
     assert all(math.isnan(e) for e in (row.e_mean, row.e_least, row.e_largest))
 
@@ -601,12 +601,6 @@ def test_a_program_that_reports_no_release_is_one_line(cli: Run, tmp_path: Path,
 EXAMPLES = examples_of("docs/export.md")
 
 
-def numbers_and_text(line: str) -> tuple[list[float], str]:
-    """The numbers in a line, and the line without them."""
-    pattern = r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[+-]?\d+)?(?![\w.])"
-    return [float(text) for text in re.findall(pattern, line)], re.sub(pattern, "#", line.rstrip())
-
-
 # each takes a second
 QUICK_EXAMPLES = ("export --to lammps", "export --to mujoco")
 
@@ -621,13 +615,8 @@ QUICK_EXAMPLES = ("export --to lammps", "export --to mujoco")
     ],
 )
 def test_the_page_prints_what_the_commands_print(cli: Run, command: str, printed: str) -> None:
-    """The last digits of a number that was solved for depend on the processor."""
     done = cli(*shlex.split(command))
-    for line, expected in zip((done.stdout + done.stderr).splitlines(), printed.splitlines(), strict=True):
-        numbers, text = numbers_and_text(line)
-        expected_numbers, expected_text = numbers_and_text(expected)
-        assert text == expected_text
-        assert numbers == pytest.approx(expected_numbers, rel=1e-9)
+    assert_same_output(done.stdout + done.stderr, printed)
 
 
 def test_the_list_of_codes_leaves_no_file_in_the_folder(cli: Run, tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ from impact.contact.models import find
 from impact.errors import UsageError
 from impact.formatting import number
 
-from .conftest import Run, assert_refused, examples_of
+from .conftest import Run, assert_refused, assert_same_output, examples_of
 
 LINEAR = "anagnostopoulos-1988"
 Array = NDArray[np.float64]
@@ -176,8 +176,7 @@ def test_the_page_prints_what_the_commands_print(cli: Run) -> None:
     examples = examples_of("docs/timestep.md")
     assert examples
     for command, printed in examples:
-        shown = "".join(line.rstrip() + "\n" for line in cli(*shlex.split(command)).stdout.splitlines())
-        assert shown == printed
+        assert_same_output(cli(*shlex.split(command)).stdout, printed)
 
 
 @pytest.mark.parametrize(

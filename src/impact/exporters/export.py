@@ -326,6 +326,8 @@ def _header(
     if problem.missing_law:
         header.append(f"release {problem.version} lacks the default law of {code.newest}, {problem.missing_law}")
     header += [*([_better_fit(problem)] if problem.better_fit else []), *problem.fit_notes]
+    if problem.defaults:
+        header.append(f"defaults of Table 1 of the paper: {', '.join(problem.defaults)}")
     if problem.point.defaulted_axes:
         header.append(f"first value of each axis of the source: {', '.join(problem.point.defaulted_axes)}")
     if problem.has_wall:

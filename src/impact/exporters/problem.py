@@ -7,17 +7,18 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from ..config.load import Config
+from ..config.tables import SWEEP_QUANTITIES
 from ..contact.impacts import INPUTS, Impacts
 from ..contact.model import ForceModel
 from ..contact.models import find
 from ..engine.build_impacts import build_impacts
 from ..engine.plan import Plan
 from ..engine.plugins import Plugins
-from ..formatting import number
+from ..formatting import number, quantity
 from ..inverse.solve import PointWithE, point_with_e
 from ..inverse.timestep import FixedStepLaw, fixed_step_law
 from ..results.calibration import position_of_law, unidentified_notes
-from ..results.single_impact import Calibration, ConfigSource, open_source
+from ..results.single_impact import Calibration, ConfigSource, PointSource, open_source
 from .code import Code, Collision
 from .releases import first_law, has_law, law_of_code
 
@@ -41,6 +42,7 @@ class ExportProblem:
     fit_notes : of a calibration, the rank of the law and its weight, and other laws that were fitted
     better_fit : the law of a calibration that fits best, where it is none of the code; else ""
     missing_law : the default law of the newest release, where this one lacks it and none was requested; else ""
+    defaults : values of Table 1 of the paper that enter, since nothing else gives them
     """
 
     code: Code
@@ -51,6 +53,7 @@ class ExportProblem:
     fit_notes: tuple[str, ...]
     better_fit: str
     missing_law: str
+    defaults: tuple[str, ...]
 
     @property
     def model(self) -> ForceModel:
@@ -138,7 +141,18 @@ def prepare_export(
         fit_notes=fit_notes,
         better_fit=better_fit,
         missing_law=missing,
+        defaults=_defaults(point_source, at, point.config) if point_source.is_starter else (),
     )
+
+
+def _defaults(source: PointSource, at: Mapping[str, object], config: Config) -> tuple[str, ...]:
+    """List the values of Table 1 of the paper that enter, since neither the user nor a config gives them."""
+    given = {str(path[1]) for path in source.config_draft.origins if len(path) > 1} | at.keys()
+    has_stiffness = any(name.split(".")[-1] == "K" for name in config.scalars)
+    material = () if has_stiffness or {"material1", "material2"} <= given else ("material",)
+    names = [name for name in ("v1", "m1", "m2", *material) if name in config.scalars.keys() - given]
+    units = {name: SWEEP_QUANTITIES[name].unit for name in ("v1", "m1", "m2")}
+    return tuple(f"{name} = {quantity(config.scalars[name], units.get(name, ''))}" for name in names)
 
 
 def _fit_notes(code: Code, version: str, key: str, calibration: Calibration) -> tuple[str, tuple[str, ...]]:

@@ -406,10 +406,13 @@ def _calibration_dataset(config: Config, plugins: Plugins, laws: Mapping[str, Fi
     assert config.data is not None
     candidates = laws_to_fit(config)
 
-    # a law at a bound is ranked by what it reaches there: a wider search can only improve it
-    def rank(key: str) -> list[float]:
+    # a law at a bound is ranked by what it reaches there: a wider search can only improve it; laws that fit equally
+    # well are in the order of the config
+    def rank(key: str) -> tuple[float, float]:
         fit = laws[key].fit
-        return [math.inf if math.isnan(value) else value for value in (fit.aicc, fit.chi2_reduced)]
+        if not math.isnan(fit.aicc):
+            return round(fit.aicc, 6), 0.0
+        return math.inf, math.inf if math.isnan(fit.chi2_reduced) else fit.chi2_reduced
 
     keys = sorted(laws, key=rank)
     fits = [laws[key].fit for key in keys]

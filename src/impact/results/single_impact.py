@@ -494,6 +494,7 @@ class PointSource:
     plugins: Plugins
     labels: Mapping[str, float | str] = field(default_factory=dict)  # at which a part of a result was selected
     has_selection: bool = True  # selects models, unlike the starter config
+    is_starter: bool = False
     calibration: Calibration | None = None
 
     @property
@@ -529,7 +530,7 @@ def open_source(source: ConfigSource, overrides: Sequence[str], plugins: Plugins
     if source is None:
         draft = open_text(STARTER_CONFIG.read_text(encoding="utf-8"), "starter", plugins.models)
         draft = draft.with_settings([STARTER_E, *settings_of(overrides)])
-        return PointSource(draft, plugins, has_selection=("models",) in draft.origins)
+        return PointSource(draft, plugins, has_selection=("models",) in draft.origins, is_starter=True)
     draft = open_config(Path(source) if isinstance(source, str) else source, plugins.models)
     return PointSource(draft.with_settings(settings_of(overrides)), plugins)
 
@@ -585,6 +586,8 @@ def single_point(
     over = {str(_input_name(name, *laws)): values for name, values in (over or {}).items()}
     settings += [Setting(InputName.parse(name).path, values, f"--over {name}") for name, values in over.items()]
     draft = draft.with_settings(settings)
+    if source.is_starter:
+        draft = _without_default_masses(draft, fixed)
     if isinstance(draft.table("sweep").get("cases"), str):
         # the inputs that vary together are the columns of the file
         draft = inline_files(draft)
@@ -600,6 +603,18 @@ def single_point(
         if is_case(name) and name not in {axis.numbered for axis in config.axes}:
             raise _unknown_input(draft, name)
     return _without_axes(config, {**labels, **fixed}, over)
+
+
+def _without_default_masses(draft: Draft, fixed: Mapping[str, object]) -> Draft:
+    """Leave out the mass of Table 1 of a ball whose radius is given: it follows from that and the density."""
+    given = {**{str(path[1]): setting.value for path, setting in draft.origins.items() if len(path) > 1}, **fixed}
+    derived = [
+        f"m{ball}"
+        for ball in (1, 2)
+        if f"m{ball}" not in given and str(given.get(f"R{ball}", "inf")).strip() != "inf"
+    ]
+    sweep = {name: value for name, value in draft.table("sweep").items() if name not in derived}
+    return replace(draft, data={**draft.data, "sweep": sweep})
 
 
 def _input_name(name: str, model: ForceModel | None, friction: FrictionLaw | None) -> InputName:
