@@ -406,8 +406,8 @@ def _calibration_dataset(config: Config, plugins: Plugins, laws: Mapping[str, Fi
     assert config.data is not None
     candidates = laws_to_fit(config)
 
-    # a law at a bound is ranked by what it reaches there: a wider search can only improve it; laws that fit equally
-    # well are in the order of the config
+    # a law at a bound is ranked by what it reaches there: a wider search can only improve it. Laws that fit
+    # equally well are in the order of the config
     def rank(key: str) -> tuple[float, float]:
         fit = laws[key].fit
         if not math.isnan(fit.aicc):
