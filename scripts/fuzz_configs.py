@@ -306,8 +306,8 @@ def judge(outcomes: Outcomes, index: int, path: Path, *, timed: bool, with_fit: 
     finally:
         signal.setitimer(signal.ITIMER_PROF, 0)
     outcomes.seconds[index] = time.process_time() - start
-    # notes of this package are UserWarnings
-    foreign = (warning for warning in caught if warning.category is not UserWarning)
+    # what this package notes
+    foreign = (warning for warning in caught if warning.category not in (UserWarning, impact.ImpactWarning))
     for line in dict.fromkeys(f"{w.category.__name__}: {w.message} ({w.filename}:{w.lineno})" for w in foreign):
         outcomes.fail(index, line)
     outcomes.counts[ended] += 1
