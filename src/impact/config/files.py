@@ -115,6 +115,7 @@ def _syntax_error_line(text: str, language: str, message: str) -> str:
 def to_plain_data(value: Any, path: KeyPath = ()) -> tuple[Any, list[ConfigProblem]]:
     """Convert a value to dicts, lists and Python numbers; list invalid text and too many levels as problems.
 
+    >>> import numpy as np
     >>> to_plain_data({"e": np.linspace(0, 1, 3), "m2": (1, np.float64(2))})
     ({'e': [0.0, 0.5, 1.0], 'm2': [1, 2.0]}, [])
     """
@@ -152,7 +153,7 @@ def _from_library(value: Any) -> object:
 
     The libraries are not imported: pandas and pint are needed only where a value is theirs.
 
-    >>> from fractions import Fraction
+    >>> import numpy as np
     >>> [_from_library(value) for value in (np.arange(2.0), range(1, 3), Fraction(1, 2))]
     [[0.0, 1.0], [1, 2], 0.5]
     """
