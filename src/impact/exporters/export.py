@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -211,9 +212,16 @@ def export(
     advised = None
     if code.scheme is not None and problem.requested_e > 0.0:
         advised = needed_steps(problem.law, ADVISED_TOL, problem.e_continuous)
-    if parameter is None and given and advised is not None and advised.dt < dt:
-        parameter = time_parameter(problem.point.config, problem.model)
     needed = None
+    if parameter is None and given and advised is not None and advised.dt < dt:
+        name = time_parameter(problem.point.config, problem.model)
+        # nobody asked for it: a law whose time scale has no such parameter is exported without
+        with suppress(UsageError):
+            needed = (
+                needed_parameter(problem.point, Plugins(), name, dt, ADVISED_TOL, problem.law, problem.outputs)
+                if name
+                else None
+            )
     if parameter:
         if code.scheme is None:
             raise UsageError(f"--for: what {code.title} delivers at a time step is not predicted")

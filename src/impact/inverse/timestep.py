@@ -515,15 +515,17 @@ def _seek(config: Config, law: FixedStepLaw, name: str) -> tuple[Parameter, str,
 
 def time_parameter(config: Config, model: ForceModel) -> str:
     """Name the parameter that sets the time scale of a law, as `timestep` takes it; "" where two materials do."""
-    if not {"K", f"{model.key}.K"}.isdisjoint(config.scalars):
-        return "K"
     arguments = argument_names(model.stiffness)
     names = [parameter.name for parameter in model.parameters if parameter.name in arguments]
+    names = [name for name in names if name != model.damping]
+    if len(names) == 1:
+        return names[0]
+    if not {"K", f"{model.key}.K"}.isdisjoint(config.scalars):
+        return "K"
     materials = {str(config.scalars.get(f"material{ball}", config.scalars.get("material"))) for ball in "12"}
     if model.stiffness is None or "E_eff" in arguments:
         return f"materials.{materials.pop()}.E" if len(materials) == 1 else ""
-    names = [name for name in names if name != model.damping]
-    return names[0] if len(names) == 1 else "K"
+    return "K"
 
 
 def fixed_step_law(
