@@ -1,9 +1,9 @@
 """Interpolate what is smooth in one variable, such as the outcome of a law in its dimensionless group.
 
-A function is replaced by Chebyshev polynomials on intervals, in the logarithm of the variable (Trefethen 2013,
-Approximation Theory and Approximation Practice, chapters 3 and 8). An interval is accurate if its last
-coefficients vanish and if the polynomial agrees with the function between the nodes. One that is not, by a kink, a
-jump or a failure, is divided; what is left after a few divisions is evaluated by the function itself.
+A function is replaced by Chebyshev polynomials on intervals, in the logarithm of the variable. An interval is
+accurate if its last coefficients vanish and if the polynomial agrees with the function between the nodes. One that
+is not, by a kink, a jump or a failure, is divided; what is left after a few divisions is evaluated by the function
+itself.
 """
 
 from __future__ import annotations
