@@ -7,6 +7,7 @@ from collections.abc import Callable
 from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -154,3 +155,24 @@ def test_implausible_inputs_and_results_are_warnings_at_the_line_of_the_user() -
     assert {warning.filename for warning in caught} == {__file__}
     with pytest.warns(impact.ImpactWarning, match="peak indentation above 10% of the smaller radius"):
         impact.sweep({"models": "hertz", "sweep": {**sweep, "v1": 2000.0, "material": "steel"}})
+
+
+@pytest.mark.parametrize("dt", ["2 us", 2e-6, np.float64(2e-6), 2 * unit.us, np.array([2e-6]), ["0.002 ms"]])
+def test_a_step_is_a_number_or_several_with_or_without_a_unit(dt: Any) -> None:
+    (row,) = impact.timestep("anagnostopoulos-1988", at={"e": 0.5}, dt=dt, tol="2%", phases=4).rows
+    assert row.dt == pytest.approx(2e-6, rel=1e-15)
+
+
+def test_a_tolerance_may_be_a_percentage(result: xr.Dataset) -> None:
+    assert impact.recommend(result, tol="2%").tol == impact.recommend(result, tol=0.02).tol == 0.02
+
+
+def test_one_model_may_be_named_without_a_list(result: xr.Dataset) -> None:
+    assert [row.model for row in impact.recommend(result, models="hertz")] == ["hertz"]
+
+
+def test_columns_of_cases_may_have_units() -> None:
+    names = ("e", "v1 [mm/s]", "m1", "m2", "K")
+    cases = pd.DataFrame([[0.5, 100.0, 1.0, 1.0, 6e9], [0.5, 200.0, 1.0, 1.0, 6e9]], columns=names)
+    swept = impact.sweep({"models": ["hertz"], "sweep": {"cases": cases}})
+    assert swept["v1"].values.tolist() == [0.1, 0.2]

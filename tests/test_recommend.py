@@ -354,7 +354,7 @@ def test_strings_of_a_file_are_escaped_on_the_terminal(cli: Run, tmp_path: Path)
 @pytest.mark.parametrize(
     ("choice", "words"),
     [
-        ({"tol": 0.0}, "tol: got 0, expected a positive finite number"),
+        ({"tol": 0.0}, "tol: got 0.0, expected a number > 0"),
         ({"tol": math.nan}, "tol: got nan"),
         ({"tol": math.inf}, "tol: got inf"),
         ({"sel": {"m3": 1.0}}, 'no axis "m3" in this result; known: e, m2'),
@@ -388,7 +388,7 @@ def test_an_error_of_the_command_is_one_line(cli: Run, tmp_path: Path) -> None:
     path = stored(tmp_path, swept("hertz", e=None))
     for words, line in (
         ([path], "this sweep has no requested e, which the ranking needs; add e or alpha\n"),
-        ([path, "--tol", "-1"], "tol: got -1, expected a positive finite number\n"),
+        ([path, "--tol", "-1"], "tol: got -1.0, expected a number > 0\n"),
         (
             [path, "--sel", "m2"],
             "impact recommend: Invalid value for '--sel': got \"m2\", expected NAME=VALUE, such as m2=1.0; "

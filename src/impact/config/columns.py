@@ -406,6 +406,11 @@ def _length_problems(path: Path, rows: Mapping[int, Sequence[str]], n_columns: i
     ]
 
 
+def _with_unit(values: list[object], unit: str) -> list[object]:
+    """Write the unit of a column beside its numbers; a text may have its own."""
+    return [value if isinstance(value, str) else f"{value!r} {unit}" for value in values] if unit else values
+
+
 def columns_of_table(table: Any, source: str) -> Columns:
     """Take the columns of a mapping, a DataFrame, or a dataset of xarray, whose units are attributes."""
     units: dict[str, str] = {}
@@ -531,11 +536,14 @@ def named_files(data: Mapping[str, Any]) -> list[str]:
 
 
 def expand_cases(draft: Draft) -> Draft:
-    """Replace `sweep.cases` by its columns."""
+    """Replace `sweep.cases` by its columns, whose names may have a unit."""
     sweep = draft.table("sweep")
-    cases = sweep.get("cases")
-    if not isinstance(cases, dict) or not cases or not all(isinstance(values, list) for values in cases.values()):
+    table = sweep.get("cases")
+    if not isinstance(table, dict) or not table or not all(isinstance(values, list) for values in table.values()):
         return draft
+    headers = {split_header(header): header for header in table}
+    cases = {name: _with_unit(table[header], unit) for (name, unit), header in headers.items()}
+    written = {name: header for (name, _), header in headers.items()}
     problems: list[ConfigProblem] = []
     paths: dict[KeyPath, KeyPath] = {}
     # the columns that belong to [sweep] take the position of the table
@@ -544,7 +552,7 @@ def expand_cases(draft: Draft) -> Draft:
     data = {**draft.data, "sweep": {**dict(items[:position]), **in_sweep, **dict(items[position + 1 :])}}
     n_cases = len(next(iter(cases.values())))
     for column, values in cases.items():
-        name, path = InputName.parse(column), ("sweep", "cases", column)
+        name, path = InputName.parse(column), ("sweep", "cases", written[column])
         try:
             name.quantity(draft.known_models)
         except KeyError:

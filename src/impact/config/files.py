@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import re
 import tomllib
@@ -11,10 +12,12 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from ..errors import ConfigError, MissingFileError
+from pydantic_core import PydanticCustomError
+
+from ..errors import ConfigError, MissingFileError, UsageError
 from ..formatting import safe_text
 from .lines import BARE_KEY
-from .quantities import ConfigProblem, KeyPath, as_text
+from .quantities import ConfigProblem, KeyPath, Quantity, as_text
 
 MAX_CONFIG_BYTES = 1_000_000  # size of a TOML file
 MAX_OVERRIDE_LENGTH = 4_000_000  # characters of the value of an override
@@ -172,6 +175,28 @@ def _from_library(value: Any) -> object:
     if isinstance(value, range):
         return list(value)
     return float(value) if isinstance(value, Fraction | Decimal) else value
+
+
+def read_number(value: object, quantity: Quantity, origin: str) -> float:
+    """Read an argument that is one number, bare, with a unit, or of another library.
+
+    >>> time = Quantity("s", "a time", 0)
+    >>> read_number("2 us", time, "--dt"), read_number("1e-3", time, "--dt")
+    (2e-06, 0.001)
+    """
+    plain, _ = to_plain_data(value)
+    with contextlib.suppress(ValueError, TypeError):
+        plain = float(plain)
+    try:
+        return float(quantity.read(plain))
+    except PydanticCustomError as error:
+        raise UsageError(f"{origin}: {error.message()}") from None
+
+
+def read_numbers(values: object, quantity: Quantity, origin: str) -> list[float]:
+    """Read an argument that is a number or several."""
+    plain, _ = to_plain_data(values)
+    return [read_number(value, quantity, origin) for value in (plain if isinstance(plain, list) else [plain])]
 
 
 def _is_storable(text: str) -> bool:

@@ -31,7 +31,7 @@ from ..contact.frictions import frictions
 from ..contact.model import ForceModel
 from ..contact.models import built_in, catalogue
 from ..contact.variables import OUTPUTS
-from ..errors import UsageError, did_you_mean
+from ..errors import did_you_mean
 from .quantities import (
     COLUMN,
     MAX_AXIS_VALUES,
@@ -219,12 +219,7 @@ MATERIAL_KEYS = {
 }
 
 
-def read_sweep_value(name: str, value: object, origin: str) -> float:
-    """Read one number of an input of [sweep], bare or with a unit."""
-    try:
-        return float(SWEEP_QUANTITIES[name].read(value))
-    except PydanticCustomError as error:
-        raise UsageError(f"{origin}: {error.message()}") from None
+TOLERANCE = Quantity("1", "largest accepted difference", 0, above=True)
 
 
 SWEEP_DEFAULTS = {name: float(Sweep.model_fields[name].default) for name in ("v2", "n")}

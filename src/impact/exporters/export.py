@@ -12,6 +12,8 @@ from typing import Any
 
 from .._version import __version__
 from ..atomic import check_outputs, write_file
+from ..config.files import read_number
+from ..config.tables import SWEEP_QUANTITIES
 from ..contact.status import Status
 from ..display import Block, Displayed
 from ..engine.plugins import Plugins
@@ -23,7 +25,6 @@ from ..inverse.timestep import (
     TimestepRow,
     needed_parameter,
     needed_steps,
-    read_step,
     time_parameter,
     time_steps,
     timestep_rows,
@@ -204,7 +205,7 @@ def export(
     if (script or verify) and not code.template:
         raise UsageError(f"--script: there is none for {code.title}: {code.tested}")
     contact_time = problem.law.contact_time
-    given = [] if dt is None else [read_step(dt)]
+    given = [] if dt is None else [read_number(dt, SWEEP_QUANTITIES["dt"], "--dt")]
     (dt,) = time_steps(contact_time, [] if given else [STEPS_PER_CONTACT], given)
     collision = problem.collision(dt, 0.5)
     parameters = code.parameters(collision)

@@ -10,7 +10,6 @@ one is a power of the other for laws with a single time scale.
 
 from __future__ import annotations
 
-import contextlib
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -22,9 +21,10 @@ from numpy.typing import NDArray
 from scipy.optimize import elementwise
 
 from ..array_types import Array
+from ..config.files import read_number, read_numbers
 from ..config.input_names import InputName
 from ..config.load import Config
-from ..config.tables import read_sweep_value
+from ..config.tables import SWEEP_QUANTITIES, TOLERANCE
 from ..contact.dimensionless import dimensionless_values
 from ..contact.fixed_step import (
     KICK_DRIFT,
@@ -236,10 +236,10 @@ def timestep(
     *,
     source: str | Path | Mapping[str, object] | None = None,
     at: Mapping[str, float | str] | None = None,
-    steps_per_contact: Sequence[float] = (),
-    dt: Sequence[float | str] = (),
+    steps_per_contact: float | Sequence[float] = (),
+    dt: float | str | Sequence[float | str] = (),
     phases: int = 400,
-    tol: float | None = None,
+    tol: float | str | None = None,
     parameter: str | None = None,
     scheme: str | None = None,
     overrides: Sequence[str] = (),
@@ -284,14 +284,16 @@ def timestep(
     """
     if phases < 1:
         raise UsageError(f"--phases: got {phases}, expected a whole number >= 1")
-    if parameter is not None and (tol is None or len(dt) != 1):
+    given = read_numbers(dt, SWEEP_QUANTITIES["dt"], "--dt")
+    counts = read_numbers(steps_per_contact, SWEEP_QUANTITIES["steps_per_contact"], "--steps-per-contact")
+    tol = None if tol is None else read_number(tol, TOLERANCE, "--tol")
+    if parameter is not None and (tol is None or len(given) != 1):
         raise UsageError("--for: expected one --dt and --tol as well")
     plugin_set = read_plugins(plugins)
     point_source = open_source(source, overrides, plugin_set)
     point = point_with_e(point_source, find(model, plugin_set.models), at or {})
     law, collision = fixed_step_law(point.config, phases, scheme)
-    given = [read_step(step) for step in dt]
-    steps = time_steps(law.contact_time, steps_per_contact or (() if given else STEPS_PER_CONTACT), given)
+    steps = time_steps(law.contact_time, counts or (() if given else STEPS_PER_CONTACT), given)
     return TimestepResult(
         model=law.model.key,
         scheme=law.scheme,
@@ -543,17 +545,6 @@ def fixed_step_law(
     if status != Status.OK:
         raise UsageError(f"{model.key} has no rebound at these inputs: {status.meaning}")
     return FixedStepLaw(model, impact, collision["contact_time"], phases, scheme), collision
-
-
-def read_step(dt: float | str) -> float:
-    """Read a time step [s], a number or a text with a unit.
-
-    >>> read_step("2 us"), read_step("1e-3")
-    (2e-06, 0.001)
-    """
-    with contextlib.suppress(ValueError):
-        dt = float(dt)
-    return read_sweep_value("dt", dt, "--dt")
 
 
 def time_steps(contact_time: float, steps_per_contact: Sequence[float], dt: Sequence[float]) -> list[float]:

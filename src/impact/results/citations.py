@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -108,7 +109,9 @@ def cite(*laws: str | Path | xr.Dataset | ForceModel | FrictionLaw, plugins: Seq
             item = load(item)
         if isinstance(item, xr.Dataset):
             coordinates = (item.coords[name] for name in ("model", "friction") if name in item.coords)
-            keys = [str(key) for coordinate in coordinates for key in coordinate.values.flat]
+            # the laws of a calibration with friction are pairs
+            laws_of = (str(key).split(" with ") for coordinate in coordinates for key in coordinate.values.flat)
+            keys = list(chain.from_iterable(laws_of))
         else:
             keys = [item]
         chosen |= {key: look_up(known, key, "law") for key in keys}

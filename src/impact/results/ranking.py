@@ -14,7 +14,9 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ..array_types import Mask
+from ..config.files import read_number
 from ..config.input_names import InputName
+from ..config.tables import TOLERANCE
 from ..contact.status import FIRST_FAILURE, FrictionStatus, Status
 from ..contact.variables import OUTPUTS
 from ..display import Block, Displayed, Table, html_of
@@ -239,7 +241,7 @@ class Ranking(Displayed, Sequence[Ranked]):
 def recommend(
     dataset: xr.Dataset | str | Path,
     *,
-    tol: float = DEFAULT_TOL,
+    tol: float | str = DEFAULT_TOL,
     sel: Mapping[str, float | str] | None = None,
     models: Sequence[str] | None = None,
     target: Mapping[str, float] | None = None,
@@ -279,8 +281,7 @@ def recommend(
     """
     dataset = result_of(dataset)
     require_sweep(dataset, "recommend")
-    if not 0.0 < tol < math.inf:
-        raise UsageError(f"tol: got {tol:g}, expected a positive finite number")
+    tol = read_number(tol, TOLERANCE, "tol")
     criterion = BY_ERROR if target is None else _criterion_of(target)
     if frictions and not OUTPUTS[criterion.names[0]].of_friction:
         raise UsageError("--friction: expected a --target that depends on friction, such as beta=0.4")

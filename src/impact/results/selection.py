@@ -31,9 +31,10 @@ IndexArray = NDArray[np.intp]
 
 
 def law_positions(
-    laws: Sequence[str], dataset: xr.Dataset, dim: Literal["model", "friction"] = "model"
+    laws: str | Sequence[str], dataset: xr.Dataset, dim: Literal["model", "friction"] = "model"
 ) -> list[int]:
-    """Find the positions of models or friction laws, in the order of the keys; repeated keys count once."""
+    """Find the positions of one or more models or friction laws, in the order of the keys; each counts once."""
+    laws = [laws] if isinstance(laws, str) else laws
     noun = "friction law" if dim == "friction" else dim
     if dim not in dataset.dims:
         raise UsageError(f'no {noun} "{laws[0]}" in this result, which has none; sweep a config with {dim}s')

@@ -448,9 +448,10 @@ def histories(
     return datasets
 
 
-def _chosen_keys(dataset: xr.Dataset, dim: str, chosen: Sequence[str] | None) -> list[str]:
+def _chosen_keys(dataset: xr.Dataset, dim: str, chosen: str | Sequence[str] | None) -> list[str]:
     """List the chosen keys of models or friction laws of a result, each once; by default all."""
     keys = [str(key) for key in dataset[dim].values.ravel()]
+    chosen = [chosen] if isinstance(chosen, str) else chosen
     for key in chosen or ():
         if key not in keys:
             raise UsageError(f'no {dim} "{key}" in this result; {did_you_mean(key, keys)}')
