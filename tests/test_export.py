@@ -308,7 +308,9 @@ def test_an_unstable_step_delivers_no_restitution(cli: Run) -> None:
     """The scheme then gives an e of thousands."""
     done = cli("export", "--to", "lammps", "--at", "e=0.6", "--dt", "0.1", "--code-version", "22Jul2025")
     assert done.returncode == 0
-    assert "steps per contact: unstable at 400 of 400 phases, the step is too long for the scheme" in done.stdout
+    assert (
+        " of the Rayleigh time: unstable at 400 of 400 phases, the step is too long for the scheme" in done.stdout
+    )
     assert "mean e" not in done.stdout
     assert "advised: dt <= 1" in done.stdout
     assert "warning: dt = 0.1 s: unstable at 400 of 400 phases" in done.stderr

@@ -31,6 +31,7 @@ E = "210 GPa"
 nu = 0.3
 rho = 7850
 """
+MASS = "m2: got 2 kg, but a sphere of R2 = 1 m and 7850 kg/m^3 has 3.288e+04 kg; without m2 the mass follows"
 MODULUS = "materials.steel.E: got {}"
 LIMIT, SMALL = "peak indentation above 10% of the smaller radius", "Hertz theory assumes small indentation"
 NO_IMPACT = "none of 4 points is an impact: v1 <= v2, the balls do not approach"
@@ -45,6 +46,8 @@ NO_IMPACT = "none of 4 points is an impact: v1 <= v2, the balls do not approach"
         ("materials.steel.E=999.0", [MODULUS.format("999 Pa; did you mean 999 GPa?")]),
         ("sweep.v1=-1", [NO_IMPACT]),
         ("sweep.v1=400", []),
+        ("sweep.R2=1", [MASS]),
+        ("sweep.R2=0.0394", []),
     ],
 )
 def test_an_implausible_value_gives_a_note(tmp_path: Path, change: str, notes: list[str]) -> None:

@@ -93,9 +93,8 @@ def timestep(
         overrides=sets or (),
         plugins=plugins or (),
     )
-    for row in result.rows:
-        if row.is_too_long:
-            exits.print_line(f"warning: {row.too_long_text}")
+    for warning in result.warnings:
+        exits.print_line(f"warning: {warning}")
     show(result, as_json=as_json)
     if any(row.failed for row in result.rows):
         raise typer.Exit(exits.EXIT_POINTS_FAILED)

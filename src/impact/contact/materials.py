@@ -37,6 +37,19 @@ def sphere_mass(radius: Array, density: Array) -> Array:
     return np.where(np.isinf(radius), np.inf, (4.0 / 3.0) * np.pi * radius**3 * density)
 
 
+def rayleigh_time(radius: Array, density: Array, E: Array, nu: Array) -> Array:
+    """Time [s] that a Rayleigh wave takes around half a sphere, with which granular codes compare a time step.
+
+    pi R sqrt(rho/G) / (0.1631 nu + 0.8766), with the shear modulus G, as the documentation of LIGGGHTS
+    has it under `fix check/timestep/gran`.
+
+    >>> glass = [np.array([value]) for value in (2.5e-3, 2500.0, 60e9, 0.25)]
+    >>> print(rayleigh_time(*glass) * 1e6)
+    [2.76316847]
+    """
+    return np.asarray(np.pi * radius * np.sqrt(2.0 * (1.0 + nu) * density / E) / (0.1631 * nu + 0.8766))
+
+
 def effective_radius(R1: Array, R2: Array) -> Array:
     """Effective radius R [m] of two spheres, equation (12), as 1/(1/R1 + 1/R2); an infinite radius is a plane.
 

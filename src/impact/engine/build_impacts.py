@@ -12,7 +12,7 @@ from ..array_types import Array
 from ..contact.formula_calls import argument_names, call_by_name
 from ..contact.friction import FrictionLaw
 from ..contact.impacts import Impacts, stiffness as hertz_or_secant
-from ..contact.materials import effective_mass, hertz_stiffness, sphere_mass, sphere_radius
+from ..contact.materials import effective_mass, hertz_stiffness, rayleigh_time, sphere_mass, sphere_radius
 from ..contact.model import Law
 from ..contact.rigid import ObliqueImpacts
 from ..contact.simulate import PHASE, STEP, STEPS_PER_CONTACT
@@ -189,6 +189,19 @@ def radius_at(inputs: Inputs, ball: str, index: Index, mass: Array) -> Array:
 def smaller_radius_at(inputs: Inputs, index: Index) -> Array:
     """Compute the radius of the smaller ball at cells [m]; NaN where it is unknown."""
     return np.fmin(*(radius_at(inputs, ball, index, mass_at(inputs, ball, index)) for ball in "12"))
+
+
+def rayleigh_time_at(inputs: Inputs, index: Index) -> Array:
+    """Compute the Rayleigh time of the ball with the smaller one at cells [s]; NaN where none is known."""
+    times = []
+    for ball in "12":
+        mass = mass_at(inputs, ball, index)
+        radius = radius_at(inputs, ball, index, mass)
+        with np.errstate(invalid="ignore"):
+            density = mass / sphere_mass(radius, np.ones(1))
+        E, nu = (property_at(inputs, ball, key, index) for key in ("E", "nu"))
+        times.append(rayleigh_time(radius, density, E, nu))
+    return np.fmin(*times)
 
 
 def restitution_at(inputs: Inputs, index: Index) -> Array:

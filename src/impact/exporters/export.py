@@ -14,7 +14,6 @@ from .._version import __version__
 from ..atomic import check_outputs, write_file
 from ..config.files import read_number
 from ..config.tables import SWEEP_QUANTITIES
-from ..contact.status import Status
 from ..display import Block, Displayed
 from ..engine.plugins import Plugins
 from ..errors import UsageError
@@ -292,11 +291,7 @@ def _warnings(problem: ExportProblem, collision: Collision, row: TimestepRow) ->
             f"{key} delivers {number(problem.e_continuous)} where e = {requested} is asked for; impact solve "
             f"--model {key} --for e --target e_out={requested} finds the e to ask for"
         )
-    if row.is_too_long:
-        warnings.append(row.too_long_text)
-    if row.failed:
-        warnings.append(f"dt = {quantity(row.dt, 's')}: {_failure(problem, row)}")
-    return warnings
+    return [*warnings, *row.warnings(problem.law.phases)]
 
 
 def _better_fit(problem: ExportProblem) -> str:
@@ -311,12 +306,6 @@ def _row(problem: ExportProblem, dt: float) -> TimestepRow:
         return TimestepRow(dt, problem.law.contact_time / dt, nan, nan, nan, nan)
     (row,) = timestep_rows(problem.law, [dt])
     return row
-
-
-def _failure(problem: ExportProblem, row: TimestepRow) -> str:
-    """Explain why the code delivers no restitution at a time step."""
-    status = row.status.replace("_", " ")
-    return f"{status} at {row.failed} of {problem.law.phases} phases, {Status[row.status.upper()].meaning}"
 
 
 def _header(
@@ -352,11 +341,13 @@ def _header(
         f"{asked}the continuous law delivers {number(problem.e_continuous)} in a contact time of {contact_time}"
     )
     steps = f"dt = {quantity(row.dt, 's')}, {number(row.steps_per_contact)} steps per contact"
+    if law.rayleigh_time == law.rayleigh_time:
+        steps += f", {number(row.dt / law.rayleigh_time, 3)} of the Rayleigh time"
     if code.scheme is None:
         header.append(f"{steps}: what the code's scheme delivers there is not predicted")
     else:
         spread = f"{decimals(row.e_least)} to {decimals(row.e_largest)} by the phase in the step"
-        delivered = _failure(problem, row) if row.failed else f"mean e {decimals(row.e_mean)}, {spread}"
+        delivered = row.failure(law.phases) if row.failed else f"mean e {decimals(row.e_mean)}, {spread}"
         header.append(f"{steps}: {delivered} ({code.scheme})")
         if row.e_to_ask == row.e_to_ask:
             header.append(

@@ -27,7 +27,6 @@ from ..config.load import Config
 from ..config.tables import SWEEP_QUANTITIES, TOLERANCE
 from ..contact.dimensionless import dimensionless_values
 from ..contact.fixed_step import (
-    KICK_DRIFT,
     MAX_CONTACTS,
     MAX_STEPS_PER_CONTACT,
     FixedStepResult,
@@ -43,7 +42,7 @@ from ..contact.output_formulas import collide
 from ..contact.status import FIRST_FAILURE, Status
 from ..contact.units import with_numbers
 from ..display import Block, Displayed, Table
-from ..engine.build_impacts import build_impacts
+from ..engine.build_impacts import build_impacts, rayleigh_time_at
 from ..engine.plan import Plan
 from ..engine.plugins import Plugins, read_plugins
 from ..errors import UsageError
@@ -98,11 +97,18 @@ class TimestepRow:
         """Whether a contact ends within a step."""
         return self.steps_per_contact < 1.0
 
-    @property
-    def too_long_text(self) -> str:
-        """Say that the step is longer than the contact."""
-        contact_time = self.steps_per_contact * self.dt
-        return f"dt = {quantity(self.dt, 's')}: longer than the contact of {quantity(contact_time, 's')}"
+    def warnings(self, phases: int) -> Iterator[str]:
+        """Say that the step is longer than the contact, and that some of so many phases fail."""
+        step = f"dt = {quantity(self.dt, 's')}"
+        if self.is_too_long:
+            yield f"{step}: longer than the contact of {quantity(self.steps_per_contact * self.dt, 's')}"
+        if self.failed:
+            yield f"{step}: {self.failure(phases)}"
+
+    def failure(self, phases: int) -> str:
+        """Explain why there is no restitution."""
+        status = self.status.replace("_", " ")
+        return f"{status} at {self.failed} of {phases} phases, {Status[self.status.upper()].meaning}"
 
     @property
     def cells(self) -> tuple[str, ...]:
@@ -174,6 +180,7 @@ class TimestepResult(Displayed):
     needed : for `tol`; None without one, or if no number of steps up to `MAX_STEPS_PER_CONTACT` is enough
     phases : number of phases of each row
     parameter, needed_parameter : what `tol` needs at a step, None if no value of the parameter is enough
+    rayleigh_time : the smaller one of the balls [s]; NaN where the law's stiffness does not follow from materials
     """
 
     model: str
@@ -188,6 +195,12 @@ class TimestepResult(Displayed):
     solved: Mapping[str, float] | None = None
     parameter: str = ""
     needed_parameter: NeededParameter | None = None
+    rayleigh_time: float = math.nan
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What a user has to know of the steps: one is longer than the contact, or some of its phases fail."""
+        return tuple(text for row in self.rows for text in row.warnings(self.phases))
 
     def as_dict(self) -> dict[str, Any]:
         """Convert to plain data; numbers that do not apply are NaN."""
@@ -200,23 +213,22 @@ class TimestepResult(Displayed):
         return [asdict(row) for row in self.rows]
 
     def sections(self, width: int) -> Iterator[Block]:
-        """Write the continuous law, a row for each step, the steps that fail, and the number of steps needed."""
+        """Write the continuous law, a row for each step, and the number of steps needed."""
         e = f"e = {number(self.e)}, " if self.e == self.e else ""
         e = "".join(f"{name} = {value!r}, " for name, value in self.solved.items()) if self.solved else e
         contact_time = quantity(self.contact_time, "s")
         yield f"{self.model}: {e}e_out = {number(self.e_continuous)} in a contact time of {contact_time}"
         yield f"scheme: {self.scheme}"
         yield ""
-        headings = ("steps per contact", "dt [s]", "e mean", "e least", "e largest", "e to ask")
-        yield Table([row.cells for row in self.rows], headings, text=())
-        failures = [row for row in self.rows if row.failed]
-        if failures:
-            yield ""
-        for row in failures:
-            count = (
-                f"{row.failed} of {self.phases} phases fail at {number(row.steps_per_contact)} steps per contact"
-            )
-            yield f"{count}; {Status[row.status.upper()].meaning}"
+        headings = ["steps per contact", "dt [s]", "e mean", "e least", "e largest", "e to ask"]
+        cells = [[*row.cells] for row in self.rows]
+        if self.rayleigh_time == self.rayleigh_time:
+            headings.insert(2, "dt / T_R")
+            for row, texts in zip(self.rows, cells, strict=True):
+                texts.insert(2, number(row.dt / self.rayleigh_time, 3))
+        yield Table(cells, headings, text=())
+        if self.rayleigh_time == self.rayleigh_time:
+            yield f"T_R = {quantity(self.rayleigh_time, 's', 4)}: the Rayleigh time of the smaller ball"
         if self.tol is None:
             return
         yield ""
@@ -309,18 +321,20 @@ def timestep(
         needed_parameter=None
         if parameter is None or tol is None
         else needed_parameter(point, plugin_set, parameter, given[0], tol, law, collision),
+        rayleigh_time=law.rayleigh_time,
     )
 
 
 @dataclass(frozen=True)
 class FixedStepLaw:
-    """One impact of a law, whose e, step and phase vary."""
+    """One impact of a law, whose e, step and phase vary; `rayleigh_time` is that of the smaller ball [s]."""
 
     model: ForceModel
     impact: Impacts
     contact_time: float
     phases: int
-    scheme: str = KICK_DRIFT
+    scheme: str
+    rayleigh_time: float
 
     @property
     def has_e(self) -> bool:
@@ -522,12 +536,16 @@ def time_parameter(config: Config, model: ForceModel) -> str:
     names = [name for name in names if name != model.damping]
     if len(names) == 1:
         return names[0]
-    if not {"K", f"{model.key}.K"}.isdisjoint(config.scalars):
+    if not _takes_moduli(config, model):
         return "K"
     materials = {str(config.scalars.get(f"material{ball}", config.scalars.get("material"))) for ball in "12"}
-    if model.stiffness is None or "E_eff" in arguments:
-        return f"materials.{materials.pop()}.E" if len(materials) == 1 else ""
-    return "K"
+    return f"materials.{materials.pop()}.E" if len(materials) == 1 else ""
+
+
+def _takes_moduli(config: Config, model: ForceModel) -> bool:
+    """Whether the stiffness of a law follows from Young's moduli."""
+    is_given = not {"K", f"{model.key}.K"}.isdisjoint(config.scalars)
+    return not is_given and (model.stiffness is None or "E_eff" in argument_names(model.stiffness))
 
 
 def fixed_step_law(
@@ -544,14 +562,12 @@ def fixed_step_law(
     status = Status(collision["status"])
     if status != Status.OK:
         raise UsageError(f"{model.key} has no rebound at these inputs: {status.meaning}")
-    return FixedStepLaw(model, impact, collision["contact_time"], phases, scheme), collision
+    wave_time = float(rayleigh_time_at(plan.inputs, ()).item()) if _takes_moduli(config, model) else math.nan
+    return FixedStepLaw(model, impact, collision["contact_time"], phases, scheme, wave_time), collision
 
 
 def time_steps(contact_time: float, steps_per_contact: Sequence[float], dt: Sequence[float]) -> list[float]:
     """List time steps [s], from numbers of steps per contact and from themselves."""
-    for value in steps_per_contact:
-        if not (math.isfinite(value) and value > 0.0):
-            raise UsageError(f"--steps-per-contact: got {number(value)}, expected a finite number > 0")
     steps = [*(contact_time / steps for steps in steps_per_contact), *dt]
     largest = contact_time / min(steps)
     if largest > MAX_STEPS_PER_CONTACT:

@@ -36,7 +36,7 @@ from ..results.calibration import (
     fit_rows,
 )
 from ..results.kinds import is_calibration, is_sensitivity
-from ..results.plausibility import material_notes, result_notes, with_depths
+from ..results.plausibility import input_notes, inputs_of, result_notes, with_depths
 from ..results.ranking import DEFAULT_TOL, Ranking, rank_models, rankable_parts
 from ..results.replay_command import describe_point
 from ..results.schema import FIT_STATUSES, count_points, exponents_of
@@ -108,7 +108,7 @@ def page(dataset: xr.Dataset, plugins: Sequence[ForceModel | str | Path] = ()) -
         keys = best[:BEST_MODELS]
     drawn, left_out = figures_of(dataset, keys, plugins)
     models = [_model_section(dataset.isel(model=index)) for index in range(dataset.sizes["model"])]
-    moduli = {str(name): dataset[name].values.tolist() for name in dataset.coords if str(name).endswith(".E")}
+    inputs = inputs_of(dataset)
     lines = str(dataset.attrs.get("config", "")).replace("\r\n", "\n").expandtabs(4).split("\n")
     return _template().render(
         title=_title(dataset),
@@ -117,7 +117,7 @@ def page(dataset: xr.Dataset, plugins: Sequence[ForceModel | str | Path] = ()) -
         studies=studies,
         index_headings=INDEX_HEADINGS,
         design=describe_design(dataset),
-        notes=[*material_notes(read_attribute(dataset.attrs, "materials"), moduli), *result_notes(summary)],
+        notes=[*(input_notes(inputs) if inputs else ()), *result_notes(summary)],
         outcomes=list(_outcomes(summary)),
         axes=[_axis_row(dataset[name]) for name in varying_inputs(dataset)],
         single_values=list(_single_values(dataset)),

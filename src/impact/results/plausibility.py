@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from ..contact.materials import sphere_mass
 from ..contact.status import Status
-from ..engine.build_impacts import smaller_radius_at
+from ..engine.build_impacts import property_at, smaller_radius_at, values_at
+from ..engine.inputs import Inputs
 from ..engine.trajectories import axes_of_arrays, probe_index
 from ..errors import ModelError, ResultError
-from ..formatting import number, safe_text
+from ..formatting import number, quantity, safe_text
 from .factored import read_inputs
 from .schema import parts_of_models
 from .slabs import MAX_SUMMARY_POINTS, is_computed, over_varying_dims, slabs
@@ -21,25 +25,50 @@ if TYPE_CHECKING:
 
 # Young's moduli outside these limits are probably in another unit: gels have 1e3 Pa, diamond has 1e12 Pa
 MIN_MODULUS_PA, MAX_MODULUS_PA = 1e3, 1e13
+# a mass and that of the sphere may differ by rounding of measured values
+MAX_MASS_DIFFERENCE = 0.01
 
 
-def material_notes(
-    materials: Mapping[str, Mapping[str, object]], axes: Mapping[str, Sequence[object]]
-) -> Iterator[str]:
-    """Yield a sentence for each material whose Young's modulus E [Pa], or a value of its axis, is implausible.
+def input_notes(inputs: Inputs) -> Iterator[str]:
+    """Yield a sentence for each material or ball with an implausible Young's modulus or mass.
 
-    >>> list(material_notes({"steel": {"E": 210.0}, "rubber": {"E": 5e6}}, {}))
-    ['materials.steel.E: got 210 Pa; did you mean 210 GPa?']
-    >>> list(material_notes({"glass": {"E": None}}, {"materials.glass.E": [6e10, 72.0]}))
-    ['materials.glass.E: got 72 Pa; did you mean 72 GPa?']
+    >>> from impact.contact.materials import Material
+    >>> materials = {"steel": Material(E=210.0, nu=0.3), "glass": Material(E=6e10, nu=0.2, rho=2500.0)}
+    >>> scalars = {"material1": "steel", "material2": "glass", "m2": 1.0, "R2": 0.02}
+    >>> for note in input_notes(Inputs(scalars, (), materials)):
+    ...     print(note)
+    materials.steel.E: got 210 Pa; did you mean 210 GPa?
+    m2: got 1 kg, but a sphere of R2 = 0.02 m and 2500 kg/m^3 has 0.08378 kg; without m2 the mass follows
     """
-    for name, material in materials.items():
-        for modulus in axes.get(f"materials.{name}.E", [material.get("E")]):
+    columns = {name: values for axis in inputs.axes for name, values in axis.columns.items()}
+    for name, material in inputs.materials.items():
+        for modulus in columns.get(f"materials.{name}.E", [material.E]):
             if isinstance(modulus, float) and (modulus < MIN_MODULUS_PA or modulus > MAX_MODULUS_PA):
                 too_small = modulus < MIN_MODULUS_PA
                 hint = f"did you mean {number(modulus)} GPa?" if too_small else "no material is as stiff"
                 yield f"materials.{safe_text(name)}.E: got {number(modulus)} Pa; {hint}"
                 break
+    for ball in "12":
+        if {f"m{ball}", f"R{ball}"} <= {*inputs.names()}:
+            yield from _mass_notes(inputs, ball)
+
+
+def _mass_notes(inputs: Inputs, ball: str) -> Iterator[str]:
+    """Say that the mass of a ball is not that of a sphere of its radius and density, where all three are given."""
+    index = probe_index(inputs)
+    mass, radius = (values_at(inputs, f"{name}{ball}", index) for name in "mR")
+    stated, R, density = np.broadcast_arrays(mass, radius, property_at(inputs, ball, "rho", index))
+    expected = sphere_mass(R, density)
+    # an infinite mass is a ball that is held; without a density that of a sphere is NaN, and contradicts none
+    with np.errstate(invalid="ignore"):
+        differs = np.isfinite(stated) & np.isfinite(R) & (np.abs(stated / expected - 1.0) > MAX_MASS_DIFFERENCE)
+    if differs.any():
+        first = int(np.argmax(differs))
+        size, rho = quantity(R.flat[first], "m", 4), quantity(density.flat[first], "kg/m^3", 4)
+        yield (
+            f"m{ball}: got {quantity(stated.flat[first], 'kg', 4)}, but a sphere of R{ball} = {size} and {rho} "
+            f"has {quantity(expected.flat[first], 'kg', 4)}; without m{ball} the mass follows"
+        )
 
 
 def result_notes(summary: Summary) -> Iterator[str]:
@@ -61,14 +90,23 @@ def with_depths(summary: Summary, dataset: xr.Dataset) -> Summary:
     return replace(summary, deep=depths.deep, deepest=depths.deepest)
 
 
+def inputs_of(dataset: xr.Dataset) -> Inputs | None:
+    """Read the inputs of a sweep from its result; None if it lacks some, as a part or a changed one may."""
+    try:
+        return read_inputs(dataset, [str(dim) for dim in dataset.sizes if dim != "model"])
+    except (ResultError, KeyError):
+        return None
+
+
 def _depth_summary(dataset: xr.Dataset) -> Summary:
     """Find `deep` and `deepest` from the radii, without models of more computed points than a summary has."""
     summary = Summary()
-    axes = [str(dim) for dim in dataset.sizes if dim != "model"]
+    inputs = inputs_of(dataset)
+    if inputs is None:
+        return summary
     try:
-        inputs = read_inputs(dataset, axes)
         varied = axes_of_arrays([smaller_radius_at(inputs, probe_index(inputs))])
-    except (ResultError, ModelError, KeyError):
+    except (ModelError, KeyError):
         # a part of a result, or one that was changed, may lack what the radii follow from
         return summary
     radius_dims = [axis.name for number, axis in enumerate(inputs.axes) if number in varied]

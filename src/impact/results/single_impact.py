@@ -42,10 +42,11 @@ from ..display import Block, Displayed, Table
 from ..engine.build_impacts import build_impacts, build_oblique, fixed_steps_at
 from ..engine.plan import Plan
 from ..engine.plugins import Plugins, read_plugins
-from ..errors import ConfigError, UsageError, did_you_mean
+from ..errors import ConfigError, UsageError, did_you_mean, warn
 from ..formatting import number, quantity, safe_text
 from .calibration import fitted_config, position_of_law
 from .kinds import is_calibration, require_sweep
+from .plausibility import input_notes
 from .provenance import changed_plugins, stored_config, stored_draft, unknown_plugins
 from .schema import SCHEMA_VERSION, attributes_of, is_case, plain_unit
 from .seal import is_result
@@ -603,7 +604,10 @@ def single_point(
     for name in fixed:
         if is_case(name) and name not in {axis.numbered for axis in config.axes}:
             raise _unknown_input(draft, name)
-    return _without_axes(config, {**labels, **fixed}, over)
+    config, defaulted = _without_axes(config, {**labels, **fixed}, over)
+    for note in input_notes(Plan(config).inputs):
+        warn(note)
+    return config, defaulted
 
 
 def _without_default_masses(draft: Draft, fixed: Mapping[str, object]) -> Draft:

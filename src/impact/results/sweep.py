@@ -31,7 +31,7 @@ from ..errors import ResultError, StoreError, UnfinishedError, UsageError, warn
 from .layouts import LAYOUTS, FillSlab
 from .netcdf import MAX_LABEL_BYTES, encode_text, is_text
 from .outcome import SweepOutcome
-from .plausibility import material_notes, result_notes, with_depths
+from .plausibility import input_notes, result_notes, with_depths
 from .schema import dataset_template, plan_coordinates, stored_variables
 from .summary import summarize
 from .trajectory_table import TrajectoryTable, in_memory, lazy_dataset, table_of_ranges
@@ -231,9 +231,7 @@ def prepare(
     plan = Plan(config, plugin_set.of(config.models))
     name = str(source) if isinstance(source, Path) else "config"
     plan.check_count(run.max_points, name)
-    columns = {name: values for axis in config.axes for name, values in axis.columns.items()}
-    notes = [*material_notes(plan.material_record, columns), *plan.pair_notes(f"{name}: frictions")]
-    for note in notes:
+    for note in (*input_notes(plan.inputs), *plan.pair_notes(f"{name}: frictions")):
         run.on_note(note)
     return plan
 
