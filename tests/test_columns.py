@@ -97,6 +97,14 @@ def test_a_mapping_and_a_data_frame_have_the_bits_of_a_file() -> None:
         assert values(measurements({"columns": columns})) == EXPECTED
 
 
+def test_a_table_of_excel_may_be_in_windows_1252(folder: Path) -> None:
+    text = DIALECTS["semicolon"].replace("\n", ";Prüfer °\n", 1)
+    first, *rows = text.splitlines()
+    text = "\n".join([first, *(f"{row};Jürgen" if row else row for row in rows)])
+    (folder / "a.csv").write_bytes(text.encode("cp1252"))
+    assert values(measurements({"file": "a.csv"})) == EXPECTED
+
+
 def test_every_reader_of_columns_knows_the_dialects(folder: Path) -> None:
     text = "v1 (cm/s);m1 [g]\n# two cases\n12,5;2,5\n25;5\n"
     (folder / "cases.csv").write_text("\ufeff" + text, encoding="utf-8")
@@ -220,9 +228,9 @@ REFUSED = {
         'a.csv:2: got a number with ".", expected ","',
     ),
     "another encoding": (
-        "v1 [m/s];e_out;Prüfer\n1;1;1\n".encode("cp1252"),
+        "v1 [m/s];e_out;Prüfer\n1;1;1\n".encode("utf-16"),
         {},
-        "a.csv:1: not UTF-8: byte 0xfc; save it as UTF-8",
+        "a.csv:1: not UTF-8: byte 0xff; save it as UTF-8",
     ),
     "no such header": (
         V + "1,1\n",

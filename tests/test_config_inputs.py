@@ -177,7 +177,8 @@ BAD_CSV = [
     ("", ["cases.csv: empty, expected a CSV file"]),
     ("v1,m1" + C, ["cases.csv: got 1 lines, expected a line of names and at least one of values"]),
     ('v1,m1\n"1,2\n', ["cases.csv:2: not CSV: unexpected end of data"]),
-    (b"v1\n\xff\n", ["cases.csv:2: not UTF-8: byte 0xff; save it as UTF-8"]),
+    (b"v1\n\xff\n", ['cases.csv:2: v1: got "\u00ff", expected a finite number of m/s, bare or with a unit, such as "1 m/s"']),
+    (b"v1\n\x81\n", ["cases.csv:2: not UTF-8: byte 0x81; save it as UTF-8"]),
     ("#" * 2_000_001, ["cases.csv: larger than 2,000,000 bytes"]),
 ]  # fmt: skip
 

@@ -46,7 +46,10 @@ def file_hint(path: Path, content: bytes) -> str:
 
 
 def read_text(path: Path, kind: str = "TOML", most: int = MAX_CONFIG_BYTES) -> str:
-    """Read a regular file of UTF-8 text that is not empty or too large, or raise a ConfigError."""
+    """Read a regular file of text that is not empty or too large, or raise a ConfigError.
+
+    The text is in UTF-8, that of a table also in Windows-1252.
+    """
     name = str(path)
     try:
         if path.exists() and not path.is_file():
@@ -69,6 +72,10 @@ def read_text(path: Path, kind: str = "TOML", most: int = MAX_CONFIG_BYTES) -> s
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
+        # a "CSV" of Excel in western Europe; zeros are those of UTF-16 or of a file that is no text
+        if kind == "CSV" and b"\0" not in content:
+            with contextlib.suppress(UnicodeDecodeError):
+                return content.decode("cp1252")
         line = content.count(b"\n", 0, error.start) + 1
         hint = "; save it as UTF-8" if kind == "CSV" else ""
         raise ConfigError(f"{name}:{line}: not UTF-8: byte 0x{content[error.start]:02x}{hint}") from None
