@@ -1,7 +1,8 @@
 """Time of fits and solves after the imports, next to that of another source tree.
 
 Fits one law with one parameter to twelve points, and twenty laws to fifty points; solves for two parameters.
-Prints the CPU seconds of each, and with `--against` those of the other tree in the same run.
+Prints the CPU seconds of each, and with `--against` those of the other tree in the same run. Then times calls of a
+prepared problem next to `impact.run` and a loop of solve_ivp, and a call with an array next to a sweep.
 
     python scripts/bench_inverse.py [--against OTHER/src]
 """
@@ -19,6 +20,7 @@ from typing import Any
 import numpy as np
 
 import impact
+from bench_core import solve_ivp_restitution
 
 # laws that take an e, and two with a parameter of their own
 LAWS = [
@@ -96,12 +98,38 @@ def measure() -> None:
         print(f"{name:32}{time.process_time() - start:8.2f} s")
 
 
+def measure_calls(calls: int = 200, size: int = 1_000_000) -> None:
+    """Print milliseconds of one impact by each means, and seconds of many at once, for a law that depends on e."""
+    law = impact.models()["gharib-hurmuzlu-2012"]
+    problem = impact.prepare(model=law.key, outputs="e_out")
+    ways = {
+        "prepared problem": lambda e: problem(e=e)["e_out"],
+        "impact.run": lambda e: impact.run(model=law.key, at={"e": e}).values["e_out"],
+        "solve_ivp, rtol 1e-10": lambda e: solve_ivp_restitution(law, e, 1e-10),
+    }
+    values = np.linspace(0.3, 0.9, calls).tolist()
+    expected = problem(e=values)["e_out"]
+    for name, way in ways.items():
+        start = time.perf_counter()
+        difference = np.abs(np.array([way(e) for e in values]) - expected).max()
+        each = 1e3 * (time.perf_counter() - start) / calls
+        print(f"{name:32}{each:8.2f} ms an impact, e_out within {difference:.1e} of the array's")
+    many = np.linspace(0.01, 1.0, size)
+    sweep = {"v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 1e9, "e": many}
+    config = {"models": law.key, "sweep": sweep, "output": {"variables": ["e_out"]}}
+    for name, run in {"prepared": lambda: problem(e=many), "sweep": lambda: impact.sweep(config).load()}.items():
+        start = time.perf_counter()
+        run()
+        print(f"{name}, {size:,} impacts{time.perf_counter() - start:16.2f} s")
+
+
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--against", help="source tree of another version")
     arguments = parser.parse_args()
     print(impact.__file__, flush=True)
     measure()
+    measure_calls()
     if arguments.against:
         environment = {**os.environ, "PYTHONPATH": arguments.against}
         subprocess.run([sys.executable, __file__], env=environment, check=True)

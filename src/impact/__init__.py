@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from .exporters.environment import Environment as Environment, doctor as doctor
     from .exporters.export import Export as Export, export as export, export_codes as export_codes
     from .inverse.calibrate import calibrate as calibrate
+    from .inverse.prepared import PreparedProblem as PreparedProblem, prepare as prepare
     from .inverse.solve import SolveResult as SolveResult, solve as solve
     from .inverse.timestep import TimestepResult as TimestepResult, timestep as timestep
     from .plots.draw import plot as plot
@@ -71,6 +72,7 @@ _MODULES = {
     "ModelError": "errors",
     "Models": "engine.model_catalogue",
     "Parameter": "contact.model",
+    "PreparedProblem": "inverse.prepared",
     "Ranking": "results.ranking",
     "ResultError": "errors",
     "SolveResult": "inverse.solve",
@@ -103,6 +105,7 @@ _MODULES = {
     "plot": "plots.draw",
     "plot_to_files": "plots.files",
     "power": "contact.powers",
+    "prepare": "inverse.prepared",
     "progress_bar": "progress_display",
     "recommend": "results.ranking",
     "report": "reporting.page",

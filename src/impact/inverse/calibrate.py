@@ -16,22 +16,17 @@ import xarray as xr
 from ..array_types import Array
 from ..atomic import check_outputs, write_file
 from ..config.files import override_text
-from ..config.grid import Axis
 from ..config.input_names import InputName
 from ..config.load import Config, parse_config, read_config
 from ..config.measurements import fitted_parameters
 from ..config.quantities import Quantity, middle_of
-from ..config.tables import Solver
 from ..contact.friction import Pair
 from ..contact.interpolant import InterpolatedCollisions, motion_key
 from ..contact.model import ForceModel
-from ..contact.output_formulas import collide
 from ..contact.simulate import ComputeCollisions
 from ..contact.units import dimension
-from ..engine.build_impacts import build_impacts, build_oblique
 from ..engine.execute import WorkerContext, context_of, models_of_context
 from ..engine.executors import choose_executor
-from ..engine.inputs import Inputs
 from ..engine.plan import Plan
 from ..engine.plugins import Plugins, read_plugins
 from ..engine.trajectories import PlanLaw, model_of
@@ -41,6 +36,7 @@ from ..results.schema import FIT_STATUSES
 from ..results.xarray_backend import save
 from .batched_solvers import VectorFunction
 from .fit import Bounds, DataPoints, Fit, FitProblem, fit_all
+from .prepared import interpolated, outputs_at
 from .solve import SolveProblem, unknown_of
 
 # points of the curve of each law over an input
@@ -185,31 +181,12 @@ def prediction(
     `impact.contact.simulate.simulate`.
     """
     assert config.data is not None
-    outputs, model = tuple(config.data.outputs), model_of(law)
-    scalars = {name: value for name, value in config.scalars.items() if name not in (*names, *inputs)}
-    solver = config.solver
+    outputs = tuple(config.data.outputs)
 
     def predict(rows: Array) -> Array:
         columns = {name: np.tile(values, len(rows)) for name, values in inputs.items()}
         columns |= {name: np.repeat(values, points) for name, values in zip(names, rows.T, strict=True)}
-        # the values are arrays here, for speed
-        columns["trial"] = np.arange(len(rows) * points)
-        axis = Axis(columns, numbered="trial")  # type: ignore[arg-type]
-        swept = Inputs(scalars, (axis,), config.materials)
-        impacts = build_impacts(swept, model, swept.index()).broadcast()
-        oblique = None
-        if isinstance(law, Pair):
-            oblique = law, build_oblique(swept, impacts, swept.index(), law.friction)
-        collisions = collide(
-            model,
-            impacts,
-            rtol=solver.rtol,
-            max_steps=solver.max_steps,
-            core=core_of(solver),
-            names=outputs,
-            oblique=oblique,
-            compute=compute,
-        )
+        collisions = outputs_at(config, law, columns, outputs, compute)
         # a law on which no column has an effect has one trajectory
         shape = len(rows) * points
         return np.concatenate(
@@ -250,30 +227,13 @@ def fit_laws(config: Config) -> dict[str, FittedLaw]:
     for key, law in laws.items():
         problem = FitProblem(key, _bounds(config, names[key]), points, f"{key}, integrated")
         problems.append(problem)
-        compute = _interpolated(config, law, shared)
+        compute = interpolated(config, law, tuple(data.outputs))
+        if compute is not None:
+            compute = shared.setdefault(motion_key(model_of(law)), compute)
         functions[problem.key] = prediction(config, law, names[key], data.inputs, len(data.lines), compute)
         functions[problem.final_key] = _with_curve(config, law, names[key], varied)
     fits = fit_all(problems, functions)
     return {key: FittedLaw(names[key], fit, _curve(config, fit)) for key, fit in zip(laws, fits, strict=True)}
-
-
-def core_of(solver: Solver) -> str:
-    """Choose the core of fits: NumPy unless the config names numba."""
-    return "numba" if solver.core == "numba" else "numpy"
-
-
-def _interpolated(
-    config: Config, law: PlanLaw, shared: dict[object, InterpolatedCollisions]
-) -> InterpolatedCollisions | None:
-    """Interpolate the collisions of a law, together with others of the same motion; None with friction."""
-    assert config.data is not None
-    if isinstance(law, Pair):
-        return None
-    solver, outputs = config.solver, tuple(config.data.outputs)
-    interpolated = InterpolatedCollisions(
-        law, outputs, rtol=solver.rtol, max_steps=solver.max_steps, core=core_of(solver)
-    )
-    return shared.setdefault(motion_key(law), interpolated)
 
 
 def _bounds(config: Config, names: Sequence[str]) -> Bounds:

@@ -1,0 +1,227 @@
+"""Prepared problems: the outputs of a law as a function of its inputs, without config or file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from ..array_types import Array
+from ..config.files import read_number, to_plain_data
+from ..config.grid import Axis
+from ..config.input_names import InputName
+from ..config.load import Config
+from ..config.quantities import Quantity
+from ..config.tables import MATERIAL_QUANTITIES, law_quantities
+from ..contact.fixed_step import EXACT
+from ..contact.friction import FrictionLaw, Pair
+from ..contact.interpolant import InterpolatedCollisions
+from ..contact.model import ForceModel
+from ..contact.output_formulas import Outputs, collide
+from ..contact.simulate import ComputeCollisions
+from ..contact.variables import CENTRAL_OUTPUTS, OUTPUTS
+from ..engine.build_impacts import build_impacts, build_oblique
+from ..engine.inputs import Inputs
+from ..engine.plan import Plan
+from ..engine.plugins import read_plugins
+from ..engine.trajectories import PlanLaw, model_of
+from ..errors import UsageError, did_you_mean
+from ..results.single_impact import open_source, single_point
+
+# inputs that a config may leave to others: masses and radii follow from each other, K from materials
+DERIVED = ("m1", "m2", "R1", "R2", "K")
+
+
+def core_of(config: Config) -> str:
+    """Choose the core of a few trajectories at a time: NumPy unless the config names numba."""
+    return "numba" if config.solver.core == "numba" else "numpy"
+
+
+def interpolated(config: Config, law: PlanLaw, outputs: Sequence[str]) -> InterpolatedCollisions | None:
+    """Interpolate the collisions of a law; None with friction, which has kinks."""
+    if isinstance(law, Pair):
+        return None
+    solver = config.solver
+    return InterpolatedCollisions(law, outputs, rtol=solver.rtol, max_steps=solver.max_steps, core=core_of(config))
+
+
+def outputs_at(
+    config: Config,
+    law: PlanLaw,
+    columns: Mapping[str, Array],
+    names: Sequence[str],
+    compute: ComputeCollisions | None = None,
+) -> Outputs:
+    """Compute outputs of a law at arrays of inputs by config name, all of one length; others are of a config.
+
+    An output is of that length, or of length 1 if no column has an effect; NaN where the law has no result.
+    `compute` is that of `impact.contact.simulate.simulate`.
+    """
+    size = len(next(iter(columns.values()))) if columns else 1
+    scalars = {name: value for name, value in config.scalars.items() if name not in columns}
+    # the values are arrays here, for speed
+    axis = Axis({**columns, "trial": np.arange(size)}, numbered="trial")  # type: ignore[dict-item]
+    swept, model = Inputs(scalars, (axis,), config.materials), model_of(law)
+    impacts = build_impacts(swept, model, swept.index()).broadcast()
+    oblique = None
+    if isinstance(law, Pair):
+        oblique = law, build_oblique(swept, impacts, swept.index(), law.friction)
+    return collide(
+        model,
+        impacts,
+        rtol=config.solver.rtol,
+        max_steps=config.solver.max_steps,
+        core=core_of(config),
+        names=names,
+        oblique=oblique,
+        compute=compute,
+    )
+
+
+@dataclass(frozen=True)
+class PreparedProblem:
+    """The outputs of a law as a function of its inputs; call it with values or arrays of those that change.
+
+    A call takes inputs by config name, numbers or arrays that broadcast against each other, bare or with units;
+    a parameter of the law needs no key of it. The others are those of the config. It returns a dict of `outputs`
+    and of their statuses: floats, or arrays of the shape of the inputs; NaN where the law has no result.
+
+    Parameters
+    ----------
+    config : of a single impact
+    law : the model, or its pair with a friction law
+    outputs : names of outputs, such as "e_out"
+    """
+
+    config: Config
+    law: PlanLaw
+    outputs: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        return f"<PreparedProblem {self.law.key}>"
+
+    def __call__(self, values: Mapping[str, Any] | None = None, /, **more: Any) -> dict[str, Any]:
+        """Compute the outputs; `values` takes names that are no Python words, such as "materials.steel.E"."""
+        given = {**(values or {}), **more}
+        read = dict(self._read(name, value) for name, value in given.items())
+        try:
+            shape = np.broadcast_shapes(*(column.shape for column in read.values()))
+        except ValueError:
+            shapes = ", ".join(f"{name} {column.shape}" for name, column in read.items())
+            raise UsageError(f"got the shapes {shapes}, expected shapes that broadcast") from None
+        columns = {name: np.broadcast_to(column, shape).ravel() for name, column in read.items()}
+        names = (*self.outputs, *self._statuses)
+        collisions = outputs_at(self.config, self.law, columns, names, self._collisions)
+        result = {}
+        for name in names:
+            array = np.broadcast_to(collisions[name], int(np.prod(shape))).reshape(shape)
+            result[name] = array.copy() if shape else array.item()
+        return result
+
+    @cached_property
+    def _collisions(self) -> InterpolatedCollisions | None:
+        """What polynomials replace, from one call to the next."""
+        return interpolated(self.config, self.law, self.outputs)
+
+    @property
+    def _statuses(self) -> list[str]:
+        """The names of the statuses of the outputs."""
+        names = ["status", *(OUTPUTS[name].status for name in self.outputs)]
+        return [name for name in dict.fromkeys(names) if name not in self.outputs]
+
+    @cached_property
+    def _quantities(self) -> dict[str, tuple[str, Quantity]]:
+        """The inputs that a call may have: their names in the config and what they may be, by name."""
+        scalars = self.config.scalars
+        model = model_of(self.law)
+        laws: dict[str, ForceModel | FrictionLaw] = {"model": model}
+        if isinstance(self.law, Pair):
+            laws["friction"] = self.law.friction
+        # what the config has, and what replaces what the law derives from it
+        names = [InputName.parse(name) for name in (*scalars, *DERIVED, *(() if "alpha" in scalars else ("e",)))]
+        names += [
+            InputName("materials", name, key) for name in self.config.materials for key in MATERIAL_QUANTITIES
+        ]
+        of_laws = [InputName(table, law.key, key) for table, law in laws.items() for key in law_quantities(law)]
+        quantities = {
+            name: name.quantity({law.key: law for law in self.config.models}) for name in (*names, *of_laws)
+        }
+        known = {str(name): (str(name), quantity) for name, quantity in quantities.items() if quantity is not None}
+        if model.exponent is not None:
+            known.pop("n", None)
+        short = {name.key: known[str(name)] for name in of_laws if name.key != "K" or str(name) in scalars}
+        return {**known, **short}
+
+    def _read(self, name: str, value: Any) -> tuple[str, Array]:
+        """Read the values of an input, with its name in the config."""
+        known = self._quantities.get(str(InputName.parse(name)))
+        if known is None:
+            raise UsageError(f'no input "{name}" of this law; {did_you_mean(name, list(self._quantities))}')
+        full_name, quantity = known
+        if isinstance(value, float) and quantity.allows(value):
+            return full_name, np.array(value)
+        plain, _ = to_plain_data(value)
+        try:
+            array = np.asarray(plain, dtype=float)
+            if quantity.allows(array.min()) and quantity.allows(array.max()):
+                return full_name, array
+        except (TypeError, ValueError):
+            # texts, or no value at all
+            pass
+        items = np.array(plain, object)
+        if not items.size:
+            raise UsageError(f"{name}: got no value, expected one or more")
+        numbers = [read_number(item, quantity, name) for item in items.ravel().tolist()]
+        return full_name, np.reshape(numbers, items.shape)
+
+
+def prepare(
+    source: str | Path | Mapping[str, object] | xr.Dataset | None = None,
+    *,
+    model: str | None = None,
+    friction: str | None = None,
+    at: Mapping[str, float | str] | None = None,
+    outputs: str | Sequence[str] | None = None,
+    overrides: Sequence[str] = (),
+    plugins: Sequence[ForceModel | str | Path] = (),
+) -> PreparedProblem:
+    """Prepare the outputs of a law as a function of its inputs, for a fit, a sampler or an optimiser.
+
+    Where the motion of the law depends on one dimensionless number, Chebyshev polynomials that agree with the
+    integration to 1e-10 replace it from the second call on; elsewhere each call integrates.
+
+    Parameters
+    ----------
+    source, model, friction, at, overrides, plugins : see `impact.run`
+    outputs : names of the outputs to compute; by default all of the law
+
+    Returns
+    -------
+    PreparedProblem : call it with inputs by name; it returns outputs in SI by name, floats or arrays
+
+    Raises
+    ------
+    ConfigError, UsageError, ModelError, ResultError : the source, a plug-in, a name or a value is invalid
+
+    >>> import impact
+    >>> problem = impact.prepare(model="gharib-hurmuzlu-2012")
+    >>> round(problem(e=0.5)["e_out"], 6), problem(e=[0.25, 0.5])["e_out"].round(6).tolist()
+    (0.41072, [0.165302, 0.41072])
+    """
+    plugin_set = read_plugins(plugins)
+    config, _ = single_point(open_source(source, overrides, plugin_set), model, at, friction=friction)
+    if config.solver.integrator != EXACT:
+        raise UsageError(f'prepare: got the integrator "{config.solver.integrator}", expected "{EXACT}"')
+    law = Plan(config, plugin_set.of(config.models)).laws[-1]
+    known = [*CENTRAL_OUTPUTS] if isinstance(law, ForceModel) else [*OUTPUTS]
+    known = [name for name in known if OUTPUTS[name].dtype == "f8" and "model" in OUTPUTS[name].dims]
+    names = [outputs] if isinstance(outputs, str) else known if outputs is None else list(outputs)
+    for name in names:
+        if name not in known:
+            raise UsageError(f'outputs: no output "{name}" of this law; {did_you_mean(name, known)}')
+    return PreparedProblem(replace(config, axes=()), law, tuple(names))

@@ -1,0 +1,110 @@
+"""A prepared problem gives what a run gives, for numbers and arrays, with and without friction."""
+
+from __future__ import annotations
+
+import pickle
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pint
+import pytest
+
+import impact
+from impact.contact.interpolant import CHECK_TOLERANCE
+
+unit = pint.UnitRegistry()
+BALLS: dict[str, Any] = {"v1": 1.0, "m1": 1.0, "m2": 2.0, "R1": 0.01, "R2": 0.02, "K": 1e9, "e": 0.5}
+FRICTION = {"models": "hertz", "frictions": "coulomb-1785", "sweep": {**BALLS, "u1": 0.3, "mu": 0.2}}
+# a model of which one, two and no dimensionless numbers vary, with the inputs that vary
+CASES = {
+    "kuwabara-kono-1987": {"A": (1e-5, 3e-5), "v1": (0.5, 2.0)},
+    "tsuji-1992": {"e": (0.2, 0.9), "m2": (0.5, 3.0)},
+    "simbody-hunt-crossley": {"c": (0.1, 1.0), "v1": (0.5, 2.0)},
+    "hertz": {"v1": (0.5, 2.0), "K": (1e8, 1e10)},
+}
+
+
+@pytest.mark.parametrize("model", CASES)
+def test_a_prepared_problem_gives_what_a_run_gives(model: str) -> None:
+    spans = CASES[model]
+    config = {"models": model, "sweep": BALLS}
+    own = {name: span[0] for name, span in spans.items() if name not in BALLS}
+    if own:
+        config["model"] = {model: own}
+    problem = impact.prepare(config)
+    generator = np.random.default_rng(7)
+    points = {name: generator.uniform(*span, 5) for name, span in spans.items()}
+    together = problem(points)
+    for position in range(5):
+        point = {name: float(values[position]) for name, values in points.items()}
+        expected = impact.run(config, at=point).values
+        for got in (problem(**point), {name: values[position] for name, values in together.items()}):
+            for name in ("e_out", "v1_post", "peak_indentation", "peak_force", "contact_time"):
+                assert got[name] == pytest.approx(expected[name], rel=10 * CHECK_TOLERANCE), name
+            assert got["status"] == 1
+
+
+def test_a_pair_with_friction_gives_what_a_run_gives() -> None:
+    problem = impact.prepare(FRICTION, outputs=("beta", "e_out"))
+    got = problem(mu=[[0.05], [0.2]], u1=[0.1, 0.3, 0.9])
+    assert got["beta"].shape == got["friction_status"].shape == (2, 3)
+    expected = impact.run(FRICTION, at={"mu": 0.05, "u1": 0.9}).values
+    assert got["beta"][0, 2] == pytest.approx(expected["beta"], rel=1e-12)
+    assert got["beta"][0, 2] != got["beta"][1, 2]
+
+
+@pytest.mark.parametrize(
+    "half", ["50 %", np.float32(0.5), 0.5 * unit.dimensionless, pd.Series([0.5]), np.array([[0.5]]), [0.5]]
+)
+def test_inputs_are_those_of_any_library(half: Any) -> None:
+    problem = impact.prepare(model="tsuji-1992", outputs="e_out")
+    e = problem(e=half, v1="100 cm/s")["e_out"]
+    assert np.shape(e) == np.shape(getattr(half, "magnitude", half))
+    assert float(np.ravel(e)[0]) == pytest.approx(0.5, rel=1e-9)
+
+
+def test_a_problem_without_changes_is_the_impact_of_the_config_and_can_be_pickled() -> None:
+    problem = impact.prepare(model="gharib-hurmuzlu-2012", at={"e": 0.5})
+    expected = impact.run(model="gharib-hurmuzlu-2012", at={"e": 0.5}).values["e_out"]
+    assert problem()["e_out"] == pytest.approx(expected, rel=1e-14)
+    problem(e=[0.2, 0.4])
+    copy = pickle.loads(pickle.dumps(problem))
+    assert copy(e=0.3)["e_out"] == problem(e=0.3)["e_out"]
+    assert problem({"materials.table1.E": "70 GPa"})["contact_time"] < problem()["contact_time"]
+
+
+def test_where_there_is_no_rebound_outputs_are_nan() -> None:
+    got = impact.prepare(model="tsuji-1992")(v1=[1.0, -1.0])
+    assert (got["status"].tolist(), np.isnan(got["e_out"]).tolist()) == ([1, 2], [False, True])
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"w1": 1.0}, 'no input "w1" of this law; known: K, R1, R2, e, m1, m2, '),
+        ({"e": 2}, "e: got 2.0, expected a number from 0 to 1"),
+        ({"e": "half"}, 'e: got "half", expected a number from 0 to 1'),
+        ({"e": []}, "e: got no value, expected one or more"),
+        ({"e": None}, "e: got nothing, expected a number from 0 to 1"),
+        ({"e": [0.1, np.nan]}, "e: got nan, expected a number from 0 to 1"),
+        (
+            {"e": [0.1, 0.2], "v1": [1.0, 2.0, 3.0]},
+            "got the shapes e (2,), v1 (3,), expected shapes that broadcast",
+        ),
+        ({"angle": 0.1}, 'no input "angle" of this law; '),
+        ({"gharib-hurmuzlu-2012.K": 1e9}, 'no input "gharib-hurmuzlu-2012.K" of this law; '),
+    ],
+)
+def test_an_input_that_is_none_is_refused(values: dict[str, Any], message: str) -> None:
+    problem = impact.prepare(model="tsuji-1992", outputs="e_out")
+    with pytest.raises(impact.UsageError) as refusal:
+        problem(values)
+    assert message in str(refusal.value)
+
+
+def test_an_output_that_the_law_lacks_is_refused() -> None:
+    with pytest.raises(impact.UsageError, match='no output "beta" of this law'):
+        impact.prepare(model="hertz", outputs="beta")
+    with pytest.raises(impact.UsageError, match='got the integrator "kick-drift", expected "exact"'):
+        impact.prepare({"models": "hertz", "sweep": {**BALLS, "dt": 1e-6}, "solver": {"integrator": "kick-drift"}})
