@@ -69,9 +69,7 @@ def test_a_range_and_lengths_with_units_are_axes() -> None:
     assert speeds["m1"].values.tolist() == [0.001, 0.002]
 
 
-@pytest.mark.parametrize(
-    "source", [None, [1], pd.DataFrame({"e": [0.1]}), b"x", 5], ids=lambda v: type(v).__name__
-)
+@pytest.mark.parametrize("source", [(), [1], pd.DataFrame({"e": [0.1]}), b"x", 5], ids=lambda v: type(v).__name__)
 def test_another_type_is_named(source: object) -> None:
     with pytest.raises(impact.UsageError, match=f"^source: got a {type(source).__name__}, expected a mapping"):
         impact.sweep(source)  # type: ignore[arg-type]
@@ -176,3 +174,33 @@ def test_columns_of_cases_may_have_units() -> None:
     cases = pd.DataFrame([[0.5, 100.0, 1.0, 1.0, 6e9], [0.5, 200.0, 1.0, 1.0, 6e9]], columns=names)
     swept = impact.sweep({"models": ["hertz"], "sweep": {"cases": cases}})
     assert swept["v1"].values.tolist() == [0.1, 0.2]
+
+
+def test_a_sweep_takes_its_inputs_by_name() -> None:
+    """Without a source the others are those of the starter config; with one they are changes of it."""
+    here = impact.sweep(models="tsuji-1992", e=np.array([0.25, 0.5]), v1="50 cm/s", overrides={"sweep.m2": 2.0})
+    expected = impact.run(model="tsuji-1992", at={"e": 0.25, "v1": 0.5, "m2": 2.0}).values
+    assert here["v1_post"].sel(e=0.25).item() == pytest.approx(expected["v1_post"], rel=1e-9)
+    assert (
+        impact.sweep(BASE, e=0.5)["e_out"].values.tolist()
+        == impact.sweep(BASE)["e_out"].sel(e=0.5).values.tolist()
+    )
+    assert dict(impact.sweep(models="hertz", frictions="coulomb-1785", e=0.5, u1=0.3, mu=[0.1, 0.2]).sizes) == {
+        "model": 1,
+        "friction": 1,
+        "mu": 2,
+    }
+
+
+@pytest.mark.parametrize(
+    ("inputs", "message"),
+    [
+        ({"overide": ["a"]}, "overide: sweep.overide: unknown key; known: K, "),
+        ({"e": 2}, "e: sweep.e: got 2, expected a number from 0 to 1"),
+        ({"models": "hert"}, 'models: models: got "hert", expected a model; did you mean "hertz"?'),
+    ],
+)
+def test_an_input_that_is_none_is_refused(inputs: dict[str, Any], message: str) -> None:
+    with pytest.raises(impact.ConfigError) as refusal:
+        impact.sweep(**inputs)
+    assert message in str(refusal.value)

@@ -56,4 +56,5 @@ def test_the_roots_are_those_of_a_scan(case: int) -> None:
     for root in inside:
         index = min(int(np.searchsorted(values, root)), SCANNED - 1)
         near = np.abs(distance[max(index - 1, 0) : index + 1])
-        assert near.min() <= 1e-3 * abs(target), (key, output, target, root)
+        # where an output falls to zero, values that are as good as zero are roots
+        assert near.min() <= 1e-3 * abs(target) + 1e-8, (key, output, target, root)

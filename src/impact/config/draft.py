@@ -34,6 +34,7 @@ from .input_names import InputName, input_values
 from .lines import MAX_PROBLEM_LINES, key_lines, path_text
 from .material_library import library
 from .quantities import VALUE_FORMS, ConfigProblem, KeyPath
+from .starter import STARTER_CONFIG
 from .tables import MATERIAL_KEYS, SWEEP_DEFAULTS, SWEEP_QUANTITIES, Loss, Noise, expand_frictions, expand_models
 
 # keys of [sweep] that arrange inputs
@@ -66,15 +67,16 @@ class Setting:
         return self.text or override_text(self.path, to_plain_data(self.value)[0])
 
 
-def settings_of(overrides: str | Iterable[str] | Mapping[str, object]) -> list[Setting]:
-    """Read changes of a config: texts PATH=VALUE, or values by path.
+def settings_of(overrides: str | Iterable[str | Setting] | Mapping[str, object]) -> list[Setting]:
+    """Read changes of a config: texts PATH=VALUE, values by path, or settings.
 
     >>> [setting.override for setting in settings_of({"sweep.e": [0.5, 1.0], "models": "hertz"})]
     ['sweep.e=[0.5, 1.0]', 'models="hertz"']
     """
     if isinstance(overrides, Mapping):
         return [Setting(read_override(f"{path}=")[0], value, f"--set {path}") for path, value in overrides.items()]
-    return [Setting.parse(text) for text in ([overrides] if isinstance(overrides, str) else overrides)]
+    items = [overrides] if isinstance(overrides, str) else overrides
+    return [item if isinstance(item, Setting) else Setting.parse(item) for item in items]
 
 
 @dataclass(frozen=True)
@@ -236,8 +238,13 @@ def _library_setting(name: str, without: Iterable[str] = ()) -> Setting:
     return Setting(path, properties, f"--set {text}", text)
 
 
-def open_config(source: Path | Mapping[str, object], plugins: Sequence[ForceModel] = ()) -> Draft:
-    """Open the config of a TOML file or a mapping, in which names of files are relative to its folder."""
+def open_config(source: Path | Mapping[str, object] | None, plugins: Sequence[ForceModel] = ()) -> Draft:
+    """Open the config of a TOML file or a mapping, in which names of files are relative to its folder.
+
+    None is the starter config.
+    """
+    if source is None:
+        return open_text(STARTER_CONFIG.read_text(encoding="utf-8"), "starter", plugins)
     if not isinstance(source, Mapping):
         if not isinstance(source, str | Path):
             raise UsageError(

@@ -67,15 +67,16 @@ class Config:
 
 
 def read_config(
-    source: Path | Mapping[str, object],
-    overrides: Sequence[str] = (),
+    source: Path | Mapping[str, object] | None,
+    overrides: Sequence[str | Setting] = (),
     plugins: Sequence[ForceModel] = (),
     max_points: int = MAX_POINTS,
     purpose: Purpose = "sweep",
 ) -> Config:
     """Read the config of a TOML file or a mapping, with overrides such as "sweep.e.linspace=[0,1,11]".
 
-    The names of CSV files are relative to the folder of the TOML file, or for a mapping to the working directory.
+    Without a source it is the starter config. Names of CSV files are relative to the folder of the TOML file, or
+    for a mapping to the working directory.
 
     >>> steel = {"E": "210 GPa", "nu": 0.3, "rho": 7850}
     >>> sweep = {"e": [0.5, 1], "v1": 1, "m1": 1, "m2": 1, "material": "steel"}

@@ -22,7 +22,6 @@ from ..config.grid import Axis
 from ..config.input_names import SWEEP_INPUTS, InputName, input_values
 from ..config.load import Config, build, inline_files
 from ..config.rules import has_other_stiffness
-from ..config.starter import STARTER_CONFIG
 from ..config.tables import MATERIAL_QUANTITIES, SWEEP_DEFAULTS, expand_models, law_quantities
 from ..contact.fixed_step import EXACT
 from ..contact.force_expressions import unload_to_residual, unload_with_stiffness
@@ -530,8 +529,7 @@ def open_source(source: ConfigSource, overrides: Sequence[str], plugins: Plugins
     if isinstance(source, xr.Dataset):
         return _open_stored(source, overrides, plugins, "the result")
     if source is None:
-        draft = open_text(STARTER_CONFIG.read_text(encoding="utf-8"), "starter", plugins.models)
-        draft = draft.with_settings([STARTER_E, *settings_of(overrides)])
+        draft = open_config(None, plugins.models).with_settings([STARTER_E, *settings_of(overrides)])
         return PointSource(draft, plugins, has_selection=("models",) in draft.origins, is_starter=True)
     draft = open_config(Path(source) if isinstance(source, str) else source, plugins.models)
     return PointSource(draft.with_settings(settings_of(overrides)), plugins)

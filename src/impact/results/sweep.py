@@ -11,10 +11,12 @@ from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import xarray as xr
 
 from ..atomic import atomic_write, check_output, check_outputs
+from ..config.draft import Setting, settings_of
 from ..config.grid import MAX_POINTS
 from ..config.input_names import InputName
 from ..config.load import read_config
@@ -68,8 +70,10 @@ NO_EXTENSION = Extension()
 
 
 def sweep(
-    source: str | Path | Mapping[str, object],
+    source: str | Path | Mapping[str, object] | None = None,
     *,
+    models: str | Sequence[str] | None = None,
+    frictions: str | Sequence[str] | None = None,
     output: str | Path | None = None,
     overrides: Sequence[str] = (),
     plugins: Sequence[ForceModel | str | Path] = (),
@@ -80,12 +84,16 @@ def sweep(
     resume: bool = False,
     overwrite: bool = False,
     progress: bool = False,
+    **inputs: Any,
 ) -> xr.Dataset:
     """Run a sweep; the result is in memory, or in a file and of any size.
 
     Parameters
     ----------
-    source : path of a TOML file, or a mapping of the same shape
+    source : path of a TOML file, or a mapping of the same shape; by default the starter config, the two balls of
+        Table 1 of the paper
+    models, frictions : keys of laws, in place of those of the source
+    inputs : of `[sweep]`, in place of those of the source, such as `e=[0.1, 0.9]` or `v1="50 cm/s"`
     output : file to write; by default the result stays in memory
     overrides : changes to the config, such as `"sweep.e=0.5"`
     plugins : plug-in models, which the config may name, and paths of Python files with such models, which are
@@ -123,7 +131,13 @@ def sweep(
     ... })
     >>> result["e_out"].values.round(6).tolist()
     [[0.665265, 0.913177]]
+    >>> impact.sweep(models="lankarani-nikravesh-1990", e=[0.1, 0.9])["e_out"].values.round(6).tolist()
+    [[0.665265, 0.913177]]
     """
+    laws = {key: value for key, value in (("models", models), ("frictions", frictions)) if value is not None}
+    changes = [Setting((key,), value, key) for key, value in laws.items()]
+    changes += [Setting(("sweep", name), value, name) for name, value in inputs.items()]
+    settings = [*settings_of(overrides), *changes]
     if output is None and (resume or overwrite):
         raise UsageError("resume and overwrite: got no output, expected one as well")
     backend = choose_executor(jobs, threads, executor)
@@ -136,13 +150,13 @@ def sweep(
     with bar as on_progress:
         if output is None:
             run = Run(backend, max_points=max_points, on_progress=on_progress)
-            result = sweep_in_memory(prepare(source, overrides, plugins, run), run)
+            result = sweep_in_memory(prepare(source, settings, plugins, run), run)
             summary = with_depths(summarize(result), result)
         else:
             outcome = sweep_to_file(
                 source,
                 output,
-                overrides=overrides,
+                overrides=settings,
                 plugins=plugins,
                 backend=backend,
                 max_points=max_points,
@@ -157,10 +171,10 @@ def sweep(
 
 
 def sweep_to_file(
-    source: str | Path | Mapping[str, object],
+    source: str | Path | Mapping[str, object] | None,
     output: str | Path,
     *,
-    overrides: Sequence[str] = (),
+    overrides: Sequence[str | Setting] = (),
     plugins: Sequence[ForceModel | str | Path] = (),
     backend: AbstractContextManager[ExecutorSpec] | None = None,
     max_points: int = MAX_POINTS,
@@ -219,8 +233,8 @@ def sweep_to_file(
 
 
 def prepare(
-    source: str | Path | Mapping[str, object],
-    overrides: Sequence[str] = (),
+    source: str | Path | Mapping[str, object] | None,
+    overrides: Sequence[str | Setting] = (),
     plugins: Sequence[ForceModel | str | Path] = (),
     run: Run = DEFAULT_RUN,
 ) -> Plan:
