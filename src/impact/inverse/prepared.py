@@ -211,7 +211,7 @@ def prepare(
     >>> import impact
     >>> problem = impact.prepare(model="gharib-hurmuzlu-2012")
     >>> round(problem(e=0.5)["e_out"], 6), problem(e=[0.25, 0.5])["e_out"].round(6).tolist()
-    (0.41072, [0.165302, 0.41072])
+    (0.41072, [0.241279, 0.41072])
     """
     plugin_set = read_plugins(plugins)
     config, _ = single_point(open_source(source, overrides, plugin_set), model, at, friction=friction)
