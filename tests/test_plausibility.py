@@ -145,9 +145,11 @@ def test_the_report_has_every_note_of_the_sweep(cli: Run, tmp_path: Path, layout
     (tmp_path / "c.json").write_text(json.dumps(MANY_AXES), encoding="utf-8")
     done = cli("sweep", "c.json", "-o", "r.h5", "--set", f"output.layout={layout}", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
+    mass = "m2: got 2 kg, but a sphere of R2 = 0.01 m and 7850 kg/m^3 has 0.03288 kg; without m2 the mass follows"
     printed = [line.removeprefix("note: ") for line in done.stderr.splitlines() if line.startswith("note: ")]
     assert [line.partition(" at ")[0] for line in printed] == [
         "c.json: materials.steel.E: got 210 Pa; did you mean 210 GPa?",
+        f"c.json: {mass}",
         LIMIT,
     ]
     result = impact.load(tmp_path / "r.h5")
@@ -157,7 +159,7 @@ def test_the_report_has_every_note_of_the_sweep(cli: Run, tmp_path: Path, layout
     part = result.isel(single)
     depth = part["peak_indentation"].values / np.cbrt(3 * 0.001 / (4 * np.pi * 1200.0))
     note = f"{LIMIT} at {(depth > 0.1).sum()} of 3 points, at most {depth.max():.0%}; {SMALL}"
-    assert notes_of(impact.report(part))[1:] == [note]
+    assert notes_of(impact.report(part))[1:] == [mass, note]
     # without the values, or what the radii follow from, there is none
-    assert len(notes_of(impact.report(result.drop_vars("peak_indentation")))) == 1
+    assert len(notes_of(impact.report(result.drop_vars("peak_indentation")))) == 2
     assert notes_of(impact.report(result.assign_attrs(materials="{}"))) == []

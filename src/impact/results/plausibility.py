@@ -93,9 +93,11 @@ def with_depths(summary: Summary, dataset: xr.Dataset) -> Summary:
 def inputs_of(dataset: xr.Dataset) -> Inputs | None:
     """Read the inputs of a sweep from its result; None if it lacks some, as a part or a changed one may."""
     try:
-        return read_inputs(dataset, [str(dim) for dim in dataset.sizes if dim != "model"])
+        inputs = read_inputs(dataset, [str(dim) for dim in dataset.sizes if dim != "model"])
     except (ResultError, KeyError):
         return None
+    is_complete = all(inputs.materials_of(ball) <= inputs.materials.keys() for ball in "12")
+    return inputs if is_complete else None
 
 
 def _depth_summary(dataset: xr.Dataset) -> Summary:
