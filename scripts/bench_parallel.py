@@ -22,7 +22,7 @@ from bench_core import PAPER_MODELS
 from impact.contact.numba.dispatch import is_installed
 from impact.engine.executors import choose_executor
 from impact.engine.run import Run
-from impact.results.sweep import prepare, sweep_in_memory
+from impact.results.sweep import read_plan, sweep_in_memory
 
 
 def sweep_rate(impacts: int, rtol: float, core: str, jobs: int, threads: int) -> float:
@@ -40,7 +40,7 @@ def sweep_rate(impacts: int, rtol: float, core: str, jobs: int, threads: int) ->
         "materials": {"table1": {"E": 56e9, "nu": 0.3, "rho": 2712.0}},
         "solver": {"rtol": rtol, "collapse": False, "core": core},
     }
-    plan = prepare(config)
+    plan = read_plan(config)
     start = time.perf_counter()
     sweep_in_memory(plan, Run(choose_executor(jobs, threads)))
     return plan.points / (time.perf_counter() - start)

@@ -40,7 +40,7 @@ from impact.engine.trajectories import (
     RANGE_TRAJECTORIES,
     Columns,
 )
-from impact.results.sweep import prepare, sweep_into
+from impact.results.sweep import read_plan, sweep_into
 
 IDLE_TIME_S = 5.0
 MODELS = ("lankarani-nikravesh-1990", "gharib-hurmuzlu-2012")
@@ -54,7 +54,7 @@ def table1_plan(points: int, core: str) -> Plan:
         "solver": {"collapse": False, "core": core},
         "sweep": {"e": {"linspace": [0.05, 0.99, points // len(MODELS)]}, **sweep},
     }
-    return prepare(config)
+    return read_plan(config)
 
 
 @contextmanager

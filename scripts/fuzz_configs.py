@@ -33,7 +33,7 @@ from types import FrameType
 import impact
 from impact.config.load import read_config
 from impact.errors import ConfigError, Interruption
-from impact.results.sweep import prepare
+from impact.results.sweep import read_plan
 
 ROOT = Path(__file__).parent.parent
 sys.path.insert(0, str(ROOT))
@@ -271,7 +271,7 @@ def run_config(path: Path, *, timed: bool, with_fit: bool) -> str:
         if timed:
             impact.estimate(path)
             return "planned and timed"
-        prepare(path)
+        read_plan(path)
         return "planned"
     config = read_config(path, purpose="calibrate")
     assert config.data is not None

@@ -323,12 +323,12 @@ class SweepServer:
 
     def expected_digest(self, folder: Path) -> str:
         """The SHA-256 of the result of a folder's config, computed in this process without a fault."""
-        from impact.results.sweep import prepare, sweep_into
+        from impact.results.sweep import read_plan, sweep_into
 
         text = (folder / CONFIG).read_text()
         if text not in self.digests:
             with tempfile.TemporaryDirectory() as whole:
-                sweep_into(Path(whole, RESULT), prepare(folder / CONFIG))
+                sweep_into(Path(whole, RESULT), read_plan(folder / CONFIG))
                 self.digests[text] = digest(Path(whole, RESULT))
         return self.digests[text]
 

@@ -56,11 +56,11 @@ def test_a_value_of_e_takes_the_steps_of_the_page_in_their_order(tmp_path: Path)
             calls.append(name)
 
     import impact
-    from impact.results.sweep import prepare, sweep_into
+    from impact.results.sweep import read_plan, sweep_into
 
     sys.setprofile(note)
     try:
-        sweep_into(tmp_path / "results.h5", prepare(ROOT / "configs" / "figure6.toml"))
+        sweep_into(tmp_path / "results.h5", read_plan(ROOT / "configs" / "figure6.toml"))
         impact.plot(impact.load(tmp_path / "results.h5"))
     finally:
         sys.setprofile(None)

@@ -20,7 +20,7 @@ from impact.results.provenance import config_of_part
 from impact.results.ranking import recommend
 from impact.results.selection import select
 from impact.results.summary import summarize
-from impact.results.sweep import prepare, sweep_in_memory, sweep_into
+from impact.results.sweep import read_plan, sweep_in_memory, sweep_into
 
 from .conftest import assert_same_array
 
@@ -52,7 +52,7 @@ def plan_of(columns: dict[str, list[Any]], models: list[str] = MODELS, **sweep: 
         "material2": "brass",
         **sweep,
     }
-    plan = prepare(
+    plan = read_plan(
         {
             "models": models,
             "sweep": inputs,
@@ -169,7 +169,7 @@ def test_cases_are_appended_and_keep_their_numbers(tmp_path: Path, layout: str) 
             "output": {"layout": layout},
         }
 
-    sweep_into(tmp_path / "r.h5", prepare(config(v1=[1.0, 0.5, 1.0])))
+    sweep_into(tmp_path / "r.h5", read_plan(config(v1=[1.0, 0.5, 1.0])))
     whole = impact.sweep(config(v1=[1.0, 0.5, 1.0, 2.0]))
     for wrong in ("[1.0, 2.0, 1.0, 2.0]", "[1.0, 0.5]"):
         with pytest.raises(UsageError, match="expected the cases that the result has, in their order"):
@@ -205,7 +205,7 @@ SPEEDS = [0.5, 1.0]
 
 def axes_of_parameters(keys: list[str], **output: Any) -> Plan:
     """Several models, each with an axis of one of its parameters, over two speeds."""
-    return prepare(
+    return read_plan(
         {
             "models": keys,
             "materials": MATERIALS,

@@ -14,7 +14,7 @@ import pytest
 
 import impact
 from impact.engine.execute import context_of, integrate_remotely
-from impact.results.sweep import prepare
+from impact.results.sweep import read_plan
 
 from .clusters import (
     BLOCK_COUNT,
@@ -204,7 +204,7 @@ def test_a_block_integrated_twice_gives_the_same_bits(
     from distributed import Client
 
     (tmp_path / "c.toml").write_text(CONFIG)
-    plan = prepare(tmp_path / "c.toml")
+    plan = read_plan(tmp_path / "c.toml")
     part = plan.ranges[0]
     block = ([plan.models[part.model].key], plan.columns_of(part), context_of(plan))
     with Client(cluster.address, set_as_default=False) as client:

@@ -21,7 +21,7 @@ from impact.contact.status import FIRST_FAILURE
 from impact.contact.variables import CENTRAL_OUTPUTS
 from impact.engine.plan import NUMBA_MIN_TRAJECTORIES
 from impact.errors import ConfigError, UsageError
-from impact.results.sweep import prepare
+from impact.results.sweep import read_plan
 
 from .conftest import ROOT, Run, assert_same_bits
 from .problems import table1_impacts, with_parameters
@@ -171,7 +171,7 @@ def test_processes_and_threads_together_are_refused() -> None:
 def test_auto_chooses_numba_if_installed_and_above_a_number_of_trajectories() -> None:
     def core(count: int, key: str) -> str:
         v1 = {"geomspace": [0.1, 1.0, count]}
-        plan = prepare(
+        plan = read_plan(
             {
                 "models": key,
                 "sweep": {"v1": v1, "m1": 1.0, "m2": 1.0, "K": 6e9},

@@ -17,7 +17,7 @@ from impact.engine.build_impacts import build_impacts
 from impact.engine.plan import Plan
 from impact.engine.run import Run
 from impact.results.estimate import estimate
-from impact.results.sweep import prepare
+from impact.results.sweep import read_plan
 
 from .conftest import ROOT, assert_same_bits, new_law
 
@@ -112,7 +112,7 @@ def test_deduplication_within_blocks_changes_no_bit_of_a_result(config: dict[str
 @settings(max_examples=15)
 @given(configs())
 def test_the_impacts_of_a_grid_are_those_of_its_points(config: dict[str, object]) -> None:
-    plan = prepare(config, plugins=[DASHPOT, SPEED])
+    plan = read_plan(config, plugins=[DASHPOT, SPEED])
     at = np.ix_(*map(np.arange, plan.shape)) if plan.shape else ()
     flat = tuple(np.unravel_index(np.arange(plan.inputs.cells), plan.shape)) if plan.shape else ()
     for model in plan.models:
@@ -127,7 +127,7 @@ def test_the_impacts_of_a_grid_are_those_of_its_points(config: dict[str, object]
 def trajectory_counts(sweep: dict[str, object], *models: str, **more: object) -> list[int]:
     """The trajectories of each model."""
     config = {"models": list(models), "sweep": sweep, "materials": MATERIALS, **more}
-    return [model_map.count for model_map in prepare(config, plugins=[DASHPOT, SPEED]).maps]
+    return [model_map.count for model_map in read_plan(config, plugins=[DASHPOT, SPEED]).maps]
 
 
 GRID = {"e": [0.1, 0.5, 0.9], "v1": [1.0, 2.0], "m1": [1.0, 4.0], "m2": [1.0, 4.0], "material": ["soft", "hard"]}
@@ -183,7 +183,7 @@ def test_a_unit_whose_exponent_is_zero_at_the_first_values_hides_no_axis(
         },
         "model": {"powers": {"c": 0.3, "p": p}},
     }
-    (model_map,) = prepare(config, plugins=[power_law]).maps
+    (model_map,) = read_plan(config, plugins=[power_law]).maps
     assert model_map.axes == axes
     deduplicated, separate = (
         impact.sweep(config, overrides=[f"solver.collapse={word}"], plugins=[power_law])
@@ -196,7 +196,7 @@ def test_the_trajectories_of_a_plan_of_any_size_are_counted() -> None:
     long = {"geomspace": [0.1, 10.0, 10_000]}
     sweep = {"e": {"linspace": [0.01, 1.0, 100]}, "v1": long, "m1": long, "m2": long, "material": ["soft", "hard"]}
     config = {"models": ["gharib-hurmuzlu-2012", "speed"], "sweep": sweep, "materials": MATERIALS}
-    plan = prepare(config, plugins=[SPEED], run=Run(max_points=10**15))
+    plan = read_plan(config, plugins=[SPEED], run=Run(max_points=10**15))
     assert plan.points == 4 * 10**14
     assert [model_map.count for model_map in plan.maps] == [100, 10_000]
     estimated = estimate(config, plugins=[SPEED], max_points=10**15)

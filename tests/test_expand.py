@@ -18,7 +18,7 @@ from impact.engine.build_impacts import build_impacts
 from impact.engine.run import Run as SweepRun
 from impact.errors import UsageError
 from impact.results import sweep as sweep_module
-from impact.results.sweep import prepare, sweep_into
+from impact.results.sweep import read_plan, sweep_into
 from impact.results.trajectory_table import CHECKS, checks_that_may_fail
 
 from .conftest import Run, assert_same_array
@@ -128,7 +128,7 @@ def test_any_part_of_a_lazy_result_has_the_bits_of_the_full_one(
 @settings(max_examples=20)
 @given(configs())
 def test_a_check_that_is_skipped_never_fails(config: dict[str, object]) -> None:
-    plan = prepare(config, plugins=[*PLUGINS.values()])
+    plan = read_plan(config, plugins=[*PLUGINS.values()])
     for model in plan.models:
         impacts = build_impacts(plan.inputs, model, plan.inputs.index())
         with np.errstate(all="ignore"):
@@ -151,7 +151,7 @@ def test_only_inputs_that_may_be_invalid_are_checked() -> None:
     sweep = {"e": [0.1, 0.9], "v1": [1.0, 2.0], "m1": 1.0, "m2": [1.0, 2.0], "K": 1e9}
 
     def checks(**changes: object) -> frozenset[str]:
-        plan = prepare({"models": "gharib-hurmuzlu-2012", "sweep": {**sweep, **changes}})
+        plan = read_plan({"models": "gharib-hurmuzlu-2012", "sweep": {**sweep, **changes}})
         return checks_that_may_fail(plan.inputs, plan.models[0])
 
     assert checks() == frozenset()
@@ -160,14 +160,14 @@ def test_only_inputs_that_may_be_invalid_are_checked() -> None:
     assert "length" in checks(v1=[1e-200, 1.0])
     assert checks(v1=[-1.0, -2.0]) == CHECKS
     alpha = {name: values for name, values in sweep.items() if name != "e"}
-    plan = prepare({"models": "gharib-hurmuzlu-2012", "sweep": {**alpha, "alpha": [0.1, 0.6]}})
+    plan = read_plan({"models": "gharib-hurmuzlu-2012", "sweep": {**alpha, "alpha": [0.1, 0.6]}})
     assert checks_that_may_fail(plan.inputs, plan.models[0]) == {"e"}
 
 
 @settings(max_examples=3, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(configs())
 def test_a_factored_file_holds_the_values_of_a_full_one(tmp_path: Path, config: dict[str, object]) -> None:
-    plans = {layout: prepare(config, [f'output.layout="{layout}"'], [*PLUGINS.values()]) for layout in LAYOUTS}
+    plans = {layout: read_plan(config, [f'output.layout="{layout}"'], [*PLUGINS.values()]) for layout in LAYOUTS}
     surveys = {
         layout: sweep_into(tmp_path / layout, plan, SweepRun(overwrite=True)) for layout, plan in plans.items()
     }
@@ -190,7 +190,7 @@ def test_a_factored_file_of_a_plugin_is_read_without_the_plugin(tmp_path: Path) 
     sweep = {"e": [0.1, 0.5], "v1": [1.0, 2.0, 4.0], "m1": [1.0, 3.0], "m2": [1.0, float("inf")], "n": [1.0, 1.5]}
     config = {"models": ["stiff", "hertz"], "sweep": {**sweep, "material": "soft"}, "materials": MATERIALS,
               "output": {"layout": "factored", "variables": EVERYTHING}}  # fmt: skip
-    plan = prepare(config, plugins=[tmp_path / "stiff.py"])
+    plan = read_plan(config, plugins=[tmp_path / "stiff.py"])
     sweep_into(tmp_path / "factored.h5", plan)
     full = impact.sweep(config, plugins=[tmp_path / "stiff.py"])
     (tmp_path / "stiff.py").unlink()

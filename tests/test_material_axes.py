@@ -18,7 +18,7 @@ from impact.contact.variables import CENTRAL_OUTPUTS
 from impact.engine.plan import Plan
 from impact.engine.run import Run
 from impact.errors import ModelError, UsageError
-from impact.results.sweep import prepare, sweep_in_memory, sweep_into
+from impact.results.sweep import read_plan, sweep_in_memory, sweep_into
 
 from .conftest import assert_same_array
 
@@ -111,7 +111,7 @@ def test_a_sweep_over_properties_equals_the_sweeps_at_each_value(
 def _prepared(config: Any) -> Plan:
     """The plan of a config in which masses may be missing: it is read with masses, which are then removed."""
     missing = {f"m{ball}": 1.0 for ball in "12" if f"m{ball}" not in config["sweep"]}
-    plan = prepare({**config, "sweep": {**config["sweep"], **missing}})
+    plan = read_plan({**config, "sweep": {**config["sweep"], **missing}})
     scalars = {name: value for name, value in plan.config.scalars.items() if name not in missing}
     return replace(plan, config=replace(plan.config, scalars=scalars))
 
@@ -174,7 +174,7 @@ def test_a_missing_mass_is_an_error() -> None:
 def test_a_material_name_with_a_space_is_refused_before_integration() -> None:
     balls = {**BALLS, "m1": 1.0, "m2": 1.0, "material": "soft steel"}
     plan = with_axes(
-        prepare(config(balls, {"soft steel": STEEL}, LAW)), Axis({"materials.soft steel.E": (1e9, 2e9)})
+        read_plan(config(balls, {"soft steel": STEEL}, LAW)), Axis({"materials.soft steel.E": (1e9, 2e9)})
     )
     with pytest.raises(UsageError, match=r"materials\.soft steel\.E: expected a material name without spaces"):
         sweep_in_memory(plan)
@@ -182,7 +182,7 @@ def test_a_material_name_with_a_space_is_refused_before_integration() -> None:
 
 def test_a_file_has_the_unit_of_a_swept_property_and_no_value_in_its_table(tmp_path: Path) -> None:
     balls = {**BALLS, "m1": 1.0, "m2": 1.0, "material": "steel"}
-    plan = with_axes(prepare(config(balls, {"steel": STEEL}, LAW)), Axis({"materials.steel.E": (1e9, 2e9)}))
+    plan = with_axes(read_plan(config(balls, {"steel": STEEL}, LAW)), Axis({"materials.steel.E": (1e9, 2e9)}))
     sweep_into(tmp_path / "r.h5", plan)
     with xr.open_dataset(tmp_path / "r.h5", engine="h5netcdf") as stored:
         E = stored["materials.steel.E"]
@@ -194,7 +194,7 @@ def test_a_file_has_the_unit_of_a_swept_property_and_no_value_in_its_table(tmp_p
 def test_a_sweep_over_a_property_is_compared_with_a_sweep_at_one_value() -> None:
     balls = {**BALLS, "m1": 1.0, "m2": 1.0, "material": "steel"}
     single = impact.sweep(config(balls, {"steel": STEEL}, LAW))
-    plan = prepare(config(balls, {"steel": STEEL}, LAW))
+    plan = read_plan(config(balls, {"steel": STEEL}, LAW))
     swept = sweep_in_memory(with_axes(plan, Axis({"materials.steel.E": (1e9, STEEL["E"])})))
     assert impact.compare(single, swept, subset=True).equal
     assert impact.compare(swept.sel({"materials.steel.E": STEEL["E"]}), single).equal
@@ -209,7 +209,7 @@ def test_a_model_without_material_is_not_integrated_for_each_property() -> None:
         **config(sweep, {"steel": STEEL}, ["bilinear", "thornton-1997"]),
         "model": {"bilinear": {"K": 1e6}},
     }
-    plan = with_axes(prepare(document), Axis({"materials.steel.yield_strength": (0.1e9, 0.2e9, 0.3e9)}))
+    plan = with_axes(read_plan(document), Axis({"materials.steel.yield_strength": (0.1e9, 0.2e9, 0.3e9)}))
     assert [trajectories.count for trajectories in plan.maps] == [2, 3]
 
 
@@ -220,7 +220,7 @@ def test_values_of_a_property_are_added_to_a_result(tmp_path: Path, layout: str)
         document = config(sweep, {"steel": {**STEEL, **properties}, "brass": BRASS}, ["thornton-1997", "bilinear"])
         return {**document, "output": {"layout": layout}}
 
-    sweep_into(tmp_path / "r.h5", prepare(swept(yield_strength=[0.1e9, 0.8e9])))
+    sweep_into(tmp_path / "r.h5", read_plan(swept(yield_strength=[0.1e9, 0.8e9])))
     # another value of an axis, and a scalar that becomes an axis
     overrides = ["materials.steel.yield_strength=[3e8]", "materials.steel.rho=[7850, 1000]"]
     impact.extend_to_file(tmp_path / "r.h5", overrides, output=tmp_path / "more.h5")

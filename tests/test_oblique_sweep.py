@@ -14,7 +14,7 @@ from impact.contact.status import FrictionStatus
 from impact.engine.executors import choose_executor
 from impact.engine.run import Run as SweepRun
 from impact.errors import ConfigError, UnfinishedError
-from impact.results.sweep import prepare, sweep_into
+from impact.results.sweep import read_plan, sweep_into
 
 from .conftest import Run, assert_same_bits
 
@@ -177,7 +177,7 @@ def test_a_resumed_sweep_has_the_bytes_of_the_whole_sweep(
 ) -> None:
     # else a small sweep keeps nothing
     monkeypatch.setattr("impact.results.sweep.RANGE_TRAJECTORIES", 1)
-    plan, output = prepare(folder / "c.toml", with_layout(layout)), tmp_path / "results.h5"
+    plan, output = read_plan(folder / "c.toml", with_layout(layout)), tmp_path / "results.h5"
     with pytest.raises(UnfinishedError, match="trajectories are kept"):
         sweep_into(output, plan, SweepRun(should_stop=lambda: any(tmp_path.glob("results.h5.work/*.npz"))))
     assert 0 < len(list(tmp_path.glob("results.h5.work/*.npz"))) < BLOCKS
@@ -188,7 +188,7 @@ def test_a_resumed_sweep_has_the_bytes_of_the_whole_sweep(
 @pytest.mark.slow
 @pytest.mark.parametrize("layout", LAYOUTS)
 def test_two_processes_write_the_bytes_of_one(folder: Path, layout: str, tmp_path: Path) -> None:
-    plan = prepare(folder / "c.toml", with_layout(layout))
+    plan = read_plan(folder / "c.toml", with_layout(layout))
     sweep_into(tmp_path / "results.h5", plan, SweepRun(choose_executor(jobs=2)))
     assert (tmp_path / "results.h5").read_bytes() == (folder / f"{layout}.h5").read_bytes()
 

@@ -32,7 +32,7 @@ import impact
 from impact.contact.dimensionless import dimensionless_values
 from impact.contact.fixed_step import collide_at_fixed_step
 from impact.engine.build_impacts import build_impacts
-from impact.results.sweep import prepare
+from impact.results.sweep import read_plan
 
 pytestmark = pytest.mark.peers
 
@@ -481,7 +481,7 @@ def by_impact(key: str, collision: Values) -> tuple[float, float]:
 
 def by_map(key: str, collision: Values, steps: np.ndarray, scheme: str = "kick-drift") -> np.ndarray:
     """The restitution by a scheme at time steps [s], and at each phase."""
-    plan = prepare(config_of(key, collision))
+    plan = read_plan(config_of(key, collision))
     (model,) = plan.models
     impacts = build_impacts(plan.inputs, model, ())
     count = steps.size * PHASES.size

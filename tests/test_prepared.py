@@ -16,7 +16,7 @@ from impact.contact.interpolant import CHECK_TOLERANCE
 unit = pint.UnitRegistry()
 BALLS: dict[str, Any] = {"v1": 1.0, "m1": 1.0, "m2": 2.0, "R1": 0.01, "R2": 0.02, "K": 1e9, "e": 0.5}
 FRICTION = {"models": "hertz", "frictions": "coulomb-1785", "sweep": {**BALLS, "u1": 0.3, "mu": 0.2}}
-# a model of which one, two and no dimensionless numbers vary, with the inputs that vary
+# inputs that vary, for laws whose motion depends on one, two and no dimensionless numbers
 CASES = {
     "kuwabara-kono-1987": {"A": (1e-5, 3e-5), "v1": (0.5, 2.0)},
     "tsuji-1992": {"e": (0.2, 0.9), "m2": (0.5, 3.0)},
@@ -29,9 +29,9 @@ CASES = {
 def test_a_prepared_problem_gives_what_a_run_gives(model: str) -> None:
     spans = CASES[model]
     config = {"models": model, "sweep": BALLS}
-    own = {name: span[0] for name, span in spans.items() if name not in BALLS}
-    if own:
-        config["model"] = {model: own}
+    parameters = {name: span[0] for name, span in spans.items() if name not in BALLS}
+    if parameters:
+        config["model"] = {model: parameters}
     problem = impact.prepare(config)
     generator = np.random.default_rng(7)
     points = {name: generator.uniform(*span, 5) for name, span in spans.items()}
@@ -64,6 +64,12 @@ def test_inputs_are_those_of_any_library(half: Any) -> None:
     assert float(np.ravel(e)[0]) == pytest.approx(0.5, rel=1e-9)
 
 
+def test_the_columns_of_a_data_frame_are_inputs() -> None:
+    problem = impact.prepare(model="kuwabara-kono-1987", at={"A": 2e-5}, outputs="e_out")
+    frame = pd.DataFrame({"A": [1e-5, 3e-5], "v1": [1, 2]})
+    assert problem(frame)["e_out"].tolist() == problem(A=[1e-5, 3e-5], v1=[1.0, 2.0])["e_out"].tolist()
+
+
 def test_a_problem_without_changes_is_the_impact_of_the_config_and_can_be_pickled() -> None:
     problem = impact.prepare(model="gharib-hurmuzlu-2012", at={"e": 0.5})
     expected = impact.run(model="gharib-hurmuzlu-2012", at={"e": 0.5}).values["e_out"]
@@ -83,7 +89,7 @@ def test_where_there_is_no_rebound_outputs_are_nan() -> None:
     ("values", "message"),
     [
         ({"w1": 1.0}, 'no input "w1" of this law; known: K, R1, R2, e, m1, m2, '),
-        ({"e": 2}, "e: got 2.0, expected a number from 0 to 1"),
+        ({"e": 2}, "e: got 2, expected a number from 0 to 1"),
         ({"e": "half"}, 'e: got "half", expected a number from 0 to 1'),
         ({"e": []}, "e: got no value, expected one or more"),
         ({"e": None}, "e: got nothing, expected a number from 0 to 1"),
@@ -92,6 +98,9 @@ def test_where_there_is_no_rebound_outputs_are_nan() -> None:
             {"e": [0.1, 0.2], "v1": [1.0, 2.0, 3.0]},
             "got the shapes e (2,), v1 (3,), expected shapes that broadcast",
         ),
+        ({"tsuji-1992.K": 1e9, "K": 1e9, "model.tsuji-1992.K": 1e9}, "got tsuji-1992.K twice, expected it once"),
+        ({"e": True}, "e: got true, expected a number from 0 to 1"),
+        ({"e": [[0.1], [0.1, 0.2]]}, "e: got a list, expected a number from 0 to 1"),
         ({"angle": 0.1}, 'no input "angle" of this law; '),
         ({"gharib-hurmuzlu-2012.K": 1e9}, 'no input "gharib-hurmuzlu-2012.K" of this law; '),
     ],

@@ -169,6 +169,25 @@ def test_one_model_may_be_named_without_a_list(result: xr.Dataset) -> None:
     assert [row.model for row in impact.recommend(result, models="hertz")] == ["hertz"]
 
 
+@pytest.mark.parametrize(
+    ("cases", "message"),
+    [
+        (
+            {"v1": [1.0], "v1 [mm/s]": [1.0]},
+            'sweep.cases."v1 [mm/s]": set together with "v1", expected one of the two',
+        ),
+        (
+            {"v1": [1.0], "material [mm]": ["steel"]},
+            'sweep.cases."material [mm]": got a unit, expected "material"',
+        ),
+    ],
+)
+def test_a_column_that_would_be_ignored_is_refused(cases: dict[str, object], message: str) -> None:
+    with pytest.raises(impact.ConfigError) as refusal:
+        impact.sweep({"models": ["hertz"], "sweep": {"m1": 1.0, "m2": 1.0, "K": 6e9, "e": 0.5, "cases": cases}})
+    assert message in str(refusal.value)
+
+
 def test_columns_of_cases_may_have_units() -> None:
     names = ("e", "v1 [mm/s]", "m1", "m2", "K")
     cases = pd.DataFrame([[0.5, 100.0, 1.0, 1.0, 6e9], [0.5, 200.0, 1.0, 1.0, 6e9]], columns=names)
@@ -190,6 +209,12 @@ def test_a_sweep_takes_its_inputs_by_name() -> None:
         "friction": 1,
         "mu": 2,
     }
+
+
+def test_a_radius_replaces_the_mass_of_the_starter_config() -> None:
+    swept = impact.sweep(models="hertz", e=0.5, R1=0.01, R2=0.01)
+    expected = impact.run(model="hertz", at={"e": 0.5, "R1": 0.01, "R2": 0.01}).values
+    assert swept["contact_time"].item() == pytest.approx(expected["contact_time"], rel=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -29,7 +29,7 @@ from impact.engine.run import Run as SweepRun
 from impact.errors import ResultError, StoreError, UnfinishedError, UsageError
 from impact.results import sweep as sweep_module
 from impact.results.seal import write_seal
-from impact.results.sweep import prepare, sweep_into
+from impact.results.sweep import read_plan, sweep_into
 from impact.results.xarray_backend import open_result
 
 from .conftest import ROOT, Run, full_disk
@@ -64,7 +64,7 @@ QUICK_OPTIONS = ("all",)
 def factored(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The result of configs/figure6.toml in the factored layout."""
     path = tmp_path_factory.mktemp("factored") / "figure6.h5"
-    sweep_into(path, prepare(ROOT / "configs" / "figure6.toml", FACTORED))
+    sweep_into(path, read_plan(ROOT / "configs" / "figure6.toml", FACTORED))
     return path
 
 
@@ -206,7 +206,7 @@ MANY = {
 @pytest.mark.slow
 @pytest.mark.parametrize("layout", ["full", "factored"])
 def test_threads_processes_and_an_interruption_change_no_byte(tmp_path: Path, layout: str) -> None:
-    plan = prepare(MANY | {"output": {"layout": layout}})
+    plan = read_plan(MANY | {"output": {"layout": layout}})
     sweep_into(tmp_path / "serial.h5", plan)
     sweep_into(tmp_path / "threads.h5", plan, SweepRun(choose_executor(threads=2)))
     sweep_into(tmp_path / "jobs.h5", plan, SweepRun(choose_executor(jobs=2)))
@@ -232,7 +232,7 @@ def test_a_sweep_whose_file_cannot_be_read_back_leaves_no_file(
 
     monkeypatch.setattr(sweep_module, "check_readable", refuse)
     with pytest.raises(StoreError, match="cannot be read"):
-        sweep_into(tmp_path / "out.h5", prepare(ROOT / "configs" / "figure6.toml", ["sweep.e=0.5"]))
+        sweep_into(tmp_path / "out.h5", read_plan(ROOT / "configs" / "figure6.toml", ["sweep.e=0.5"]))
     assert not (tmp_path / "out.h5").exists()
 
 
@@ -489,7 +489,7 @@ LARGE = {
 
 
 def test_values_that_exceed_the_memory_are_refused_before_they_are_computed(tmp_path: Path) -> None:
-    sweep_into(tmp_path / "large.h5", prepare(LARGE, run=SweepRun(max_points=10**13)))
+    sweep_into(tmp_path / "large.h5", read_plan(LARGE, run=SweepRun(max_points=10**13)))
     with open_result(tmp_path / "large.h5") as opened:
         assert opened["e_out"].size == 10**12
         tracemalloc.start()

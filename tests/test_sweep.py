@@ -30,7 +30,7 @@ from impact.engine.trajectories import trajectory_ranges
 from impact.errors import ConfigError, StoreError, UsageError
 from impact.progress_display import line, new_bar, update
 from impact.results.summary import summarize
-from impact.results.sweep import prepare, sweep_in_memory, sweep_into
+from impact.results.sweep import read_plan, sweep_in_memory, sweep_into
 
 from .conftest import PLUGIN, ROOT, WIDE, Run
 from .fork_server import ForkServer, printed_on_terminal
@@ -98,7 +98,7 @@ def test_a_dry_run_estimates_transferred_bytes_and_the_useful_number_of_workers(
     # a sweep on this machine has no such line
     assert "workers" not in cli(*words, *larger, cwd=blocks.parent).stdout
     estimate = json.loads(cli(*words, "--json", cwd=blocks.parent).stdout)
-    plan = prepare(blocks, overrides)
+    plan = read_plan(blocks, overrides)
     ranges = plan.ranges
     assert [part.size for part in ranges] == [17_000] * 4
     transferred = 0
@@ -244,7 +244,7 @@ def test_two_processes_with_a_plug_in_write_the_same_bytes_as_one(blocks: Path) 
     plugin = blocks.parent / "plugin.py"
     plugin.write_text(PLUGIN.format(chi="1 - e"), encoding="utf-8")
     overrides = ["models=['mine-2026', 'bilinear']", "output.variables=['e_out', 'contact_time', 'status']"]
-    plan = prepare(blocks, overrides, [plugin])
+    plan = read_plan(blocks, overrides, [plugin])
     # every process uses the source that was read at the start
     plugin.write_text("raise SystemExit", encoding="utf-8")
     paths = [blocks.parent / name for name in ("serial.h5", "parallel.h5")]
@@ -295,7 +295,7 @@ def test_an_executor_gets_no_more_blocks_than_its_capacity(blocks: Path) -> None
             largest = max(largest, len(unfinished))
             return future
 
-    plan = prepare(blocks, ["models=['bilinear']", "sweep.m1=1.0", "sweep.e.linspace=[0,1,1001]"])
+    plan = read_plan(blocks, ["models=['bilinear']", "sweep.m1=1.0", "sweep.e.linspace=[0,1,1001]"])
     todo = list(trajectory_ranges(plan.maps, 10))
     with CountingExecutor(2) as executor:
         spec = ExecutorSpec(lambda: nullcontext(executor), lambda: 5, shares_memory=True)
@@ -398,7 +398,7 @@ def test_a_result_is_stored_in_the_format_of_its_config(
     loaded = impact.load(tmp_path / "wide.h5")
     # a sweep in memory, saved afterwards, gives the same file
     in_memory = impact.sweep(config, overrides=overrides)
-    impact.save(in_memory, tmp_path / "saved.h5", output=prepare(config, overrides).config.output)
+    impact.save(in_memory, tmp_path / "saved.h5", output=read_plan(config, overrides).config.output)
     assert (tmp_path / "saved.h5").read_bytes() == (tmp_path / "wide.h5").read_bytes()
     assert loaded.identical(in_memory)
     assert loaded["v1_post"].values.tobytes() == read_by_h5py.tobytes()
@@ -441,19 +441,19 @@ def test_an_invalid_storage_format_is_refused(blocks: Path, key: str) -> None:
     value, message = OUTPUT_VALUES[key]
     override = f"output.{key}={json.dumps(value)}"
     if message is None:
-        assert prepare(blocks, [override]).config.output.chunks == {"m1": 1}
+        assert read_plan(blocks, [override]).config.output.chunks == {"m1": 1}
         return
     with pytest.raises(ConfigError) as refused:
-        prepare(blocks, [override])
+        read_plan(blocks, [override])
     (line,) = refused.value.problems
     assert line.endswith(message)
 
 
 def test_too_many_and_too_large_chunks_are_refused(blocks: Path) -> None:
     with pytest.raises(ConfigError, match=r"got 1,600,000 chunks of 2 points, expected at most 100,000 of"):
-        prepare(blocks, ["output.chunks.e=1"])
+        read_plan(blocks, ["output.chunks.e=1"])
     with pytest.raises(ConfigError, match=r"got 80 chunks of 10,000,000 points"):
-        prepare(blocks, ["output.chunks.m1=1", "sweep.v1={linspace=[1,2,250]}"])
+        read_plan(blocks, ["output.chunks.m1=1", "sweep.v1={linspace=[1,2,250]}"])
 
 
 def test_a_file_with_a_high_compression_ratio_can_be_read(tmp_path: Path) -> None:

@@ -541,10 +541,16 @@ def expand_cases(draft: Draft) -> Draft:
     table = sweep.get("cases")
     if not isinstance(table, dict) or not table or not all(isinstance(values, list) for values in table.values()):
         return draft
-    headers = {split_header(header): header for header in table}
-    cases = {name: _with_unit(table[header], unit) for (name, unit), header in headers.items()}
-    written = {name: header for (name, _), header in headers.items()}
     problems: list[ConfigProblem] = []
+    cases: dict[str, list[object]] = {}
+    header_of: dict[str, str] = {}
+    for header, values in table.items():
+        column, unit = split_header(header)
+        if column in header_of:
+            message = f'set together with "{header_of[column]}", expected one of the two'
+            problems.append((("sweep", "cases", header), message))
+            continue
+        header_of[column], cases[column] = header, _with_unit(values, unit)
     paths: dict[KeyPath, KeyPath] = {}
     # the columns that belong to [sweep] take the position of the table
     in_sweep = {column: values for column, values in cases.items() if not InputName.parse(column).owner}
@@ -552,13 +558,15 @@ def expand_cases(draft: Draft) -> Draft:
     data = {**draft.data, "sweep": {**dict(items[:position]), **in_sweep, **dict(items[position + 1 :])}}
     n_cases = len(next(iter(cases.values())))
     for column, values in cases.items():
-        name, path = InputName.parse(column), ("sweep", "cases", written[column])
+        name, path = InputName.parse(column), ("sweep", "cases", header_of[column])
         try:
-            name.quantity(draft.known_models)
+            is_word = name.quantity(draft.known_models) is None
         except KeyError:
             problems.append((path, name.unknown_message(draft.known_models)))
             data["sweep"].pop(column, None)
             continue
+        if is_word and header_of[column] != column:
+            problems.append((path, f'got a unit, expected "{column}"'))
         if contains_path(draft.data, name.path):
             problems.append((path, f"set together with {name.config_key}, expected one of the two"))
         if len(values) != n_cases or not values:

@@ -263,6 +263,21 @@ def open_text(text: str, name: str, plugins: Sequence[ForceModel] = ()) -> Draft
     return Draft(data, text, name, catalogue(plugins), problems=tuple(problems))
 
 
+def without_default_masses(draft: Draft, fixed: Mapping[str, object]) -> Draft:
+    """Leave out the mass of Table 1 of a ball whose radius is given: it follows from that and the density.
+
+    The draft is that of the starter config; `fixed` has inputs that are set after its settings.
+    """
+    given = {**{str(path[1]): setting.value for path, setting in draft.origins.items() if len(path) > 1}, **fixed}
+    derived = [
+        f"m{ball}"
+        for ball in (1, 2)
+        if f"m{ball}" not in given and str(given.get(f"R{ball}", "inf")).strip() != "inf"
+    ]
+    sweep = {name: value for name, value in draft.table("sweep").items() if name not in derived}
+    return replace(draft, data={**draft.data, "sweep": sweep})
+
+
 def add_library_materials(draft: Draft) -> Draft:
     """Add a table for each library material that a ball may have and the config does not define."""
     if not isinstance(draft.data.get("materials", {}), dict):

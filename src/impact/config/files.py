@@ -72,7 +72,7 @@ def read_text(path: Path, kind: str = "TOML", most: int = MAX_CONFIG_BYTES) -> s
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        # a "CSV" of Excel in western Europe; zeros are those of UTF-16 or of a file that is no text
+        # Excel writes "CSV" in Windows-1252 in western Europe; a zero byte is one of UTF-16, or of no text at all
         if kind == "CSV" and b"\0" not in content:
             with contextlib.suppress(UnicodeDecodeError):
                 return content.decode("cp1252")
@@ -192,8 +192,9 @@ def read_number(value: object, quantity: Quantity, origin: str) -> float:
     (2e-06, 0.001)
     """
     plain, _ = to_plain_data(value)
-    with contextlib.suppress(ValueError, TypeError):
-        plain = float(plain)
+    if isinstance(plain, str):
+        with contextlib.suppress(ValueError):
+            plain = float(plain)
     try:
         return float(quantity.read(plain))
     except PydanticCustomError as error:

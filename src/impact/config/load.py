@@ -20,7 +20,16 @@ from ..contact.variables import OUTPUTS, default_variables
 from . import measurements, quantities, tables
 from .columns import expand_cases, named_files, read_files
 from .design import design_problems, distribution_paths, draw_columns, unit_samples
-from .draft import Draft, Measurements, Setting, add_library_materials, open_config, open_text, settings_of
+from .draft import (
+    Draft,
+    Measurements,
+    Setting,
+    add_library_materials,
+    open_config,
+    open_text,
+    settings_of,
+    without_default_masses,
+)
 from .files import as_table, override_text, set_value
 from .grid import MAX_POINTS, Axis, build_grid, chunk_problems
 from .input_names import InputName
@@ -84,7 +93,7 @@ def read_config(
     (Axis(columns={'e': (0.5, 1.0)}, numbered='', numbers=()),)
     """
     draft = open_config(source, plugins).with_settings(settings_of(overrides))
-    return build(draft, max_points, purpose)
+    return build(without_default_masses(draft, {}) if source is None else draft, max_points, purpose)
 
 
 def parse_config(

@@ -219,9 +219,8 @@ MATERIAL_KEYS = {
 }
 
 
-TOLERANCE = Quantity("1", "largest accepted difference", 0, above=True)
-
-
+# of the options `--tol`
+TOLERANCE = Quantity("1", "largest accepted difference, relative", 0, above=True)
 SWEEP_DEFAULTS = {name: float(Sweep.model_fields[name].default) for name in ("v2", "n")}
 # inputs of an integrator with a fixed step only, and their defaults
 FIXED_STEP_INPUTS = ("steps_per_contact", "dt", "phase")

@@ -89,8 +89,8 @@ class Plan:
     def solver(self) -> Solver:
         """The settings of the solver, with "numba" or "numpy" for `core = "auto"`.
 
-        >>> from impact.results.sweep import prepare
-        >>> prepare("configs/figure6.toml").solver.core
+        >>> from impact.results.sweep import read_plan
+        >>> read_plan("configs/figure6.toml").solver.core
         'numpy'
         """
         solver = self.config.solver

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -32,6 +32,9 @@ from ..engine.plugins import read_plugins
 from ..engine.trajectories import PlanLaw, model_of
 from ..errors import UsageError, did_you_mean
 from ..results.single_impact import open_source, single_point
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 # inputs that a config may leave to others: masses and radii follow from each other, K from materials
 DERIVED = ("m1", "m2", "R1", "R2", "K")
@@ -64,8 +67,9 @@ def outputs_at(
     """
     size = len(next(iter(columns.values()))) if columns else 1
     scalars = {name: value for name, value in config.scalars.items() if name not in columns}
-    # the values are arrays here, for speed
-    axis = Axis({**columns, "trial": np.arange(size)}, numbered="trial")  # type: ignore[dict-item]
+    # an axis has tuples; arrays are as good for looking up values, and faster
+    values: dict[str, Any] = {**columns, "trial": np.arange(size)}
+    axis = Axis(values, numbered="trial")
     swept, model = Inputs(scalars, (axis,), config.materials), model_of(law)
     impacts = build_impacts(swept, model, swept.index()).broadcast()
     oblique = None
@@ -105,10 +109,15 @@ class PreparedProblem:
     def __repr__(self) -> str:
         return f"<PreparedProblem {self.law.key}>"
 
-    def __call__(self, values: Mapping[str, Any] | None = None, /, **more: Any) -> dict[str, Any]:
+    def __call__(self, values: Mapping[str, Any] | pd.DataFrame | None = None, /, **more: Any) -> dict[str, Any]:
         """Compute the outputs; `values` takes names that are no Python words, such as "materials.steel.E"."""
-        given = {**(values or {}), **more}
-        read = dict(self._read(name, value) for name, value in given.items())
+        read: dict[str, Array] = {}
+        # a DataFrame has no truth value
+        for name, value in {**({} if values is None else values), **more}.items():
+            full_name, column = self._read(name, value)
+            if full_name in read:
+                raise UsageError(f"{name}: got {full_name} twice, expected it once")
+            read[full_name] = column
         try:
             shape = np.broadcast_shapes(*(column.shape for column in read.values()))
         except ValueError:
@@ -167,11 +176,11 @@ class PreparedProblem:
             return full_name, np.array(value)
         plain, _ = to_plain_data(value)
         try:
-            array = np.asarray(plain, dtype=float)
-            if quantity.allows(array.min()) and quantity.allows(array.max()):
-                return full_name, array
-        except (TypeError, ValueError):
-            # texts, or no value at all
+            array = np.asarray(plain)
+            if array.dtype.kind in "iuf" and quantity.allows(array.min()) and quantity.allows(array.max()):
+                return full_name, array.astype(float)
+        except ValueError:
+            # no value at all, or lists of several lengths
             pass
         items = np.array(plain, object)
         if not items.size:

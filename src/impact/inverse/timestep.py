@@ -180,7 +180,7 @@ class TimestepResult(Displayed):
     needed : for `tol`; None without one, or if no number of steps up to `MAX_STEPS_PER_CONTACT` is enough
     phases : number of phases of each row
     parameter, needed_parameter : what `tol` needs at a step, None if no value of the parameter is enough
-    rayleigh_time : the smaller one of the balls [s]; NaN where the law's stiffness does not follow from materials
+    rayleigh_time : the smaller one of the two balls [s]; NaN if the law's stiffness does not follow from materials
     """
 
     model: str

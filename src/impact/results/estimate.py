@@ -26,7 +26,7 @@ from ..engine.trajectories import RANGE_TRAJECTORIES, TrajectoryMap, keys_of
 from ..errors import warn
 from .layouts import LAYOUTS
 from .schema import dataset_template, stored_variables
-from .sweep import prepare
+from .sweep import read_plan
 from .trajectory_table import expanded_slabs, table_of
 
 # numbers of workers for which the time is estimated
@@ -158,7 +158,7 @@ def estimate(
     >>> impact.estimate("configs/figure6.toml").points
     303
     """
-    plan = prepare(source, overrides, plugins, Run(max_points=max_points, on_note=on_note))
+    plan = read_plan(source, overrides, plugins, Run(max_points=max_points, on_note=on_note))
     # a range in the middle, to avoid the extreme values at both ends
     chosen = plan.ranges[len(plan.ranges) // 2]
     law = plan.laws[chosen.model]

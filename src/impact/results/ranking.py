@@ -243,7 +243,7 @@ def recommend(
     *,
     tol: float | str = DEFAULT_TOL,
     sel: Mapping[str, float | str] | None = None,
-    models: Sequence[str] | None = None,
+    models: str | Sequence[str] | None = None,
     target: Mapping[str, float] | None = None,
     frictions: Sequence[str] | None = None,
 ) -> Ranking:

@@ -32,7 +32,7 @@ from ..errors import ResultError, StoreError, UnfinishedError, UsageError, warn
 from .outcome import SweepOutcome
 from .provenance import stored_config
 from .schema import dataset_template
-from .sweep import check_storable, complete_ranges, prepare, reload_range, store_result
+from .sweep import check_storable, complete_ranges, read_plan, reload_range, store_result
 from .trajectory_table import table_of_ranges
 
 # describes the shard of a work folder, next to the plan
@@ -142,7 +142,7 @@ def sweep_shard(
     303
     """
     run = Run(backend or SERIAL, not overwrite, overwrite, max_points, on_progress, on_note, should_stop)
-    plan = prepare(source, overrides, plugins, run)
+    plan = read_plan(source, overrides, plugins, run)
     chosen = Shard.parse(shard)
     # the command of the whole sweep: `merge` reports it for a missing shard
     config = str(source) if isinstance(source, str | Path) else "CONFIG.toml"

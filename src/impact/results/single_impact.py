@@ -16,7 +16,15 @@ import xarray as xr
 
 from .._version import __version__
 from ..config.design import distribution_paths
-from ..config.draft import Draft, Setting, listed_names, open_config, open_text, settings_of
+from ..config.draft import (
+    Draft,
+    Setting,
+    listed_names,
+    open_config,
+    open_text,
+    settings_of,
+    without_default_masses,
+)
 from ..config.files import as_table
 from ..config.grid import Axis
 from ..config.input_names import SWEEP_INPUTS, InputName, input_values
@@ -587,7 +595,7 @@ def single_point(
     settings += [Setting(InputName.parse(name).path, values, f"--over {name}") for name, values in over.items()]
     draft = draft.with_settings(settings)
     if source.is_starter:
-        draft = _without_default_masses(draft, fixed)
+        draft = without_default_masses(draft, fixed)
     if isinstance(draft.table("sweep").get("cases"), str):
         # the inputs that vary together are the columns of the file
         draft = inline_files(draft)
@@ -606,18 +614,6 @@ def single_point(
     for note in input_notes(Plan(config).inputs):
         warn(note)
     return config, defaulted
-
-
-def _without_default_masses(draft: Draft, fixed: Mapping[str, object]) -> Draft:
-    """Leave out the mass of Table 1 of a ball whose radius is given: it follows from that and the density."""
-    given = {**{str(path[1]): setting.value for path, setting in draft.origins.items() if len(path) > 1}, **fixed}
-    derived = [
-        f"m{ball}"
-        for ball in (1, 2)
-        if f"m{ball}" not in given and str(given.get(f"R{ball}", "inf")).strip() != "inf"
-    ]
-    sweep = {name: value for name, value in draft.table("sweep").items() if name not in derived}
-    return replace(draft, data={**draft.data, "sweep": sweep})
 
 
 def _input_name(name: str, model: ForceModel | None, friction: FrictionLaw | None) -> InputName:

@@ -150,7 +150,7 @@ def sweep(
     with bar as on_progress:
         if output is None:
             run = Run(backend, max_points=max_points, on_progress=on_progress)
-            result = sweep_in_memory(prepare(source, settings, plugins, run), run)
+            result = sweep_in_memory(read_plan(source, settings, plugins, run), run)
             summary = with_depths(summarize(result), result)
         else:
             outcome = sweep_to_file(
@@ -218,7 +218,7 @@ def sweep_to_file(
     (303, 303, True)
     """
     run = Run(backend or SERIAL, resume, overwrite, max_points, on_progress, on_note, should_stop)
-    plan = prepare(source, overrides, plugins, run)
+    plan = read_plan(source, overrides, plugins, run)
     output = Path(output)
     outcome = None if overwrite else find_finished(output, plan)
     if outcome is not None:
@@ -232,7 +232,7 @@ def sweep_to_file(
     return outcome
 
 
-def prepare(
+def read_plan(
     source: str | Path | Mapping[str, object] | None,
     overrides: Sequence[str | Setting] = (),
     plugins: Sequence[ForceModel | str | Path] = (),

@@ -24,7 +24,7 @@ from ..engine.plan import Plan
 from ..engine.run import Run
 from ..errors import ConfigError, UsageError, did_you_mean
 from ..results.sensitivity import HALF, QUANTILES, sensitivity_template
-from ..results.sweep import prepare, sweep_in_memory
+from ..results.sweep import read_plan, sweep_in_memory
 from ..results.xarray_backend import save
 from .indices import indices_of, mixed_rows
 
@@ -130,7 +130,7 @@ def sensitivities(
             raise UsageError(f'--of: no output "{name}"; {did_you_mean(name, names)}')
     if output is not None and len(of) > 1:
         raise UsageError(f"--output: got {len(of)} outputs (--of), expected one for a file")
-    plan = prepare(source, overrides, plugins, Run(max_points=max_points))
+    plan = read_plan(source, overrides, plugins, Run(max_points=max_points))
     for name in of if not plan.frictions else ():
         if OUTPUTS[name].of_friction:
             raise UsageError(f'--of {name}: got no friction law, expected frictions, such as ["coulomb-1785"]')
