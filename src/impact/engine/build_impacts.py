@@ -192,7 +192,7 @@ def smaller_radius_at(inputs: Inputs, index: Index) -> Array:
 
 
 def rayleigh_time_at(inputs: Inputs, index: Index) -> Array:
-    """Compute the Rayleigh time of the ball with the smaller one at cells [s]; NaN where none is known."""
+    """Compute the smaller Rayleigh time of the two balls at cells [s]; NaN where none is known."""
     times = []
     for ball in "12":
         mass = mass_at(inputs, ball, index)

@@ -228,7 +228,7 @@ class TimestepResult(Displayed):
                 texts.insert(2, number(row.dt / self.rayleigh_time, 3))
         yield Table(cells, headings, text=())
         if self.rayleigh_time == self.rayleigh_time:
-            yield f"T_R = {quantity(self.rayleigh_time, 's', 4)}: the Rayleigh time of the smaller ball"
+            yield f"T_R = {quantity(self.rayleigh_time, 's', 4)}: the smaller Rayleigh time of the two balls"
         if self.tol is None:
             return
         yield ""
@@ -327,7 +327,7 @@ def timestep(
 
 @dataclass(frozen=True)
 class FixedStepLaw:
-    """One impact of a law, whose e, step and phase vary; `rayleigh_time` is that of the smaller ball [s]."""
+    """One impact of a law, whose e, step and phase vary; `rayleigh_time` [s] is the smaller one of both balls."""
 
     model: ForceModel
     impact: Impacts
