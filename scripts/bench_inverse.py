@@ -81,12 +81,15 @@ def config(laws: list[str], points: int) -> dict[str, Any]:
 
 
 def measure() -> None:
-    """Print the CPU seconds of each case, after one run for the imports."""
+    """Print the CPU seconds of each case, after one run for the imports and the compilation."""
     one, twenty = config(LAWS[-1:], 12), config(LAWS, 50)
+    compiled = {**twenty, "solver": {"core": "numba"}}
     impact.calibrate(one)
+    impact.calibrate(compiled)
     cases = {
         "1 law, 1 parameter, 12 points": lambda: impact.calibrate(one),
         "20 laws, 50 points": lambda: impact.calibrate(twenty),
+        "20 laws, 50 points, numba": lambda: impact.calibrate(compiled),
         "solve for a damping ratio": lambda: impact.solve("mujoco-solref", "dampratio", {"e_out": 0.6}),
         "solve beside a fold": lambda: impact.solve(
             "muthukumar-2003", "d", {"e_out": 0.64}, at={"e": 0.5, "v1": 1.0}

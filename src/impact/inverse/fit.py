@@ -68,7 +68,7 @@ class Bounds:
     # shape (2, p): whether each bound is an end of the allowed values, not only of the search
     is_limit: Mask | None = None
 
-    @property
+    @cached_property
     def is_log(self) -> Mask:
         positive = self.lower > 0.0
         ratio = np.divide(self.upper, self.lower, out=np.ones_like(self.upper), where=positive)
@@ -226,14 +226,19 @@ class FitProblem:
         """Compute the independent residuals of rows u in standard deviations, shape (k, n)."""
         return self.data.whiten(self.scale(self.predict(evaluate, u)), excess)
 
-    def slopes(self, evaluate: Evaluate, u: Array, free: NDArray[np.intp], excess: float) -> Array:
-        """Differentiate the residuals by the free ones of u, shape (n, len(free)), in one evaluation."""
+    def residuals_and_slopes(
+        self, evaluate: Evaluate, u: Array, free: NDArray[np.intp], excess: float
+    ) -> tuple[Array, Array]:
+        """Compute the residuals, shape (n,), and their derivatives by the free ones of u, shape (n, len(free)).
+
+        They are evaluated together, since a solver asks for both at every u.
+        """
         low, high = np.maximum(u[free] - STEP, 0.0), np.minimum(u[free] + STEP, 1.0)
-        rows = np.tile(u, (2 * free.size, 1))
+        rows = np.tile(u, (2 * free.size + 1, 1))
         rows[np.arange(free.size), free], rows[free.size + np.arange(free.size), free] = low, high
-        below, above = np.split(self.residuals(evaluate, rows, excess), 2)
-        slopes: Array = (above - below).T / (high - low)
-        return slopes
+        *others, residuals = self.residuals(evaluate, rows, excess)
+        below, above = np.split(np.array(others), 2)
+        return residuals, (above - below).T / (high - low)
 
 
 def scan(problem: FitProblem, evaluate: Evaluate) -> Array:
@@ -268,16 +273,22 @@ def minimize(
         u[free] = free_u
         return u
 
-    def residuals(free_u: Array) -> Array:
-        (values,) = problem.residuals(evaluate, full(free_u)[None, :], excess)
-        return np.asarray(values)
-
     if not free.size:
-        loss, *_ = LOSS_DERIVATIVES[problem.data.loss](residuals(start[free]))
+        (values,) = problem.residuals(evaluate, start[None, :], excess)
+        loss, *_ = LOSS_DERIVATIVES[problem.data.loss](values)
         return Estimate(start, float(loss.sum()), excess, True)
+    known: dict[bytes, Array] = {}
+
+    def residuals(free_u: Array) -> Array:
+        values, slopes = problem.residuals_and_slopes(evaluate, full(free_u), free, excess)
+        known.clear()
+        known[free_u.tobytes()] = slopes
+        return values
 
     def slopes(free_u: Array) -> Array:
-        return problem.slopes(evaluate, full(free_u), free, excess)
+        if free_u.tobytes() not in known:
+            residuals(free_u)
+        return known[free_u.tobytes()]
 
     result = least_squares(
         residuals,
