@@ -110,14 +110,13 @@ def config_page() -> str:
 
 
 def api_page() -> str:
-    """The functions and classes of the package."""
+    """The functions and classes of the package, by the purposes of its docstring."""
     lines = ["# Python", "", "```python", "import impact", "```"]
-    for name in impact.__all__:
-        thing = getattr(impact, name)
-        if name == "__version__":
-            continue
-        kind = "autoclass" if isinstance(thing, type) else "autofunction"
-        lines += ["", f"## {name}", "", "```{eval-rst}", f".. {kind}:: impact.{name}", "```"]
+    for purpose, names in re.findall(r"^([A-Z][\w ]+): ((?:\w+,?\s)+)$", impact.__doc__ or "", re.MULTILINE):
+        lines += ["", f"## {purpose}"]
+        for name in names.replace(",", " ").split():
+            kind = "autoclass" if isinstance(getattr(impact, name), type) else "autofunction"
+            lines += ["", f"### {name}", "", "```{eval-rst}", f".. {kind}:: impact.{name}", "```"]
     return "\n".join(lines) + "\n"
 
 

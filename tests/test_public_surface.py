@@ -153,6 +153,11 @@ def test_the_public_surface_is_the_recorded_one(cli: Run, tmp_path: Path) -> Non
     assert surface(cli, tmp_path).splitlines() == SURFACE.read_text(encoding="utf-8").splitlines()
 
 
+def test_help_names_each_public_name_once_by_its_purpose() -> None:
+    listed = re.findall(r"^[A-Z][\w ]+: ((?:\w+,?\s)+)$", impact.__doc__ or "", re.MULTILINE)
+    assert sorted(name for names in listed for name in re.findall(r"\w+", names)) == sorted(impact.__all__)
+
+
 def main() -> None:
     """Record the surface."""
     with start_fork_server() as forked, tempfile.TemporaryDirectory() as folder:

@@ -1,4 +1,47 @@
-"""Parameter sweeps of contact force models for the impact of two balls, checked against closed forms."""
+"""Parameter sweeps of contact force models for the impact of two balls, checked against closed forms.
+
+The public names by purpose; `help(impact.NAME)` shows more of each.
+
+Run sweeps and single impacts: sweep, sweep_to_file, estimate, run, prepare, extend, extend_to_file, sweep_shard,
+merge, progress_bar
+
+>>> import impact
+>>> result = impact.sweep(models=["hertz", "flores-2011"], e=[0.5, 0.9])
+>>> result["e_out"].sel(model="flores-2011").round(4).values.tolist()
+[0.4704, 0.8939]
+
+See results and choose a law: recommend, plot, plot_to_files, explore, report, describe, info
+
+>>> impact.recommend(result, tol=0.1)[0].model
+'flores-2011'
+
+Find inputs: solve, calibrate, sensitivity, sensitivities
+
+>>> round(impact.solve("mujoco-solref", "dampratio", {"e_out": 0.6}).roots[0].value, 6)
+0.180858
+
+Simulation codes and their time steps: timestep, export, export_codes
+
+>>> impact.export("mujoco", "mujoco-solref", at={"e": 0.6}, dt="2 ms").lines[0]
+'<option timestep="0.002" integrator="Euler"/>'
+
+Store results and guard them: save, load, expand, compare, bless, rerun
+
+>>> impact.compare(result, result).equal
+True
+
+Laws and what they need: models, frictions, materials, cite, check_model, hysteresis, power, init, schema, doctor
+
+>>> impact.models()["flores-2011"].family
+'hysteresis'
+
+Classes of laws: ForceModel, FrictionLaw, Parameter, Evidence
+
+Classes of results: Impact, PreparedProblem, Ranking, SolveResult, TimestepResult, Export, Estimate, Verdict,
+Models, Frictions, Citations, Environment
+
+Errors and warnings: ImpactError, ConfigError, ModelError, ResultError, StoreError, UsageError, ImpactWarning
+"""
 
 from __future__ import annotations
 
