@@ -158,6 +158,12 @@ def test_help_names_each_public_name_once_by_its_purpose() -> None:
     assert sorted(name for names in listed for name in re.findall(r"\w+", names)) == sorted(impact.__all__)
 
 
+def test_no_signature_shows_an_object_by_its_address() -> None:
+    functions = filter(inspect.isfunction, (getattr(impact, name) for name in impact.__all__))
+    signatures = {function.__name__: str(inspect.signature(function)) for function in functions}
+    assert [name for name, signature in signatures.items() if " at 0x" in signature or "[Plan]" in signature] == []
+
+
 def main() -> None:
     """Record the surface."""
     with start_fork_server() as forked, tempfile.TemporaryDirectory() as folder:

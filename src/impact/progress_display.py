@@ -92,13 +92,13 @@ def write_to_stderr(line: str) -> None:
 
 @contextmanager
 def progress_bar(
-    write: Callable[[str], None] = write_to_stderr, *, quiet: bool = False
+    write: Callable[[str], None] | None = None, *, quiet: bool = False
 ) -> Iterator[Callable[[Progress], None]]:
     """A function that reports the progress of a sweep, to be passed as `on_progress`.
 
     Parameters
     ----------
-    write : prints a line where there is no bar
+    write : prints a line where there is no bar; by default to stderr
     quiet : report nothing
 
     >>> import impact, tempfile
@@ -121,7 +121,7 @@ def progress_bar(
                 bar.start()
         elif now - last >= INTERVAL_S and not task.finished:
             last = now
-            write(line(task, at.of_points))
+            (write or write_to_stderr)(line(task, at.of_points))
 
     try:
         yield report

@@ -28,7 +28,7 @@ def bless(
     reason: str,
     tol: float | Tolerances | None = None,
     allow_failed: bool = False,
-    show: Callable[[Verdict], None] = lambda verdict: None,
+    show: Callable[[Verdict], None] | None = None,
 ) -> Verdict | None:
     """Replace a baseline by a result, and store the reason and the tolerances in it.
 
@@ -73,7 +73,8 @@ def bless(
         comparison = compare(result, old_baseline, tol=tol)
         repeats = command_start(str(new), result)
         verdict = replace(comparison, new=str(new), baseline=str(baseline), repeats=repeats)
-        show(verdict)
+        if show is not None:
+            show(verdict)
     tolerances = effective_tolerances(tol, result.attrs if old_baseline is None else old_baseline.attrs)
     save_with_attributes(new, baseline, {"reason": reason, "tolerances": json.dumps(tolerances)})
     return verdict

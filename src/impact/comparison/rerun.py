@@ -30,7 +30,7 @@ def rerun(
     tol: float | Tolerances | None = None,
     subset: bool = False,
     max_points: int = MAX_POINTS,
-    execute: Callable[[Plan], xr.Dataset] = sweep_in_memory,
+    execute: Callable[..., xr.Dataset] | None = None,
 ) -> Verdict:
     """Repeat the sweep or the calibration of a result from its file alone, and compare the new values with it.
 
@@ -72,7 +72,7 @@ def rerun(
     whole = Plan(config, plugin_set.of(config.models))
     plan = replace(whole, config=config_of_part(config, stored))
     plan.check_count(max_points, str(result))
-    verdict = compare(execute(plan), stored, tol=tol, subset=subset)
+    verdict = compare((execute or sweep_in_memory)(plan), stored, tol=tol, subset=subset)
     if plan.points < whole.points:
         part = f"repeated {plan.points:,} of {whole.points:,} points of the config: the file holds no others"
         verdict = replace(verdict, notes=(part, *verdict.notes))

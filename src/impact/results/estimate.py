@@ -140,7 +140,7 @@ def estimate(
     plugins: Sequence[ForceModel | str | Path] = (),
     jobs: int = 1,
     max_points: int = MAX_POINTS,
-    on_note: Callable[[str], None] = warn,
+    on_note: Callable[[str], None] | None = None,
 ) -> Estimate:
     """Count the points and trajectories of a sweep, and estimate its size and time; nothing is written.
 
@@ -158,7 +158,7 @@ def estimate(
     >>> impact.estimate("configs/figure6.toml").points
     303
     """
-    plan = read_plan(source, overrides, plugins, Run(max_points=max_points, on_note=on_note))
+    plan = read_plan(source, overrides, plugins, Run(max_points=max_points, on_note=on_note or warn))
     # a range in the middle, to avoid the extreme values at both ends
     chosen = plan.ranges[len(plan.ranges) // 2]
     law = plan.laws[chosen.model]

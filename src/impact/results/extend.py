@@ -98,8 +98,8 @@ def extend_to_file(
     plugins: Sequence[ForceModel | str | Path] = (),
     backend: AbstractContextManager[ExecutorSpec] | None = None,
     max_points: int = MAX_POINTS,
-    on_progress: ProgressCallback = ignore,
-    should_stop: Callable[[], bool] = never,
+    on_progress: ProgressCallback | None = None,
+    should_stop: Callable[[], bool] | None = None,
 ) -> SweepOutcome:
     """Extend a stored result as `extend` does, and summarize it, without reading the file again.
 
@@ -126,7 +126,9 @@ def extend_to_file(
     3
     """
     source, target = Path(result), Path(result if output is None else output)
-    run = Run(backend or SERIAL, resume, overwrite, max_points, on_progress, should_stop=should_stop)
+    run = Run(
+        backend or SERIAL, resume, overwrite, max_points, on_progress or ignore, should_stop=should_stop or never
+    )
     check_outputs([target], plugins, overwrite=True)
     plugin_set = read_plugins(plugins)
     with run.connected() as connected:

@@ -115,9 +115,9 @@ def sweep_shard(
     backend: AbstractContextManager[ExecutorSpec] | None = None,
     max_points: int = MAX_POINTS,
     overwrite: bool = False,
-    on_progress: ProgressCallback = ignore,
-    on_note: Callable[[str], None] = warn,
-    should_stop: Callable[[], bool] = never,
+    on_progress: ProgressCallback | None = None,
+    on_note: Callable[[str], None] | None = None,
+    should_stop: Callable[[], bool] | None = None,
 ) -> ShardProgress:
     """Integrate one shard of a sweep into its work folder; `merge` joins the folders of all shards.
 
@@ -141,7 +141,8 @@ def sweep_shard(
     ...     impact.sweep_shard("configs/figure6.toml", "1/1", f"{folder}/results.h5").trajectories
     303
     """
-    run = Run(backend or SERIAL, not overwrite, overwrite, max_points, on_progress, on_note, should_stop)
+    told = on_progress or ignore, on_note or warn, should_stop or never
+    run = Run(backend or SERIAL, not overwrite, overwrite, max_points, *told)
     plan = read_plan(source, overrides, plugins, run)
     chosen = Shard.parse(shard)
     # the command of the whole sweep: `merge` reports it for a missing shard
@@ -193,8 +194,8 @@ def merge(
     *,
     plugins: Sequence[ForceModel | str | Path] = (),
     overwrite: bool = False,
-    on_progress: ProgressCallback = ignore,
-    should_stop: Callable[[], bool] = never,
+    on_progress: ProgressCallback | None = None,
+    should_stop: Callable[[], bool] | None = None,
 ) -> SweepOutcome:
     """Join the shards of a sweep into a file, and summarize it; the work folders are kept.
 
@@ -224,7 +225,10 @@ def merge(
     303
     """
     check_outputs([output], plugins, overwrite=overwrite)
-    output, run = Path(output), Run(overwrite=overwrite, on_progress=on_progress, should_stop=should_stop)
+    output, run = (
+        Path(output),
+        Run(overwrite=overwrite, on_progress=on_progress or ignore, should_stop=should_stop or never),
+    )
     plugin_set = read_plugins(plugins)
     distinct = {Path(folder).resolve(): Path(folder) for folder in folders}.values()
     records = {folder: _read_record(folder) for folder in distinct}

@@ -180,9 +180,9 @@ def sweep_to_file(
     max_points: int = MAX_POINTS,
     resume: bool = False,
     overwrite: bool = False,
-    on_progress: ProgressCallback = ignore,
-    on_note: Callable[[str], None] = warn,
-    should_stop: Callable[[], bool] = never,
+    on_progress: ProgressCallback | None = None,
+    on_note: Callable[[str], None] | None = None,
+    should_stop: Callable[[], bool] | None = None,
 ) -> SweepOutcome:
     """Run a sweep into a file and summarize it, without reading the file again.
 
@@ -217,7 +217,8 @@ def sweep_to_file(
     >>> outcome.summary.points, outcome.trajectories, outcome.is_new
     (303, 303, True)
     """
-    run = Run(backend or SERIAL, resume, overwrite, max_points, on_progress, on_note, should_stop)
+    told = on_progress or ignore, on_note or warn, should_stop or never
+    run = Run(backend or SERIAL, resume, overwrite, max_points, *told)
     plan = read_plan(source, overrides, plugins, run)
     output = Path(output)
     outcome = None if overwrite else find_finished(output, plan)

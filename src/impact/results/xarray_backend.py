@@ -54,7 +54,7 @@ def save(
     *,
     overwrite: bool = False,
     output: Output = DEFAULT_OUTPUT,
-    should_stop: Callable[[], bool] = lambda: False,
+    should_stop: Callable[[], bool] | None = None,
 ) -> None:
     """Store a dataset as a sealed netCDF-4 file, with all of its values.
 
@@ -89,7 +89,7 @@ def save(
     def parts() -> Iterator[RegionValues]:
         for name, variable in dataset.data_vars.items():
             for slab in slabs(variable.sizes):
-                if should_stop():
+                if should_stop is not None and should_stop():
                     raise UnfinishedError("nothing was written")
                 yield str(name), tuple(slab.values()), variable.isel(slab).values
 
@@ -212,7 +212,7 @@ def expand(
     models: Sequence[str] | None = None,
     overwrite: bool = False,
     max_points: int = MAX_POINTS,
-    should_stop: Callable[[], bool] = lambda: False,
+    should_stop: Callable[[], bool] | None = None,
 ) -> int:
     """Write all values of a stored result, or of a part of it, as netCDF for programs that do not use impact.
 

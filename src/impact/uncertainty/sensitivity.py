@@ -41,7 +41,7 @@ def sensitivity(
     overrides: Sequence[str] = (),
     plugins: Sequence[ForceModel | str | Path] = (),
     max_points: int = MAX_POINTS,
-    execute: Callable[[Plan], xr.Dataset] = sweep_in_memory,
+    execute: Callable[..., xr.Dataset] | None = None,
 ) -> xr.Dataset:
     """Find which uncertain input matters: Sobol indices of an output, its mean and quantiles, for every model.
 
@@ -102,7 +102,7 @@ def sensitivities(
     overrides: Sequence[str] = (),
     plugins: Sequence[ForceModel | str | Path] = (),
     max_points: int = MAX_POINTS,
-    execute: Callable[[Plan], xr.Dataset] = sweep_in_memory,
+    execute: Callable[..., xr.Dataset] | None = None,
 ) -> list[xr.Dataset]:
     """Find the `sensitivity` of several outputs, whose points are computed once.
 
@@ -136,7 +136,7 @@ def sensitivities(
             raise UsageError(f'--of {name}: got no friction law, expected frictions, such as ["coulomb-1785"]')
     plan = sensitivity_plan(plan, of, max_points, str(source) if isinstance(source, str | Path) else "config")
     check_outputs([output], [source, *plugins, *plan.config.files], overwrite=overwrite)
-    swept = execute(plan)
+    swept = (execute or sweep_in_memory)(plan)
     results = [sensitivity_of(plan, name, swept) for name in of]
     if output is not None:
         save(results[0], output, overwrite=overwrite)
