@@ -588,6 +588,36 @@ def test_a_plot_is_drawn_into_axes_of_the_user(coarse: xr.Dataset) -> None:
         impact.plot(coarse, kind="history", sel={"e": 0.5}, ax=axes[0])
 
 
+@pytest.mark.parametrize(
+    ("legend", "name"),
+    [
+        ("full", "Flores, Machado, Silva and Martins (2011)"),
+        ("short", "Flores et al. (2011)"),
+        ("keys", "flores-2011"),
+    ],
+)
+def test_a_legend_names_laws_as_asked_for_in_own_and_in_foreign_axes(legend: str, name: str) -> None:
+    result = impact.sweep(models=["flores-2011", "hunt-crossley-1975"], e=[0.5, 0.9])
+    axes = Figure((4.0, 4.0)).subplots()
+    impact.plot(result, kind="restitution", ax=axes, legend=legend)
+    own = impact.plot(result, kind="restitution", legend=legend, labels={"hunt-crossley-1975": "mine"})
+    for shown in (axes.get_legend(), own.legends[0]):
+        assert name in [text.get_text().replace("\n", " ") for text in shown.get_texts()]
+    # a label that the user gives comes first
+    assert "mine" in [text.get_text() for text in own.legends[0].get_texts()]
+
+
+def test_a_picture_without_legend_and_foreign_axes_without_title(coarse: xr.Dataset) -> None:
+    axes = Figure((4.0, 4.0)).subplots(1, 2)
+    impact.plot(coarse, kind="restitution", ax=axes[0], legend="none")
+    impact.plot(coarse, kind="restitution", ax=axes[1], title=True)
+    assert (axes[0].get_legend(), axes[0].get_title()) == (None, "")
+    assert axes[1].get_title() == "Delivered restitution"
+    assert impact.plot(coarse, legend="none").legends == []
+    with pytest.raises(UsageError, match="--legend: got key, expected full, short, keys, none"):
+        impact.plot(coarse, legend="key")
+
+
 def test_a_notebook_shows_the_picture(coarse: xr.Dataset) -> None:
     figure = impact.plot(coarse, width="single")
     assert figure._repr_png_().startswith(b"\x89PNG")  # type: ignore[attr-defined]

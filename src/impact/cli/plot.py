@@ -101,6 +101,10 @@ def plot(
         ),
     ] = None,
     no_title: Annotated[bool, typer.Option("--no-title", help="Omit the title and the conditions.")] = False,
+    legend: Annotated[
+        str,
+        typer.Option("--legend", metavar="NAMES", help="Name laws in full, short or by keys; none: no legend."),
+    ] = "full",
     label: Annotated[
         list[str] | None,
         typer.Option(
@@ -150,6 +154,7 @@ def plot(
         height=height,
         style=style,
         title=not no_title,
+        legend=legend,
         labels=_parse_labels(label),
         equations=equations,
         frictions=friction,

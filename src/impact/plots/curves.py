@@ -122,8 +122,14 @@ class CurveData:
         return {
             *(name for panel in self.panels for name in (panel.x_name, panel.y_name)),
             *(curve.variable for curve in all_curves if curve.end),
-            *(curve.law or "reference" for curve in all_curves),
+            *(["reference"] if any(not curve.law for curve in all_curves) else []),
+            *self.laws,
         }
+
+    @property
+    def laws(self) -> set[str]:
+        """The models and pairs that have a curve."""
+        return {curve.law for panel in self.panels for curve in panel.curves if curve.law}
 
     def long_table(self) -> pd.DataFrame:
         """Make a row for each point of a curve, and for each measured point."""

@@ -55,6 +55,10 @@ class PlotData(Protocol):
     def names(self) -> set[str]:
         """The names whose text a user can replace: axes, variables and models."""
 
+    @property
+    def laws(self) -> set[str]:
+        """The keys of the models and pairs among the names."""
+
     def long_table(self) -> pd.DataFrame:
         """Make a tidy table: a row for each point."""
 

@@ -17,7 +17,7 @@ from ..results.single_impact import Impact, histories
 from ..results.xarray_backend import result_of
 from .data import PlotData, Points, read_points
 from .kinds import STUDIES, Choice, Look, default_kind, find_kind
-from .labels import check_labels, escape_mathtext, pretty_conditions
+from .labels import check_labels, escape_mathtext, legend_labels, pretty_conditions
 from .layout import Picture
 from .style import default_size, styled
 
@@ -42,7 +42,8 @@ def plot(
     width: float | str | None = None,
     height: float | str | None = None,
     style: str | Path | None = None,
-    title: bool = True,
+    title: bool | None = None,
+    legend: str = "full",
     labels: Mapping[str, str] | None = None,
     equations: bool = False,
     frictions: Sequence[str] | None = None,
@@ -69,7 +70,9 @@ def plot(
         if it was changed, else "double"
     height : height of the figure [in], or a length; by default it depends on the kind
     style : a style sheet of matplotlib, or the name of one; rcParams changed by the user are respected in any case
-    title : write the title and the conditions
+    title : write the title and the conditions; by default unless `ax` is set
+    legend : name laws by title, year and parameters ("full"), by first author and year ("short"), or by key
+        ("keys"); "none" for no legend
     labels : texts by the name of an axis, of a variable whose name is at the end of its curve, the key of a law,
         "reference" or "title"
     equations : name the laws with the numbers of their equations in the paper
@@ -96,7 +99,7 @@ def plot(
         dataset = dataset.history
     dataset = result_of(dataset)
     choice = Choice(x, y, variable, sel, models, log, equations, frictions)
-    look = Look(width, height, style, title, labels)
+    look = Look(width, height, style, ax is None if title is None else title, labels, legend)
     return draw(get_plot_data(dataset, kind or default_kind(dataset).name, choice, plugins), look, points, ax)
 
 
@@ -128,8 +131,8 @@ def draw(
     ax: Axes | Sequence[Axes] | None = None,
 ) -> Figure:
     """Draw a picture, in a new figure or into the user's axes."""
-    labels = look.labels or {}
-    check_labels(labels, label_keys(plot_data, look))
+    check_labels(look.labels or {}, label_keys(plot_data, look))
+    labels = {**legend_labels(plot_data.laws, look.legend), **(look.labels or {})}
     measured = points if points is None or isinstance(points, Points) else read_points(points)
     if measured is not None and not plot_data.takes_points:
         raise UsageError(f"{measured.source}: measured points are drawn over curves only")
@@ -139,7 +142,7 @@ def draw(
         entries = plot_data.draw(all_axes, labels, measured)
         if look.title:
             all_axes[0].set_title(heading)
-        if entries:
+        if entries and look.legend != "none":
             all_axes[0].legend(*zip(*entries, strict=True), fontsize="small")
         figure = all_axes[0].get_figure(root=True)
         assert figure is not None
@@ -150,7 +153,8 @@ def draw(
         texts = (heading, pretty_conditions(plot_data.conditions)) if look.title else ()
         picture = Picture(width, *texts)
         all_axes, panels_height = plot_data.place_panels(picture, width)
-        picture.add_legend(panels_height, height, plot_data.draw(all_axes, labels, measured))
+        entries = plot_data.draw(all_axes, labels, measured)
+        picture.add_legend(panels_height, height, [] if look.legend == "none" else entries)
     return picture
 
 

@@ -48,6 +48,7 @@ def plot_to_files(
     height: float | str | None = None,
     style: str | Path | None = None,
     title: bool = True,
+    legend: str = "full",
     labels: Mapping[str, str] | None = None,
     equations: bool = False,
     frictions: Sequence[str] | None = None,
@@ -70,8 +71,9 @@ def plot_to_files(
     data : file for the numbers behind the picture: .csv, .tex or .parquet
     data_form : "wide", a column for each curve, or "long", a row for each point
     overwrite : replace existing files
-    x, y, variable, sel, models, log, points, width, height, style, title, labels, equations, frictions, plugins :
+    x, y, variable, sel, models, log, points, width, height, style, title, legend, labels, equations, frictions :
         see `plot`
+    plugins : see `plot`
 
     Returns
     -------
@@ -90,7 +92,7 @@ def plot_to_files(
     ['r.png']
     """
     choice = Choice(x, y, variable, sel, models, log, equations, frictions)
-    look = Look(width, height, style, title, labels)
+    look = Look(width, height, style, title, labels, legend)
     kinds = list(dict.fromkeys(kinds))
     for kind in kinds:
         check_kind(kind)

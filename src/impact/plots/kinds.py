@@ -46,6 +46,8 @@ STUDIES = ("calibration", "sensitivity study")
 # width of one and of two columns of a journal [in]
 WIDTHS = {"single": 3.5, "double": 7.1}
 LOG_AXES = ("x", "y", "xy")
+# how a legend names laws: by title, year and parameters, by title and year, or by key; "none" for no legend
+LEGENDS = ("full", "short", "keys", "none")
 # limits of the width and height of a picture
 MIN_SIZE_INCHES, MAX_SIZE_INCHES = 1.0, 60.0
 LENGTH_PATTERN = re.compile(r"\s*([0-9]*\.?[0-9]+(?:[eE][-+]?[0-9]+)?)\s*(mm|cm|in)\s*")
@@ -79,9 +81,12 @@ class Look:
     style: str | Path | None = None
     title: bool = True
     labels: Mapping[str, str] | None = None
+    legend: str = "full"
 
     def __post_init__(self) -> None:
         _ = self.size
+        if self.legend not in LEGENDS:
+            raise UsageError(f"--legend: got {self.legend}, expected {', '.join(LEGENDS)}")
 
     @property
     def size(self) -> tuple[float | None, float | None]:

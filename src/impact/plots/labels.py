@@ -15,11 +15,12 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormat
 
 from ..config.input_names import InputName
 from ..contact.frictions import frictions
+from ..contact.models import catalogue
 from ..contact.variables import HISTORY, OUTPUTS
 from ..errors import UsageError
 from ..formatting import NO_BREAK, safe_text, scaled_unit, typographic, with_year
 from .slices import parameter_text, scalars_of
-from .style import law_key
+from .style import WITH, law_key
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -39,6 +40,8 @@ MATH_SYMBOLS = {
     "inertia_factor1": "q_1",
     "inertia_factor2": "q_2",
 }
+# more than two names at the beginning of a title
+THREE_AUTHORS = r"^([\w-]+)(?:, [A-Z][\w-]+)+ and [A-Z][\w-]+"
 # name of the impulse-momentum solution in the paper
 REFERENCE = "Impulse-momentum"
 # distances of ticks of angles [deg], of which the first with a suitable number of ticks is used
@@ -129,6 +132,25 @@ def model_label(model_data: xr.Dataset, *, numbered: bool = False) -> str:
     title, year, equation = (model_data[name].item() for name in ("title", "year", "equation"))
     parameters = parameter_text(str(model_data["model"].item()), scalars_of(model_data))
     return law_text(str(title), int(year), str(equation), parameters, numbered=numbered)
+
+
+def legend_labels(laws: Collection[str], legend: str) -> dict[str, str]:
+    """Name laws by their keys, or by the first author and year without parameters; full names are not changed.
+
+    >>> legend_labels({"flores-2011 with coulomb-1785"}, "short")
+    {'flores-2011 with coulomb-1785': 'Flores et al. (2011) with Coulomb (1785)'}
+    """
+    if legend == "keys":
+        return {law: escape_mathtext(law) for law in laws}
+    if legend != "short":
+        return {}
+
+    def short(key: str) -> str:
+        law = catalogue().get(key) or frictions().get(key)
+        # a plug-in is not in the catalogue
+        return key if law is None else re.sub(THREE_AUTHORS, r"\1 et al.", with_year(law.title, law.year))
+
+    return {law: escape_mathtext(WITH.join(map(short, law.split(WITH)))) for law in laws}
 
 
 class LawPart(NamedTuple):

@@ -65,7 +65,12 @@ class BarData:
     @property
     def names(self) -> set[str]:
         """The axis, inputs and models whose text a user can replace."""
-        return {"index", *self.inputs, *(panel.model for panel in self.panels)}
+        return {"index", *self.inputs, *self.laws}
+
+    @property
+    def laws(self) -> set[str]:
+        """The models that have a panel."""
+        return {panel.model for panel in self.panels}
 
     def long_table(self) -> pd.DataFrame:
         """Make a row for each bar."""
