@@ -225,10 +225,8 @@ def merge(
     303
     """
     check_outputs([output], plugins, overwrite=overwrite)
-    output, run = (
-        Path(output),
-        Run(overwrite=overwrite, on_progress=on_progress or ignore, should_stop=should_stop or never),
-    )
+    output = Path(output)
+    run = Run(overwrite=overwrite, on_progress=on_progress or ignore, should_stop=should_stop or never)
     plugin_set = read_plugins(plugins)
     distinct = {Path(folder).resolve(): Path(folder) for folder in folders}.values()
     records = {folder: _read_record(folder) for folder in distinct}
