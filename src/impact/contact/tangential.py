@@ -269,17 +269,17 @@ def _result(form: TangentialForm, n: float, base: Columns, track: Track, state: 
     mode, left = np.abs(track.mode), track.energy
     at_limit, work = form.integral("limit_memory", state), form.integral("work", state)
     held_memory = track.held_memory + np.where(mode == 2.0, at_limit, 0.0)
-    slip_work = track.slip_work - np.where(mode == 1.0, left + work, 0.0) + held_memory - at_limit
+    slip_work = track.slip_work - np.where(mode == 1.0, left + work, 0.0) + held_memory
     rest = 0.5 * state[SLIP_ROW] ** 2 + left + at_limit
     damping_work = work + track.damping_work - np.where(mode == 2.0, rest, 0.0)
     memory_work = np.zeros_like(slip_work)
     if form.stiffness_power:
-        stick_work = form.integral("stick_work", state)
-        memory_work = stick_work - track.stick_energy - np.where(mode == 0.0, left, 0.0) + at_limit
-        # where N vanishes so slowly with x that both works are infinite at x = 0, the slip work is their sum
+        stuck_work = form.integral("stick_work", state) - track.stick_energy - np.where(mode == 0.0, left, 0.0)
+        # where N vanishes so slowly with x that both works are infinite at x = 0, the slip work is their sum, in
+        # which the infinite part cancels: it is not added to either, since rounding would be left of it
         is_infinite = track.touches & (2.0 * track.order < form.stiffness_power + ORDER_TOLERANCE)
-        slip_work += np.where(is_infinite, memory_work, 0.0)
-        memory_work = np.where(is_infinite, 0.0, memory_work)
+        slip_work += np.where(is_infinite, stuck_work, -at_limit)
+        memory_work = np.where(is_infinite, 0.0, stuck_work + at_limit)
     if form.kind == "regularized":
         slip_work, damping_work = work, memory_work
     ended = np.isfinite(state[SLIP_ROW])
