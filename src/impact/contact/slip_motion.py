@@ -474,12 +474,14 @@ class SlipPhase:
             y[0, ending] = self.end
             k[:, ending] = self.rates(y[:N_COMPONENTS, ending], _taken(params, ending))
             local = self.local(y, k, params)
-        sticks = columns.mode == 0.0
-        direction = np.where(sticks, np.sign(local.trial), np.sign(columns.mode))
         phi = NO_FORCE
         if self.form.has_dashpot:
             phi = -k[SLIP_ROW] / np.where(local.weight == 0.0, 1.0, local.weight)
         rate = self.trial_rate(y, k, columns, local, local.spring_force, phi)
+        sticks = columns.mode == 0.0
+        # where the force is zero, as after a change of its sign, it grows in the direction of its rate
+        has_force = np.abs(local.trial) > MARGIN_TOLERANCE / columns.G0
+        direction = np.sign(np.where(sticks, np.where(has_force, local.trial, rate), columns.mode))
         growth = direction * rate - local.dN
         room = local.N - np.abs(local.trial)
         if self.form.kind == "dashpot":
