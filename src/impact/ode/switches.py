@@ -23,9 +23,8 @@ SWITCH_RTOL, SWITCH_ATOL, NEAR_SWITCH = 1e-8, 3e-10, 1e-4
 LOW_MARGIN, NEAR_START = 0.05, 0.01
 # the rates of a margin are computed at both ends of a step over which it changes by more than this part
 LARGE_CHANGE = 0.5
-# parts of the margin before beyond which a margin of unknown rate is looked at: it vanishes within the next step,
-# of three steps at most, by its secant only below the first; it changes much also above the second
-FAR_BELOW, FAR_ABOVE = 0.75, 2.0
+# a margin of unknown rate has changed much if it is above this multiple of the one before
+FAR_ABOVE = 2.0
 
 
 def locate_switches(problem: Problem, switch: Switch, state: State, trial: TrialStep, accepted: Mask) -> Array:
@@ -42,11 +41,12 @@ def locate_switches(problem: Problem, switch: Switch, state: State, trial: Trial
         trial.k[:, ended] = problem.rates(trial.y[: problem.n_components, ended], params)
     margins, rates = switch.margins(trial.y, trial.k, state.params)
     before, rates_before = state.margins
-    # most margins are far from zero, and by a glance: one of an unknown rate may vanish soon, or change much, only
-    # where it is not of the order of that before
+    # most margins are far from zero, and by a glance: one of an unknown rate may vanish soon only below that before
+    # times this factor, where its secant vanishes within the next step
+    vanishing = trial.h_next / (state.h + trial.h_next)
     may_vanish = np.fmin(trial.h_next * rates + margins, margins) < 0.0
     may_vanish |= (rates_before < 0.0) & (rates > 0.0)
-    may_vanish |= np.isnan(rates) & ((margins < FAR_BELOW * before) | (margins > FAR_ABOVE * before))
+    may_vanish |= np.isnan(rates) & ((margins < vanishing * before) | (margins > FAR_ABOVE * before))
     positions = (may_vanish.any(axis=0) & accepted).nonzero()[0]
     reached = which = positions[:0]
     offset = np.zeros(0)
