@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, reduce
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,14 +33,12 @@ def power(base: Array, exponent: float) -> Array:
     if exponent < 0:
         return 1.0 / power(base, -exponent)
     whole, rest = divmod(quarters, 4)
-    result = integer_power(base, whole)
+    factors = [integer_power(base, whole)] if whole or not rest else []
     if rest:
         root = np.sqrt(base)
-        if rest >= 2:
-            result = result * root
-        if rest % 2:
-            result = result * np.sqrt(root)
-    return result
+        factors += [root] if rest >= 2 else []
+        factors += [np.sqrt(root)] if rest % 2 else []
+    return reduce(np.multiply, factors)
 
 
 @cache

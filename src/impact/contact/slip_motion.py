@@ -365,9 +365,11 @@ class SlipPhase:
             np.multiply(weight * slip, phi, out[rows["work"]])
         if "limit_memory" in rows:
             np.multiply(weight * slip, spring_force, out[rows["stick_work"]])
-            fading = (0.5 - self.memory) * self.stiffness_power * columns.compliance * v
-            fading /= signed_power(_away_from_zero(s), self.stiffness_power + 1.0)
-            np.multiply(fading, slip_spring * slip_spring, out[rows["limit_memory"]])
+            memory_work = out[rows["limit_memory"]]
+            # beyond the end of the contact it does not matter
+            np.divide(v, signed_power(np.maximum(s, LEAST_S), self.stiffness_power + 1.0), memory_work)
+            memory_work *= (0.5 - self.memory) * self.stiffness_power * columns.compliance
+            memory_work *= slip_spring * slip_spring
         if len(out) > TIME_ROW + len(rows):
             out[-1] = force
         return out
@@ -405,11 +407,11 @@ class SlipPhase:
         if form.has_dashpot:
             drag = self._times(columns.damping * y[SLIP_ROW], s, self.drag_power)
         capped_drag = drag if form.is_total else NO_FORCE
-        spring_force = np.where(
-            columns.mode == 0.0,
-            self._times(columns.root * y[SPRING_ROW], s, self.memory * self.stiffness_power),
-            np.sign(columns.mode) * N - capped_drag,
-        )
+        # of these two one is zero
+        spring_force = self._times(columns.spring * y[SPRING_ROW], s, self.memory * self.stiffness_power)
+        spring_force = spring_force + columns.memory_limit * k[-1]
+        if form.has_dashpot and form.is_total:
+            spring_force = spring_force - np.where(columns.mode == 0.0, 0.0, capped_drag)
         trial = drag if form.kind == "dashpot" else spring_force + capped_drag
         return Local(N, columns.share * d_force, d_force, k[TIME_ROW], spring_force, drag, trial)
 
@@ -457,49 +459,61 @@ class SlipPhase:
     def margins(self, y: Array, k: Array, params: Params) -> Margins:
         """Compute the margin of the mode and that of the sign of the normal force, see `Switch`."""
         columns, local = self.columns(params), self.local(y, k, params)
-        # at the end of the contact limit and force vanish together, up to errors of the integration
-        is_end = (k[0] < 0.0) & (y[0] < END_S)
-        tolerance = np.where(is_end, CAP_TOLERANCE, MARGIN_TOLERANCE) / columns.G0
+        leaves = k[0] < 0.0
         sign_margin, sign_rate = columns.sign * k[-1] + MARGIN_TOLERANCE, columns.sign * local.dF
         if self.law.model.release == "force":
             # the contact ends where the force vanishes: it does not pull
-            apart = k[0] < 0.0
-            sign_margin, sign_rate = np.where(apart, 1.0, sign_margin), np.where(apart, 0.0, sign_rate)
+            sign_margin, sign_rate = np.where(leaves, 1.0, sign_margin), np.where(leaves, 0.0, sign_rate)
         if not self.form.has_modes:
             return sign_margin[None], sign_rate[None]
-        # where the contact ends growth vanishes, too, but its sign shows whether the slip has ended before
-        ending = np.flatnonzero((k[0] < 0.0) & (y[0] < self.end) & (np.abs(columns.mode) == 1.0))
-        if ending.size:
-            y, k = y.copy(), k.copy()
-            y[0, ending] = self.end
-            k[:, ending] = self.rates(y[:N_COMPONENTS, ending], _taken(params, ending))
-            local = self.local(y, k, params)
+        margin, rate = self._margin_of_mode(y, k, columns, local, MARGIN_TOLERANCE)
+        near_end = np.flatnonzero(leaves & (y[0] <= max(self.end, MIN_REACH)))
+        if near_end.size:
+            margin[near_end], rate[near_end] = self._margin_near_end(
+                y[:, near_end], k[:, near_end], _taken(params, near_end)
+            )
+        held = np.flatnonzero((np.abs(columns.mode) == 2.0) & ~(leaves & (y[0] < END_S)))
+        if held.size:
+            margin[held], rate[held] = self._held_margin(y[:, held], _taken(params, held))[0], np.nan
+        # without a limit the mode does not matter, nor without a force
+        free = np.flatnonzero((columns.share == 0.0) | self._without_force(columns))
+        margin[free], rate[free] = 1.0, 0.0
+        return np.array([margin, sign_margin]), np.array([rate, sign_rate])
+
+    def _margin_of_mode(
+        self, y: Array, k: Array, columns: Columns, local: Local, tolerance: Array | float
+    ) -> tuple[Array, Array]:
+        """Compute the margin of the modes -1, 0 and 1, which is negative by no more than errors, and its rate."""
         phi = NO_FORCE
         if self.form.has_dashpot:
             phi = -k[SLIP_ROW] / np.where(local.weight == 0.0, 1.0, local.weight)
         rate = self.trial_rate(y, k, columns, local, local.spring_force, phi)
-        sticks = columns.mode == 0.0
+        sticks, size = columns.mode == 0.0, np.abs(local.trial)
         # where the force is zero, as after a change of its sign, it grows in the direction of its rate
-        has_force = np.abs(local.trial) > MARGIN_TOLERANCE / columns.G0
-        direction = np.sign(np.where(sticks, np.where(has_force, local.trial, rate), columns.mode))
-        growth = direction * rate - local.dN
-        room = local.N - np.abs(local.trial)
+        is_zero = size <= MARGIN_TOLERANCE / columns.G0
+        direction = np.sign(np.where(sticks, np.where(is_zero, rate, local.trial), columns.mode))
+        growth, room = direction * rate - local.dN, local.N - size
+        tolerance = tolerance / columns.G0
         if self.form.kind == "dashpot":
-            margin, margin_rate = np.where(sticks, room, -room) + tolerance, np.where(sticks, -growth, growth)
-        else:
-            near_end = (k[0] < 0.0) & (y[0] <= max(self.end, MIN_REACH))
-            slack = np.where(near_end, GROWTH_TOLERANCE * np.abs(local.dN), 0.0)
-            margin = np.where(sticks, room + tolerance, growth + slack)
-            margin_rate = np.where(sticks, -growth, np.nan)
-        held = np.flatnonzero(np.abs(columns.mode) == 2.0)
-        if held.size:
-            margin[held], margin_rate[held] = self._held_margin(y[:, held], _taken(params, held))[0], np.nan
-        # without a limit the mode does not matter, nor without a force, nor after the end of the contact
-        is_free = (columns.share == 0.0) | self._without_force(columns)
-        is_free |= is_end & (y[0] < np.where(sticks, -END_S, END_S))
-        free = np.flatnonzero(is_free)
-        margin[free], margin_rate[free] = 1.0, 0.0
-        return np.array([margin, sign_margin]), np.array([margin_rate, sign_rate])
+            return np.where(sticks, room, -room) + tolerance, np.where(sticks, -growth, growth)
+        return np.where(sticks, room + tolerance, growth), np.where(sticks, -growth, np.nan)
+
+    def _margin_near_end(self, y: Array, k: Array, params: Params) -> tuple[Array, Array]:
+        """Compute the same near the end of the contact, where limit and force vanish together, up to errors."""
+        columns, is_end = self.columns(params), y[0] < END_S
+        # growth vanishes, too, but its sign shows whether the slip has ended before
+        ending = (y[0] < self.end) & (np.abs(columns.mode) == 1.0)
+        if ending.any():
+            y = np.array([np.where(ending, self.end, y[0]), *y[1:]])
+            k = np.where(ending, self.rates(y[:N_COMPONENTS], params), k)
+        local, tolerance = self.local(y, k, params), np.where(is_end, CAP_TOLERANCE, MARGIN_TOLERANCE)
+        margin, rate = self._margin_of_mode(y, k, columns, local, tolerance)
+        sticks = columns.mode == 0.0
+        if self.form.kind != "dashpot":
+            margin = np.where(sticks, margin, margin + GROWTH_TOLERANCE * np.abs(local.dN))
+        # nor does the mode matter after the end of the contact
+        is_free = is_end & (y[0] < np.where(sticks, -END_S, END_S))
+        return np.where(is_free, 1.0, margin), np.where(is_free, 0.0, rate)
 
     def rates_of_margins(self, y: Array, k: Array, params: Params) -> Array:
         """Compute the rates of the margins by central difference quotients, see `Switch`."""
