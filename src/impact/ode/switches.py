@@ -51,9 +51,7 @@ def locate_switches(problem: Problem, switch: Switch, state: State, trial: Trial
     reached = which = positions[:0]
     offset = np.zeros(0)
     if positions.size:
-        reached, which, offset = _locate(
-            switch, state, trial, positions, margins[:, positions], rates[:, positions]
-        )
+        reached, which, offset = _locate(switch, state, trial, positions, margins, rates)
     stay = (~trial.is_accurate).nonzero()[0]
     margins[:, stay], rates[:, stay] = before[:, stay], rates_before[:, stay]
     state.margins = margins, rates
@@ -63,25 +61,30 @@ def locate_switches(problem: Problem, switch: Switch, state: State, trial: Trial
 
 
 def _locate(
-    switch: Switch, state: State, trial: TrialStep, positions: NDArray[np.intp], margins: Array, rates: Array
+    switch: Switch,
+    state: State,
+    trial: TrialStep,
+    positions: NDArray[np.intp],
+    all_margins: Array,
+    all_rates: Array,
 ) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
     """Shorten steps to zeros of margins; returns where a zero is reached, of which margin, and its offset."""
     assert state.margins is not None
     assert state.h_free is not None
-    before, rates_before = (values[:, positions] for values in state.margins)
+    margins, before = all_margins[:, positions], state.margins[0][:, positions]
     h, h_next = state.h[positions], trial.h_next[positions]
-    secant, unknown = (margins - before) / h, np.isnan(rates)
-    slopes = np.where(unknown, secant, rates)
-    slopes_before = np.where(np.isnan(rates_before), secant, rates_before)
     changes = np.abs(margins - before) > LARGE_CHANGE * np.maximum(np.abs(margins), np.abs(before))
-    steep = np.flatnonzero((unknown & changes).any(axis=0))
-    if steep.size:
-        at = positions[steep]
-        params = tuple(column[at] for column in state.params)
-        for values, (y, k) in ((slopes, (trial.y, trial.k)), (slopes_before, (state.y, state.k))):
+    for rates, y, k in ((all_rates, trial.y, trial.k), (state.margins[1], state.y, state.k)):
+        # kept, since the end of a step is the start of the next one
+        at = positions[(changes & np.isnan(rates[:, positions])).any(axis=0)]
+        if at.size:
+            params = tuple(column[at] for column in state.params)
             exact = switch.rates_of_margins(y[:, at], k[:, at], params)
-            values[:, steep] = np.where(unknown[:, steep] & np.isfinite(exact), exact, values[:, steep])
-            unknown[:, steep] &= ~np.isfinite(exact)
+            rates[:, at] = np.where(np.isnan(rates[:, at]), exact, rates[:, at])
+    slopes, slopes_before = all_rates[:, positions], state.margins[1][:, positions]
+    secant, unknown = (margins - before) / h, np.isnan(slopes)
+    slopes = np.where(unknown, secant, slopes)
+    slopes_before = np.where(np.isnan(slopes_before), secant, slopes_before)
     # a trajectory that has ended has no next step, and its end may lie beyond where its rates are smooth
     goes_on = state.termination[positions] == RUNNING
     h_ahead = np.where(goes_on, h_next, 0.0)
