@@ -41,8 +41,8 @@ def locate_switches(problem: Problem, switch: Switch, state: State, trial: Trial
         trial.k[:, ended] = problem.rates(trial.y[: problem.n_components, ended], params)
     margins, rates = switch.margins(trial.y, trial.k, state.params)
     before, rates_before = state.margins
-    # most margins are far from zero, and by a glance: one of an unknown rate may vanish soon only below this part of
-    # the one before, where its secant vanishes within the next step
+    # most margins are far from zero, and by a glance: one of an unknown rate may vanish soon only below this part
+    # of the one before, where its secant vanishes within the next step
     vanishing = trial.h_next / (state.h + trial.h_next)
     may_vanish = np.fmin(trial.h_next * rates + margins, margins) < 0.0
     may_vanish |= (rates_before < 0.0) & (rates > 0.0)
