@@ -348,6 +348,7 @@ def test_a_pair_without_meaning_is_noted_and_a_failed_pair_has_the_command_that_
         assert "--friction drake-regularized --at mu=0.1" in failure["replay"]
     shot = impact.run(output, model="tsuji-1992", friction="drake-regularized", at={"mu": 0.1})
     assert shot.friction_status == 14
+    assert "mu_d above mu" in str(shot)
     assert shot.failed
     with pytest.raises(UsageError, match="failed, the first at model=tsuji-1992, friction=drake-regularized"):
         impact.bless(output, tmp_path / "baseline.h5", reason="test")

@@ -64,6 +64,7 @@ FRICTION_MEANINGS = {
     **{FrictionStatus(status): meaning for status, meaning in MEANINGS.items()},
     FrictionStatus.NO_IMPACT: "the balls do not approach (v1 <= v2): velocities and spins unchanged",
     FrictionStatus.LIMIT: "the normal motion is at a limit, where only Coulomb's friction has an answer",
+    FrictionStatus.INVALID_PARAMETER: "a value that arises here is out of its range, such as mu_d above mu",
     FrictionStatus.SLOW_LIMIT: "the limit of small steps, which a code with fixed steps reaches slowly",
     FrictionStatus.NOT_COMBINABLE: "the contact force lacks what the friction law needs",
 }
