@@ -509,8 +509,16 @@ def by_code(
                 count = math.ceil(2.5 * contact_time / step)
                 gap = (3 - phase) * step * closing_speed
                 runs.append(balls | entry.parameters(collision) | {"gap": gap, "step": step, "count": count})
+    version, answers = run_code(entry.code, entry.key, runs, folder)
+    speeds = np.array([run["v1"] - run["v2"] for run in runs])
+    restitutions = np.diff(np.array(answers), axis=1)[:, 0] / speeds
+    return version, restitutions.reshape(len(entry.collisions), len(steps_per_contact), len(PHASES))
+
+
+def run_code(code: Code, key: str, runs: list[Values], folder: Path) -> tuple[str, list[list[float]]]:
+    """Run collisions in a code; its version, and the velocities after each; skips where it is not installed."""
     (folder / "in.json").write_text(json.dumps(runs), encoding="utf-8")
-    command = [*entry.code.program, str(RUNNERS / entry.code.runner), "in.json", "out.json"]
+    command = [*code.program, str(RUNNERS / code.runner), "in.json", "out.json"]
     process = subprocess.run(
         command,
         cwd=folder,
@@ -523,12 +531,10 @@ def by_code(
     if not (folder / "out.json").exists():
         last = (process.stderr.strip().splitlines() or ["no message"])[-1]
         if last.startswith(("ModuleNotFoundError", "ImportError")):
-            pytest.skip(f"{entry.key}: {last} ({entry.code.install})")
+            pytest.skip(f"{key}: {last} ({code.install})")
         pytest.fail(f"{' '.join(command)}: exit {process.returncode}\n{process.stdout}\n{process.stderr}")
     answer = json.loads((folder / "out.json").read_text(encoding="utf-8"))
-    return answer["version"], np.reshape(
-        answer["restitutions"], (len(entry.collisions), len(steps_per_contact), len(PHASES))
-    )
+    return answer["version"], answer["answers"]
 
 
 def extrapolate(restitutions: np.ndarray, order: int) -> tuple[np.ndarray, np.ndarray]:

@@ -8,8 +8,8 @@ from collections.abc import Callable
 from typing import Any
 
 
-def serve(version: str, collide: Callable[..., tuple[float, float]]) -> None:
-    """Run every collision of `sys.argv[-2]` and write the version and the restitutions to `sys.argv[-1]`.
+def serve(version: str, collide: Callable[..., tuple[float, ...]]) -> None:
+    """Run every collision of `sys.argv[-2]` and write the version and the answers to `sys.argv[-1]`.
 
     Parameters
     ----------
@@ -18,13 +18,11 @@ def serve(version: str, collide: Callable[..., tuple[float, float]]) -> None:
     collide
         Returns the velocities [m/s] of both balls after the contact. It gets what the entry passes to the code and
         m1, m2 [kg], R1, R2, gap [m], v1, v2 [m/s], step [s] and count, the number of steps. The balls lie on one
-        line, ball 1 on the left, and `gap` apart at the start.
+        line, ball 1 on the left, and `gap` apart at the start. At an oblique impact it also gets u1 [m/s] and
+        omega1 [rad/s], and returns v1, u1 and omega1 after the contact with a plane.
     """
     with open(sys.argv[-2], encoding="utf-8") as stream:
         collisions: list[dict[str, Any]] = json.load(stream)
-    restitutions = []
-    for collision in collisions:
-        v1, v2 = collide(**collision)
-        restitutions.append((v2 - v1) / (collision["v1"] - collision["v2"]))
+    answers = [collide(**collision) for collision in collisions]
     with open(sys.argv[-1], "w", encoding="utf-8") as stream:
-        json.dump({"version": version, "restitutions": restitutions}, stream)
+        json.dump({"version": version, "answers": answers}, stream)

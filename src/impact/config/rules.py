@@ -9,7 +9,7 @@ from dataclasses import replace
 from pydantic_core import PydanticCustomError
 
 from ..contact.dimensionless import required_quantities
-from ..contact.fixed_step import EXACT, SCHEMES, has_scheme, law_problem
+from ..contact.fixed_step import EXACT, SCHEMES, friction_problem, has_scheme, law_problem
 from ..contact.formula_calls import argument_names
 from ..contact.friction import HERTZ, FrictionLaw, parameter_problem, required_inputs
 from ..contact.frictions import frictions
@@ -18,7 +18,7 @@ from ..contact.model import ForceModel, with_base_quantities
 from .draft import Draft, listed_names
 from .files import as_table
 from .input_names import InputName
-from .quantities import ConfigProblem, Quantity, as_text
+from .quantities import ConfigProblem, Quantity
 from .tables import (
     FIXED_STEP_INPUTS,
     MATERIAL_QUANTITIES,
@@ -267,9 +267,9 @@ def _oblique_problems(draft: Draft) -> Iterable[ConfigProblem]:
             if other in sweep and not (other == "u1" and {"angle", "speed"} <= sweep.keys() and name == "speed"):
                 yield ("sweep", other), f"set together with {name}, expected one of the two"
     integrator = draft.table("solver").get("integrator", EXACT)
-    if integrator in SCHEMES:
-        message = f'got {as_text(integrator)}, expected "{EXACT}" with frictions, which have no fixed step'
-        yield ("solver", "integrator"), message
+    if isinstance(integrator, str) and integrator in SCHEMES:
+        problems = (friction_problem(law.key, law.kind, integrator) for law in draft.frictions)
+        yield from ((("solver", "integrator"), problem) for problem in problems if problem)
 
 
 def _spin_problems(draft: Draft) -> Iterable[ConfigProblem]:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from ..array_types import Array
 from ..errors import ModelError, UsageError, did_you_mean
 from .dimensionless import with_coefficients, with_units
+from .fixed_step_slip import FixedStepSlip
 from .formula_calls import Formula, argument_names
 from .model import ForceModel
 from .motion import MotionLaw, force_at_peak, indentation, unloading_state
@@ -41,6 +42,12 @@ SCHEMES = {
 LAWS_OF_SCHEME = {
     DRAKE_TAMSI: "F = K δ (1 + χ δ̇/v₀), n = 1, in both phases, such as drake-point-contact",
     DRAKE_SAP: "F = K δ + C δ̇ to F = 0, in both phases, such as kelvin-voigt-no-tension",
+}
+# the kinds of friction laws that a scheme takes, in both of which codes were run, and what it expects in words
+FRICTION_OF_SCHEME: Mapping[str, tuple[tuple[str, ...], str]] = {
+    KICK_DRIFT: (("spring", "dashpot"), "one with a spring or a dashpot, such as cundall-strack-1979"),
+    DRAKE_TAMSI: (("coulomb",), "coulomb-1785"),
+    DRAKE_SAP: ((), "none: friction changes the restitution that it delivers"),
 }
 # a contact that takes more steps, in units of its steps at the continuous contact time, never ends
 MAX_CONTACTS = 50
@@ -84,6 +91,16 @@ def law_problem(model: ForceModel, scheme: str) -> str:
     return f'scheme "{scheme}" does not take {model.key}, expected a law {LAWS_OF_SCHEME[scheme]}'
 
 
+def friction_problem(key: str, kind: str, scheme: str) -> str:
+    """Write the message to a user who asks for a scheme that does not take a friction law; "" if it does.
+
+    >>> friction_problem("drake-regularized", "regularized", "drake-tamsi")
+    'scheme "drake-tamsi" does not take the friction law drake-regularized, expected coulomb-1785'
+    """
+    kinds, expected = FRICTION_OF_SCHEME[scheme]
+    return "" if kind in kinds else f'scheme "{scheme}" does not take the friction law {key}, expected {expected}'
+
+
 @dataclass(frozen=True)
 class FixedStepResult:
     """Collisions at a fixed step, in the contact's own units; arrays of shape (n,).
@@ -121,6 +138,7 @@ def collide_at_fixed_step(
     phase: Array,
     max_steps: int | Array,
     scheme: str = KICK_DRIFT,
+    slip: FixedStepSlip | None = None,
 ) -> FixedStepResult:
     """Simulate collisions by a scheme with a fixed step.
 
@@ -135,6 +153,7 @@ def collide_at_fixed_step(
     step : in the contact's own unit of time, shape (k,)
     phase : where in its step the contact begins, 0 < phase <= 1, shape (k,)
     max_steps : for all or of shape (k,); a collision that takes more never separates
+    slip : the slip under friction, which is advanced to the end of each contact
     """
     check_scheme(model, n, scheme)
     count = step.size
@@ -143,7 +162,8 @@ def collide_at_fixed_step(
         law_values = with_coefficients(model, with_units(values, n), count)
         params = tuple(np.broadcast_to(law_values[name], count).copy() for name in law.names)
         limit = np.broadcast_to(np.asarray(max_steps, np.int64), count).copy()
-        return _run(_Contacts(law, params, step.copy(), phase * step, np.ones(count), limit, scheme))
+        part = None if slip is None else slip.take(np.arange(count))
+        return _run(_Contacts(law, params, step.copy(), phase * step, np.ones(count), limit, scheme, part), slip)
 
 
 class _Contacts:
@@ -158,8 +178,9 @@ class _Contacts:
         u: Array,
         limit: NDArray[np.int64],
         scheme: str,
+        slip: FixedStepSlip | None,
     ) -> None:
-        self.scheme = scheme
+        self.scheme, self.slip = scheme, slip
         self.law, self.params, self.step, self.x, self.u, self.limit = law, params, step, x, u, limit
         self.peak, self.residual = x.copy(), np.zeros_like(x)
         self.largest_force = np.full_like(x, -np.inf)
@@ -223,7 +244,12 @@ class _Contacts:
     def advance(self) -> None:
         """Advance all collisions by a step."""
         force = self.force()
-        self.u = self.next_velocity(force)
+        velocity = self.next_velocity(force)
+        if self.slip is not None:
+            # the schemes of Drake take the force at the end of the step
+            acting = force if self.scheme == KICK_DRIFT else (self.u - velocity) / self.step
+            self.slip.advance(self.x, acting, self.step)
+        self.u = velocity
         displacement = self.step * self.u
         self.x = self.x + displacement
         self._add_work(force, displacement)
@@ -280,9 +306,10 @@ class _Contacts:
                 setattr(self, name, value[active])
         self.params = tuple(column[active] for column in self.params)
         self.branch = tuple(column[active] for column in self.branch)
+        self.slip = None if self.slip is None else self.slip.take(active)
 
 
-def _run(contacts: _Contacts) -> FixedStepResult:
+def _run(contacts: _Contacts, slip: FixedStepSlip | None) -> FixedStepResult:
     count = contacts.x.size
     arrays: dict[str, NDArray[Any]] = {field.name: np.full(count, np.nan) for field in fields(FixedStepResult)}
     arrays["steps"] = contacts.limit.astype(np.int32)
@@ -309,6 +336,8 @@ def _run(contacts: _Contacts) -> FixedStepResult:
             result.restitution_work[rows] = ended.restitution_work()
             result.steps[rows] = step
             result.status[rows] = status
+            if slip is not None and ended.slip is not None:
+                slip.put(rows, ended.slip)
             active &= ~is_over
             if not active.any():
                 break

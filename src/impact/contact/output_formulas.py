@@ -118,7 +118,7 @@ def collide(
     pair, inputs = oblique
     with np.errstate(all="ignore"):
         own = np.where(checked == STATUS_OK, check_friction(pair, inputs), checked).astype(np.int8)
-        columns = {**of_law, **friction_values(pair, inputs)}
+        columns = {**values, **friction_values(pair, inputs)}
     shape = np.broadcast_shapes(own.shape, *(column.shape for column in columns.values()))
     tangential = simulate_friction(
         pair,
@@ -128,6 +128,7 @@ def collide(
         rtol=rtol,
         max_steps=max_steps,
         collapse=collapse,
+        integrator=integrator,
         errors=errors,
     )
     return outputs(model, impacts, result, names, checked, (inputs, tangential, pair.friction.kind))

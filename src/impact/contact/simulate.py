@@ -25,6 +25,7 @@ from . import motion
 from .deduplicate import deduplicate
 from .dimensionless import LawValues, chi_of, exact_restitution, with_coefficients, with_units
 from .fixed_step import EXACT, MAX_CONTACTS, FixedStepResult, collide_at_fixed_step
+from .fixed_step_slip import FixedStepSlip
 from .formula_calls import argument_names, describe_error
 from .model import ForceModel
 from .numba import dispatch
@@ -126,9 +127,9 @@ def simulate(
     )
     if integrator != EXACT:
         collide_part = partial(
-            _collide_at_fixed_steps, model, scheme=integrator, compute=integrate, max_steps=max_steps
+            collide_at_fixed_steps, model, scheme=integrator, compute=integrate, max_steps=max_steps
         )
-        simulate_part = partial(_simulate_fixed_steps, collide_part=collide_part)
+        simulate_part = partial(simulate_fixed_steps, collide_part=collide_part)
     return simulate_parts(CollisionResult, model.key, n, values, status, simulate_part, collapse, errors)
 
 
@@ -270,14 +271,14 @@ def distinct_problems(
         yield DistinctProblems(law, rows, first, row_of_impact, distinct_params, distinct_others)
 
 
-def _simulate_fixed_steps(
+def simulate_fixed_steps(
     n: float,
     values: ValueArrays,
     count: int,
     *,
-    collide_part: SimulatePart[CollisionResult],
+    collide_part: SimulatePart[T],
     collapse: bool,
-) -> CollisionResult:
+) -> T:
     """Integrate each distinct dimensionless problem at its fixed step once."""
     if collapse:
         first, row_of_impact = deduplicate([values[name] for name in sorted(values)], (count,))
@@ -287,7 +288,7 @@ def _simulate_fixed_steps(
     return collide_part(n, values, count, collapse=collapse)
 
 
-def _collide_at_fixed_steps(
+def collide_at_fixed_steps(
     model: ForceModel,
     n: float,
     values: ValueArrays,
@@ -297,8 +298,12 @@ def _collide_at_fixed_steps(
     compute: ComputeCollisions,
     collapse: bool,
     max_steps: int,
+    slip: FixedStepSlip | None = None,
 ) -> CollisionResult:
-    """Integrate impacts at a fixed step; if it is a part of the contact time, the continuous law comes first."""
+    """Integrate impacts at a fixed step; if it is a part of the contact time, the continuous law comes first.
+
+    `slip`, of the same impacts under friction, is advanced to their ends.
+    """
     of_law = {name: array for name, array in values.items() if name not in (STEPS_PER_CONTACT, STEP, PHASE)}
 
     def contact_times(rows: Positions, size: int) -> tuple[Array, NDArray[np.int8]]:
@@ -328,9 +333,12 @@ def _collide_at_fixed_steps(
         # at least the contacts of one step
         limits = np.ceil(MAX_CONTACTS * np.maximum(times[rows] / step[rows], 1.0))
         limits = np.fmin(limits, max_steps).astype(np.int64)
+        part = None if slip is None else slip.take(rows)
         fixed = collide_at_fixed_step(
-            model, n, _values_at(of_law, rows), step[rows], values[PHASE][rows], limits, scheme
+            model, n, _values_at(of_law, rows), step[rows], values[PHASE][rows], limits, scheme, part
         )
+        if slip is not None and part is not None:
+            slip.put(rows, part)
         _put_fixed_steps(result, rows, fixed, step[rows], limits >= max_steps)
 
     active = np.flatnonzero(status == STATUS_OK)

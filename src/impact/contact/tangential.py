@@ -9,26 +9,33 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..array_types import Array
+from ..array_types import Array, Mask
 from ..ode.problem import Params, Problem, Solution, Step
 from ..ode.rk45 import integrate
 from . import motion
 from .dimensionless import exact_restitution, with_coefficients, with_units
+from .fixed_step import EXACT
+from .fixed_step_slip import FixedStepSlip
 from .formula_calls import argument_names
 from .model import ForceModel
 from .piecewise import in_parts
 from .records import Record
 from .simulate import (
+    ComputeCollisions,
     DistinctProblems,
     Recovery,
+    SimulatePart,
     ValueArrays,
     check_coefficients,
+    collide_at_fixed_steps,
     distinct_problems,
+    integrate_collisions,
+    simulate_fixed_steps,
     simulate_parts,
     solve_phases,
 )
@@ -109,6 +116,7 @@ def simulate_friction(
     max_steps: int,
     collapse: bool = True,
     core: str = "numpy",
+    integrator: str = EXACT,
     errors: dict[str, str] | None = None,
 ) -> TangentialResult:
     """Integrate the slip of impacts by a pair of laws; one that fails has a status, and affects no other.
@@ -116,16 +124,24 @@ def simulate_friction(
     Parameters
     ----------
     n : compliance exponents, shape (k,)
-    values : `dimensionless_values` of the impacts by the normal law, and `friction_values`, each of shape (k,)
+    values : `dimensionless_values` of the impacts by the normal law, and `friction_values`, each of shape (k,);
+        for a scheme also those of its step, see `simulate`
     status : `FrictionStatus` by `check_inputs` and `check_friction`, shape (k,); impacts that are not OK are not
         integrated, nor are those without slip, or without friction, whose G0 is 0 or infinite
     core : "numpy"; another core, which only integrates normal motions, is not used
+    integrator : "exact", or a scheme with a fixed step, which has no works
 
     Raises
     ------
     ModelError : of the errors of a law, only what is raised outside its formulas
     """
-    simulate_part = partial(_simulate_distinct, pair, rtol=rtol, max_steps=max_steps)
+    simulate_part: SimulatePart[TangentialResult] = partial(
+        _simulate_distinct, pair, rtol=rtol, max_steps=max_steps
+    )
+    if integrator != EXACT:
+        compute = partial(integrate_collisions, rtol=rtol, max_steps=max_steps, core=core)
+        collide_part = partial(_slip_at_fixed_steps, pair, scheme=integrator, compute=compute, max_steps=max_steps)
+        simulate_part = partial(simulate_fixed_steps, collide_part=collide_part)
     return simulate_parts(TangentialResult, pair.key, n, values, status, simulate_part, collapse, errors)
 
 
@@ -157,20 +173,14 @@ def _simulate_distinct(
     model = _smooth_model(pair.model, form)
     law_values = with_coefficients(model, with_units(values, n), count)
     status = check_coefficients(model, law_values, values, count)
-    zero = np.zeros(count)
-    slip = np.ones(count) if form.kind == "coulomb" else np.abs(values[SLIP])
-    stiffness = values[TANGENTIAL_STIFFNESS] if form.kind == "spring" else zero
-    damping = values.get(TANGENTIAL_DAMPING, zero) if form.kind in ("spring", "dashpot") else zero
-    is_positive = values.get(LIMIT_POSITIVE, zero)
-    is_trivial = (slip == 0.0) | ~np.isfinite(slip)
-    for array in (stiffness, damping):
-        status[(status == STATUS_OK) & ~is_trivial & ~np.isfinite(array)] = Status.OUT_OF_RANGE
+    given = _tangential_columns(form, values, count)
+    status[(status == STATUS_OK) & given.is_invalid] = Status.OUT_OF_RANGE
     names = _coefficient_arguments(form)
     coefficient = (
-        (values[SLIP_SCALE] * slip, *(values[PREFIX + name] for name in names)) if form.coefficient else ()
+        (values[SLIP_SCALE] * given.slip, *(values[PREFIX + name] for name in names)) if form.coefficient else ()
     )
-    columns = (slip, stiffness, damping, is_positive, *coefficient)
-    chosen = (status == STATUS_OK) & ~is_trivial
+    columns = (*given, *coefficient)
+    chosen = (status == STATUS_OK) & ~given.is_trivial
     parts = [
         (problems.rows, _integrate(form, problems, rtol, max_steps, recorded).take(problems.row_of_impact))
         for problems in distinct_problems(model, n, law_values, chosen, collapse, columns)
@@ -181,6 +191,83 @@ def _simulate_distinct(
         result.sliding_impulse[status == LIMIT] = 1.0
         result.exact[:] *= 1.0 + exact_restitution(model, law_values, count)
     return result
+
+
+class TangentialColumns(NamedTuple):
+    """The values of tangential problems, shape (n,): abs(G0), k' and c', and whether the limit is positive."""
+
+    slip: Array
+    stiffness: Array
+    damping: Array
+    is_positive: Array
+
+    @property
+    def is_trivial(self) -> Mask:
+        """Whether there is no slip, or no friction."""
+        return np.asarray((self.slip == 0.0) | ~np.isfinite(self.slip))
+
+    @property
+    def is_invalid(self) -> Mask:
+        """Whether a value that the slip needs is not finite."""
+        return ~self.is_trivial & ~(np.isfinite(self.stiffness) & np.isfinite(self.damping))
+
+
+def _tangential_columns(form: TangentialForm, values: ValueArrays, count: int) -> TangentialColumns:
+    """Find the values of tangential problems among those of impacts; zero where the form has none."""
+    zero = np.zeros(count)
+    return TangentialColumns(
+        np.ones(count) if form.kind == "coulomb" else np.abs(values[SLIP]),
+        values[TANGENTIAL_STIFFNESS] if form.kind == "spring" else zero,
+        values.get(TANGENTIAL_DAMPING, zero) if form.kind in ("spring", "dashpot") else zero,
+        values.get(LIMIT_POSITIVE, zero),
+    )
+
+
+def _slip_at_fixed_steps(
+    pair: PairOfLaws,
+    n: float,
+    values: ValueArrays,
+    count: int,
+    *,
+    scheme: str,
+    compute: ComputeCollisions,
+    max_steps: int,
+    collapse: bool,
+) -> TangentialResult:
+    """Integrate slips at a fixed step; those without slip or friction as contacts without slip."""
+    form, given = pair.form(n), _tangential_columns(pair.form(n), values, count)
+    is_finite = np.isfinite(given.slip)
+    slip = FixedStepSlip.of(form, np.where(is_finite, given.slip, 0.0), *given[1:])
+    of_law = {name: array for name, array in values.items() if not name.startswith(PREFIX)}
+    collisions = collide_at_fixed_steps(
+        pair.model,
+        n,
+        of_law,
+        count,
+        scheme=scheme,
+        compute=compute,
+        collapse=collapse,
+        max_steps=max_steps,
+        slip=slip,
+    )
+    status = np.where(given.is_invalid & (collisions.status == STATUS_OK), Status.OUT_OF_RANGE, collisions.status)
+    has_answer = status == STATUS_OK
+    result = replace(
+        TangentialResult.blank(count),
+        sliding_impulse=np.where(has_answer, slip.impulse, np.nan),
+        steps=collisions.steps,
+        status=status.astype(np.int8),
+    )
+    if form.kind == "coulomb":
+        return result
+    regime = np.where(slip.sticks, np.where(slip.slips, BOTH, STICKS), SLIDES)
+    return replace(
+        result,
+        slip=np.where(has_answer, slip.slip, np.nan),
+        regime=np.where(has_answer, regime, 0).astype(np.int8),
+        slip_changes=np.where(has_answer, slip.changes, 0).astype(np.int32),
+        stiffness=given.stiffness / n if form.kind == "spring" else np.full(count, np.nan),
+    )
 
 
 def _smooth_model(model: ForceModel, form: TangentialForm) -> ForceModel:

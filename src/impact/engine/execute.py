@@ -74,12 +74,17 @@ def integrate_columns(law: PlanLaw, columns: Columns, solver: Solver) -> Integra
     problems, settings = (
         (columns["n"], values, columns["status"]),
         dict[str, Any](
-            rtol=solver.rtol, max_steps=solver.max_steps, collapse=solver.collapse, core=solver.core, errors=errors
+            rtol=solver.rtol,
+            max_steps=solver.max_steps,
+            collapse=solver.collapse,
+            core=solver.core,
+            integrator=solver.integrator,
+            errors=errors,
         ),
     )
     if isinstance(law, Pair):
         return simulate_friction(law, *problems, **settings), errors
-    return simulate(law, *problems, integrator=solver.integrator, **settings), errors
+    return simulate(law, *problems, **settings), errors
 
 
 def integrate_remotely(keys: Sequence[str], columns: Columns, context: WorkerContext) -> Integrated:

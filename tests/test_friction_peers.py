@@ -1,0 +1,182 @@
+"""Codes deliver at an oblique impact what the map of their scheme predicts: velocities and spins.
+
+A sphere meets a plane at angles from 10 to 80 degrees, with and without a spin, at 12 and 31 steps per contact and
+two phases of a step.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import impact
+
+from .test_peers import LAMMPS, Code, Values, run_code
+
+pytestmark = pytest.mark.peers
+
+ANGLES, MUS, SPINS, STEPS, PHASES = (
+    (10.0, 30.0, 45.0, 60.0, 80.0),
+    (0.1, 0.5),
+    (0.0, -10.0, 25.0),
+    (12, 31),
+    (0.125, 0.625),
+)
+BALL: Values = {"v1": 1.0, "m1": 1.0, "R1": 0.05}
+MATERIAL = {"E": 1e9, "nu": 0.3, "rho": 1000.0}
+# between a code whose lever arm is the radius and the map, relative to the speed before the impact
+TOLERANCE = 1e-10
+
+
+@dataclass(frozen=True)
+class Pairing:
+    """A contact force and a friction law, and how a code is made to run both.
+
+    `model` is the key of the contact force, `sweep` its inputs; `parameters` returns what the runner needs, from
+    the parameters of the friction law and mu.
+    """
+
+    friction: str
+    model: str
+    code: Code
+    sweep: Values
+    values: Values
+    parameters: Callable[[Values, float], Values]
+    tolerance: float = TOLERANCE
+
+    @property
+    def name(self) -> str:
+        values = ", ".join(f"{name}={value:g}" for name, value in self.values.items())
+        return f"{self.friction}-{self.model}-{values}"
+
+
+HOOKE: Values = {"e": 0.7, "K": 1e6, "n": 1.0}
+HERTZ: Values = {"e": 0.7, "material": "soft"}
+LAMMPS_WALL = replace(LAMMPS, runner="run_lammps_wall.py")
+
+
+def lammps_hooke(line: str) -> Callable[[Values, float], Values]:
+    """The line of fix wall/gran for a linear spring."""
+    normal = f"hooke {HOOKE['K']} {HOOKE['e']} damping coeff_restitution tangential"
+    return lambda values, mu: {"pair": f"{normal} {line.format(**values)} {mu}"}
+
+
+def lammps_hertz(name: str) -> Callable[[Values, float], Values]:
+    """The line of fix wall/gran for materials."""
+    normal = f"hertz/material {MATERIAL['E']} {HERTZ['e']} {MATERIAL['nu']} damping coeff_restitution tangential"
+    return lambda values, mu: {"pair": f"{normal} {name} NULL {values['xt']} {mu}"}
+
+
+MINDLIN = {
+    "lammps-mindlin": "mindlin",
+    "lammps-mindlin-force": "mindlin/force",
+    "lammps-mindlin-rescale": "mindlin_rescale",
+    "lammps-mindlin-rescale-force": "mindlin_rescale/force",
+}
+PAIRINGS = (
+    *(
+        Pairing(
+            "lammps-linear-history",
+            "lammps-coeff-restitution-hooke",
+            LAMMPS_WALL,
+            HOOKE,
+            {"k_t": ratio * HOOKE["K"], "xt": xt},
+            lammps_hooke("linear_history {k_t} {xt}"),
+        )
+        for ratio, xt in ((0.2, 0.0), (2 / 7, 0.5), (0.8, 1.0))
+    ),
+    *(
+        Pairing(
+            "lammps-linear-nohistory",
+            "lammps-coeff-restitution-hooke",
+            LAMMPS_WALL,
+            HOOKE,
+            {"xt": xt},
+            lammps_hooke("linear_nohistory {xt}"),
+        )
+        for xt in (0.5, 1.0)
+    ),
+    *(
+        Pairing(key, "lammps-coeff-restitution-hertz", LAMMPS_WALL, HERTZ, {"xt": xt}, lammps_hertz(name))
+        for key, name in MINDLIN.items()
+        for xt in (0.0, 0.6)
+    ),
+)
+
+
+def config_of(pairing: Pairing, sweep: Values, solver: Values) -> Values:
+    """The config of a pairing."""
+    wall = {"m2": math.inf, "R2": math.inf}
+    return {
+        "models": pairing.model,
+        "frictions": pairing.friction,
+        "sweep": {**BALL, **wall, **pairing.sweep, "mu": [*MUS], **sweep},
+        "materials": {"soft": MATERIAL},
+        "friction": {pairing.friction: pairing.values},
+        "solver": solver,
+    }
+
+
+def predicted(pairing: Pairing) -> tuple[float, np.ndarray]:
+    """The contact time [s], and v1, u1 and R1 omega1 after impacts, shape (mu, angle, spin, steps, phase, 3)."""
+    continuous = impact.sweep(config_of(pairing, {"mu": 0.1, "angle": "45 deg"}, {}))
+    axes = {
+        "angle": [f"{angle} deg" for angle in ANGLES],
+        "omega1": [*SPINS],
+        "steps_per_contact": [*STEPS],
+        "phase": [*PHASES],
+    }
+    result = impact.sweep(config_of(pairing, axes, {"integrator": "kick-drift"}))
+    dims = ("mu", *axes)
+    assert (result.friction_status == 1).all()
+    after = [result.v1_post, result.u1_post, BALL["R1"] * result.omega1_post]
+    columns = [
+        variable.isel(model=0, friction=0, missing_dims="ignore")
+        .expand_dims({dim: result.sizes[dim] for dim in dims if dim not in variable.dims})
+        .transpose(*dims)
+        .values
+        for variable in after
+    ]
+    return float(continuous.contact_time.squeeze()), np.stack(columns, axis=-1)
+
+
+def runs_of(pairing: Pairing, contact_time: float) -> list[Values]:
+    """The runs of a code in the order of `predicted`."""
+    return [
+        BALL
+        | pairing.parameters(pairing.values, mu)
+        | {
+            "u1": BALL["v1"] * math.tan(math.radians(angle)),
+            "omega1": spin,
+            "gap": (3 - phase) * contact_time / steps * BALL["v1"],
+            "step": contact_time / steps,
+            "count": math.ceil(2.5 * steps),
+        }
+        for mu in MUS
+        for angle in ANGLES
+        for spin in SPINS
+        for steps in STEPS
+        for phase in PHASES
+    ]
+
+
+@pytest.mark.parametrize("pairing", PAIRINGS, ids=lambda pairing: pairing.name)
+def test_a_code_delivers_velocities_and_spins_of_the_map_of_its_scheme(
+    pairing: Pairing, tmp_path: Path, record_property: Callable[[str, object], None]
+) -> None:
+    contact_time, ours = predicted(pairing)
+    version, answers = run_code(pairing.code, pairing.name, runs_of(pairing, contact_time), tmp_path)
+    theirs = np.array(answers).reshape(ours.shape) * (1.0, 1.0, BALL["R1"])
+    speed = BALL["v1"] / np.cos(np.radians(ANGLES)).reshape(1, -1, 1, 1, 1, 1)
+    difference = float((np.abs(theirs - ours) / speed).max())
+    variant = ", ".join(f"{name} {value:g}" for name, value in pairing.values.items())
+    key = f"{pairing.model} with {pairing.friction}"
+    record_property(
+        "peer", (pairing.code.name, version, key, variant, ours[..., 0].size, difference, pairing.tolerance)
+    )
+    assert difference <= pairing.tolerance
