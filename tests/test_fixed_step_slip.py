@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import impact
-from impact.errors import ConfigError
+from impact.errors import ConfigError, UsageError
 
 MATERIALS = {"soft": {"E": 1e9, "nu": 0.3, "rho": 1000.0}}
 HOOKE = {"e": 0.7, "K": 1e6, "n": 1.0}
@@ -120,3 +120,38 @@ def test_a_scheme_refuses_friction_of_which_no_code_was_run(scheme: str, frictio
         ConfigError, match=f'scheme "{scheme}" does not take the friction law {friction}, expected {expected}'
     ):
         sweep(model, friction, {}, HOOKE | STEP, scheme)
+
+
+def test_timestep_has_the_tangential_restitution_of_a_sweep_over_the_phases() -> None:
+    inputs = {**HOOKE, "v1": 1.0, "mu": 0.3, "angle": "45 deg", "friction.cundall-strack-1979.k_t": 3e5}
+    friction = "cundall-strack-1979"
+    result = impact.timestep(LINEAR, at=inputs, friction=friction, steps_per_contact=[12, 31], phases=4)
+    phases = [0.125, 0.375, 0.625, 0.875]
+    config = {
+        "models": LINEAR,
+        "frictions": friction,
+        "sweep": {**HOOKE, "v1": 1.0, "mu": 0.3, "angle": "45 deg", "m1": 1.0, "m2": 1.0, "R1": 0.02, "R2": 0.02,
+                  "steps_per_contact": [12, 31], "phase": phases},
+        "friction": {friction: {"k_t": 3e5}},
+        "solver": {"integrator": "kick-drift"},
+    }  # fmt: skip
+    beta = impact.sweep(config).beta.squeeze().transpose("steps_per_contact", "phase").values
+    assert [row.beta_mean for row in result.rows] == pytest.approx(beta.mean(axis=1), rel=1e-12)
+    assert [row.beta_least for row in result.rows] == pytest.approx(beta.min(axis=1), rel=1e-12)
+    assert [row.beta_largest for row in result.rows] == pytest.approx(beta.max(axis=1), rel=1e-12)
+    data = result.as_dict()
+    assert data["friction"] == friction
+    exact = impact.run(model=LINEAR, at=inputs, friction=friction).values["beta"]
+    assert data["beta_continuous"] == pytest.approx(exact, rel=1e-9)
+    assert {"beta_mean", "beta_least", "beta_largest"} <= data["rows"][0].keys()
+    central = impact.timestep(LINEAR, at={**HOOKE, "v1": 1.0}, steps_per_contact=[12], phases=4).as_dict()
+    assert "friction" not in central
+    assert "beta_mean" not in central["rows"][0]
+
+
+def test_timestep_without_friction_is_smooth_and_refuses_what_its_scheme_does_not_take() -> None:
+    inputs = {**HOOKE, "v1": 1.0, "mu": 0.0, "angle": "45 deg", "friction.cundall-strack-1979.k_t": 3e5}
+    (row,) = impact.timestep(LINEAR, at=inputs, friction="cundall-strack-1979", steps_per_contact=[12]).rows
+    assert row.beta_mean == -1.0
+    with pytest.raises(UsageError, match='scheme "kick-drift" does not take the friction law coulomb-1785'):
+        impact.timestep("hertz", at={"mu": 0.3, "angle": "45 deg"}, friction="coulomb-1785")

@@ -11,7 +11,16 @@ import impact
 from ..display import show
 from . import exits
 from .completion import complete_scheme
-from .options import AtOption, JsonOption, ModelKeyOption, ParameterOption, PluginOption, SetOption, SourceArgument
+from .options import (
+    AtOption,
+    FrictionKeyOption,
+    JsonOption,
+    ModelKeyOption,
+    ParameterOption,
+    PluginOption,
+    SetOption,
+    SourceArgument,
+)
 from .parsing import parse_number, parse_whole_number
 
 
@@ -67,6 +76,7 @@ def timestep(
             autocompletion=complete_scheme,
         ),
     ] = None,
+    friction: FrictionKeyOption = None,
     sets: SetOption = None,
     plugins: PluginOption = None,
     as_json: JsonOption = False,
@@ -75,7 +85,7 @@ def timestep(
 
     The restitution depends on the phase, the part of a step in which the contact begins.
 
-    The table has its mean, least and largest value over all phases.
+    The table has its mean, least and largest value over all phases; with a friction law, of beta too.
 
     If a phase fails, its step has none of them, and the exit code is 3.
     """
@@ -90,6 +100,7 @@ def timestep(
         tol=tol,
         parameter=parameter,
         scheme=scheme,
+        friction=friction,
         overrides=sets or (),
         plugins=plugins or (),
     )

@@ -59,9 +59,9 @@ class FixedStepSlip:
         return cls(
             form=form,
             slip=slip.copy(),
-            stiffness=stiffness,
-            damping=damping,
-            is_positive=is_positive,
+            stiffness=stiffness.copy(),
+            damping=damping.copy(),
+            is_positive=is_positive.copy(),
             memory=zero.copy(),
             last_power=np.full(slip.size, np.nan),
             impulse=zero.copy(),

@@ -260,6 +260,7 @@ def point_with_e(
     law: ForceModel,
     at: Mapping[str, float | str],
     replacing: Callable[[Config], Mapping[str, float] | None] = lambda config: None,
+    friction: str | None = None,
 ) -> PointWithE:
     """Reduce a source to one impact, and replace inputs; an e for a law without one is reached by its damping."""
     is_solved = "e" in at and "e" not in law.quantities
@@ -269,7 +270,7 @@ def point_with_e(
         if not {law.damping, f"{law.key}.{law.damping}"}.isdisjoint(at):
             raise UsageError(f"--at: got e and {law.damping}, expected one of the two")
         at = {**at, **placeholder(law, unknown_of(law, law.damping))}
-    config, defaulted_axes = single_point(source, law.key, at)
+    config, defaulted_axes = single_point(source, law.key, at, friction=friction)
     replaced = replacing(config)
     config = replace(config, scalars={**config.scalars, **(replaced or {})})
     if not is_solved:

@@ -24,7 +24,7 @@ from ..array_types import Array
 from ..config.files import read_number, read_numbers
 from ..config.input_names import InputName
 from ..config.load import Config
-from ..config.tables import SWEEP_QUANTITIES, TOLERANCE
+from ..config.tables import DEFAULT_RTOL, SWEEP_QUANTITIES, TOLERANCE
 from ..contact.dimensionless import dimensionless_values
 from ..contact.fixed_step import (
     MAX_CONTACTS,
@@ -33,16 +33,22 @@ from ..contact.fixed_step import (
     check_scheme,
     collide_at_fixed_step,
     default_scheme,
+    friction_problem,
 )
 from ..contact.formula_calls import argument_names
+from ..contact.friction import Pair, friction_values
 from ..contact.impacts import Impacts
 from ..contact.model import ForceModel, Parameter
 from ..contact.models import find
 from ..contact.output_formulas import collide
-from ..contact.status import FIRST_FAILURE, Status
+from ..contact.rigid import ObliqueImpacts
+from ..contact.simulate import PHASE, STEP
+from ..contact.status import FIRST_FAILURE, STATUS_OK, FrictionStatus, Status
+from ..contact.tangential import simulate_friction
 from ..contact.units import with_numbers
+from ..contact.variables import CENTRAL_OUTPUTS
 from ..display import Block, Displayed, Table
-from ..engine.build_impacts import build_impacts, rayleigh_time_at
+from ..engine.build_impacts import build_impacts, build_oblique, rayleigh_time_at
 from ..engine.plan import Plan
 from ..engine.plugins import Plugins, read_plugins
 from ..errors import UsageError
@@ -81,6 +87,7 @@ class TimestepRow:
     e_to_ask : the e to ask for, so that the mean is the e wanted; NaN for a law without an e, or if there is none
     status : of `impact.contact.status.Status`: "ok", or that of most of the collisions that fail
     failed : number of phases at which the collision fails
+    beta_mean, beta_least, beta_largest : tangential restitution over the phases; NaN without a friction law
     """
 
     dt: float
@@ -91,6 +98,9 @@ class TimestepRow:
     e_to_ask: float
     status: str = Status.OK.name.lower()
     failed: int = 0
+    beta_mean: float = math.nan
+    beta_least: float = math.nan
+    beta_largest: float = math.nan
 
     @property
     def is_too_long(self) -> bool:
@@ -116,6 +126,15 @@ class TimestepRow:
         mean = self.status if self.failed else decimals(self.e_mean)
         others = map(decimals, (self.e_least, self.e_largest, self.e_to_ask))
         return (number(self.steps_per_contact), number(self.dt), mean, *others)
+
+    @property
+    def friction_cells(self) -> tuple[str, ...]:
+        """Format the tangential restitution."""
+        return tuple(map(decimals, (self.beta_mean, self.beta_least, self.beta_largest)))
+
+    def as_dict(self, has_friction: bool) -> dict[str, Any]:
+        """Convert to plain data, without a tangential restitution if there is no friction."""
+        return {name: value for name, value in asdict(self).items() if has_friction or "beta" not in name}
 
 
 @dataclass(frozen=True)
@@ -181,6 +200,8 @@ class TimestepResult(Displayed):
     phases : number of phases of each row
     parameter, needed_parameter : what `tol` needs at a step, None if no value of the parameter is enough
     rayleigh_time : the smaller one of the two balls [s]; NaN if the law's stiffness does not follow from materials
+    friction : key of the friction law; "" without one
+    beta_continuous : tangential restitution of the continuous law
     """
 
     model: str
@@ -196,6 +217,8 @@ class TimestepResult(Displayed):
     parameter: str = ""
     needed_parameter: NeededParameter | None = None
     rayleigh_time: float = math.nan
+    friction: str = ""
+    beta_continuous: float = math.nan
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -204,20 +227,25 @@ class TimestepResult(Displayed):
 
     def as_dict(self) -> dict[str, Any]:
         """Convert to plain data; numbers that do not apply are NaN."""
-        options = ("phases", "tol", "parameter", "needed_parameter")
+        options = {"phases", "tol", "parameter", "needed_parameter"}
+        options |= set() if self.friction else {"friction", "beta_continuous"}
         data = {name: value for name, value in asdict(self).items() if name not in options}
+        data["rows"] = tuple(self.records())
         return {**data, "for": self.needed_parameter and self.needed_parameter.as_dict()}
 
     def records(self) -> Sequence[Mapping[str, Any]]:
         """List the rows, one for each step."""
-        return [asdict(row) for row in self.rows]
+        return [row.as_dict(bool(self.friction)) for row in self.rows]
 
     def sections(self, width: int) -> Iterator[Block]:
         """Write the continuous law, a row for each step, and the number of steps needed."""
         e = f"e = {number(self.e)}, " if self.e == self.e else ""
         e = "".join(f"{name} = {value!r}, " for name, value in self.solved.items()) if self.solved else e
         contact_time = quantity(self.contact_time, "s")
-        yield f"{self.model}: {e}e_out = {number(self.e_continuous)} in a contact time of {contact_time}"
+        laws, beta = self.model, ""
+        if self.friction:
+            laws, beta = f"{laws} with {self.friction}", f", beta = {number(self.beta_continuous)}"
+        yield f"{laws}: {e}e_out = {number(self.e_continuous)}{beta} in a contact time of {contact_time}"
         yield f"scheme: {self.scheme}"
         yield ""
         headings = ["steps per contact", "dt [s]", "e mean", "e least", "e largest", "e to ask"]
@@ -226,6 +254,10 @@ class TimestepResult(Displayed):
             headings.insert(2, "dt / T_R")
             for row, texts in zip(self.rows, cells, strict=True):
                 texts.insert(2, number(row.dt / self.rayleigh_time, 3))
+        if self.friction:
+            headings += ["beta mean", "least", "largest"]
+            for row, texts in zip(self.rows, cells, strict=True):
+                texts += row.friction_cells
         yield Table(cells, headings, text=())
         if self.rayleigh_time == self.rayleigh_time:
             yield f"T_R = {quantity(self.rayleigh_time, 's', 4)}: the smaller Rayleigh time of the two balls"
@@ -254,6 +286,7 @@ def timestep(
     tol: float | str | None = None,
     parameter: str | None = None,
     scheme: str | None = None,
+    friction: str | None = None,
     overrides: Sequence[str] = (),
     plugins: Sequence[ForceModel | str | Path] = (),
 ) -> TimestepResult:
@@ -275,6 +308,7 @@ def timestep(
     parameter : a parameter of the law, "K" or "materials.NAME.E", whose value from which on `tol` holds at the
         only `dt` is found, for a step that cannot be changed
     scheme : its name; by default "drake-tamsi" for the laws of Drake, "kick-drift" for all others
+    friction : key of the friction law of an oblique impact; by default the first one of the source, if any
 
     Returns
     -------
@@ -303,8 +337,10 @@ def timestep(
         raise UsageError("--for: expected one --dt and --tol as well")
     plugin_set = read_plugins(plugins)
     point_source = open_source(source, overrides, plugin_set)
-    point = point_with_e(point_source, find(model, plugin_set.models), at or {})
-    law, collision = fixed_step_law(point.config, phases, scheme)
+    point = point_with_e(point_source, find(model, plugin_set.models), at or {}, friction=friction)
+    if point.config.frictions:
+        Plan(point.config, plugin_set).pair_notes("frictions")
+    law, collision = fixed_step_law(point.config, phases, scheme, of_friction=True)
     steps = time_steps(law.contact_time, counts or (() if given else STEPS_PER_CONTACT), given)
     return TimestepResult(
         model=law.model.key,
@@ -322,7 +358,41 @@ def timestep(
         if parameter is None or tol is None
         else needed_parameter(point, plugin_set, parameter, given[0], tol, law, collision),
         rayleigh_time=law.rayleigh_time,
+        friction=law.oblique.pair.friction.key if law.oblique else "",
+        beta_continuous=collision.get("beta", math.nan),
     )
+
+
+@dataclass(frozen=True)
+class ObliqueLaw:
+    """A pair of laws, and the inputs of one oblique impact."""
+
+    pair: Pair
+    impact: ObliqueImpacts
+
+    def restitution(self, values: Mapping[str, Array], scheme: str, max_steps: int) -> Array:
+        """Compute beta of impacts at fixed steps, from the values of the normal problem and of the steps."""
+        count = values[STEP].size
+        friction = {
+            name: np.broadcast_to(column.ravel(), count)
+            for name, column in friction_values(self.pair, self.impact).items()
+        }
+        result = simulate_friction(
+            self.pair,
+            np.full(count, float(self.impact.impacts.n[0])),
+            {**values, **friction},
+            np.full(count, STATUS_OK, np.int8),
+            rtol=DEFAULT_RTOL,
+            max_steps=max_steps,
+            integrator=scheme,
+        )
+        with np.errstate(all="ignore"):
+            G0 = np.abs(self.impact.G0.ravel())
+            # Coulomb's friction ends where the slip does
+            slides = np.fmax(G0 - result.sliding_impulse, 0.0)
+            beta: Array = -(slides if self.pair.friction.kind == "coulomb" else result.slip) / G0
+        # 0.0 in place of -0.0
+        return np.where(np.isinf(G0), -1.0, beta) + 0.0
 
 
 @dataclass(frozen=True)
@@ -335,6 +405,7 @@ class FixedStepLaw:
     phases: int
     scheme: str
     rayleigh_time: float
+    oblique: ObliqueLaw | None = None
 
     @property
     def has_e(self) -> bool:
@@ -351,19 +422,31 @@ class FixedStepLaw:
 
     def collide(self, dt: Array, e: Array | None = None) -> FixedStepResult:
         """Collide at steps dt [s] with the e to ask for at each, over all phases, shape (k,) to (k phases,)."""
-        phase = (np.arange(self.phases) + 0.5) / self.phases
-        count = dt.size * self.phases
+        values = self._values(dt)
+        if e is not None:
+            values["e"] = np.repeat(e, self.phases)
+        step, phase = values.pop(STEP), values.pop(PHASE)
+        n = float(self.impact.n[0])
+        return collide_at_fixed_step(self.model, n, values, step, phase, self._max_steps(dt), self.scheme)
+
+    def tangential_restitution(self, dt: Array) -> Array:
+        """Compute beta at steps dt [s] over all phases, shape (k, phases); NaN without a friction law."""
+        if self.oblique is None:
+            return np.full((dt.size, self.phases), np.nan)
+        beta = self.oblique.restitution(self._values(dt), self.scheme, self._max_steps(dt))
+        return beta.reshape(dt.size, self.phases)
+
+    def _values(self, dt: Array) -> dict[str, Array]:
+        """Compute the values of the normal problem and of the steps, over all phases, shape (k phases,)."""
+        phase, count = (np.arange(self.phases) + 0.5) / self.phases, dt.size * self.phases
         values = {
             name: np.broadcast_to(value, count)
             for name, value in dimensionless_values(self.model, self.impact).items()
         }
-        if e is not None:
-            values["e"] = np.repeat(e, self.phases)
-        step = np.repeat(dt / self.impact.time[0], self.phases)
-        max_steps = math.ceil(MAX_CONTACTS * max(self.contact_time / float(dt.min()), 1.0))
-        return collide_at_fixed_step(
-            self.model, float(self.impact.n[0]), values, step, np.tile(phase, dt.size), max_steps, self.scheme
-        )
+        return {**values, STEP: np.repeat(dt / self.impact.time[0], self.phases), PHASE: np.tile(phase, dt.size)}
+
+    def _max_steps(self, dt: Array) -> int:
+        return math.ceil(MAX_CONTACTS * max(self.contact_time / float(dt.min()), 1.0))
 
 
 def timestep_rows(law: FixedStepLaw, dt: Sequence[float]) -> tuple[TimestepRow, ...]:
@@ -372,6 +455,7 @@ def timestep_rows(law: FixedStepLaw, dt: Sequence[float]) -> tuple[TimestepRow, 
     result = law.collide(steps)
     delivered = result.e_out.reshape(steps.size, law.phases)
     statuses = result.status.reshape(steps.size, law.phases)
+    betas = law.tangential_restitution(steps)
     e_compensated = compensated_e(law, steps)
     return tuple(
         TimestepRow(
@@ -383,6 +467,9 @@ def timestep_rows(law: FixedStepLaw, dt: Sequence[float]) -> tuple[TimestepRow, 
             e_to_ask=float(e_compensated[row]),
             status=_shared_status(statuses[row]).name.lower(),
             failed=int(np.count_nonzero(statuses[row] >= FIRST_FAILURE)),
+            beta_mean=float(betas[row].mean()),
+            beta_least=float(betas[row].min()),
+            beta_largest=float(betas[row].max()),
         )
         for row, e in enumerate(delivered)
     )
@@ -549,21 +636,42 @@ def _takes_moduli(config: Config, model: ForceModel) -> bool:
 
 
 def fixed_step_law(
-    config: Config, phases: int, scheme: str | None = None
+    config: Config, phases: int, scheme: str | None = None, *, of_friction: bool = False
 ) -> tuple[FixedStepLaw, dict[str, float]]:
-    """Build the law and impact of a config without axes, and the outputs of the continuous law by name, in SI."""
+    """Build the law and impact of a config without axes, and the outputs of the continuous law by name, in SI.
+
+    Its friction law is left out unless it is asked for.
+    """
     plan = Plan(config)
     model = config.models[0]
     impact = build_impacts(plan.inputs, model, ())
     scheme = default_scheme(model) if scheme is None else scheme
     check_scheme(model, float(impact.n[0]), scheme)
-    outputs = collide(model, impact, rtol=config.solver.rtol, max_steps=config.solver.max_steps)
-    collision = {name: array[0].item() for name, array in outputs.items()}
+    oblique = None
+    if of_friction and config.frictions:
+        law = config.frictions[0]
+        problem = friction_problem(law.key, law.kind, scheme)
+        if problem:
+            raise UsageError(problem)
+        oblique = ObliqueLaw(Pair(model, law), build_oblique(plan.inputs, impact, (), law))
+    outputs = collide(
+        model,
+        impact,
+        rtol=config.solver.rtol,
+        max_steps=config.solver.max_steps,
+        names=(*CENTRAL_OUTPUTS, *(("beta", "friction_status") if oblique else ())),
+        oblique=(oblique.pair, oblique.impact) if oblique else None,
+    )
+    collision = {name: array.ravel()[0].item() for name, array in outputs.items()}
     status = Status(collision["status"])
     if status != Status.OK:
         raise UsageError(f"{model.key} has no rebound at these inputs: {status.meaning}")
+    friction_status = FrictionStatus(collision.get("friction_status", FrictionStatus.OK))
+    if friction_status >= FIRST_FAILURE and oblique is not None:
+        raise UsageError(f"{oblique.pair.key} has no answer at these inputs: {friction_status.meaning}")
     wave_time = float(rayleigh_time_at(plan.inputs, ()).item()) if _takes_moduli(config, model) else math.nan
-    return FixedStepLaw(model, impact, collision["contact_time"], phases, scheme, wave_time), collision
+    contact_time = collision["contact_time"]
+    return FixedStepLaw(model, impact, contact_time, phases, scheme, wave_time, oblique), collision
 
 
 def time_steps(contact_time: float, steps_per_contact: Sequence[float], dt: Sequence[float]) -> list[float]:
