@@ -2,34 +2,68 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import asyncio
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from html import escape
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..config.grid import SAMPLE
+import numpy as np
+
+from ..config.grid import SAMPLE, Axis
+from ..config.load import Config
 from ..contact.model import ForceModel
-from ..errors import UsageError
+from ..engine.plan import Plan
+from ..engine.plugins import Plugins, read_plugins
+from ..errors import ImpactError, UsageError, did_you_mean
 from ..formatting import quantity, safe_text
+from ..results.provenance import config_of_part, stored_config
+from ..results.selection import in_si, law_positions, select
+from ..results.sweep import sweep_in_memory
 from ..results.xarray_backend import result_of
 from .draw import plot
 from .kinds import STUDIES, default_kind, find_kind, kinds_of, source_of
 from .slices import unit_of, x_axis
+from .style import is_geometric
 
 if TYPE_CHECKING:
     import xarray as xr
     from ipywidgets import VBox
 
-DPI = 110
+# of a picture, which a window that is wide enough shows at its own size
+WIDTH_INCHES, DPI = 5.5, 150
+MAX_PICTURE_WIDTH = "825px"
+# a change is drawn after this time without another one
+DELAY_S = 0.1
+COMPUTING = "<b>computing …</b>"
+# of the label beside a control; the rest of a longer one appears under the mouse
+MAX_LABEL_LETTERS = 20
+# points that are integrated again at values that are not on the grid, in some seconds
+MAX_POINTS_AGAIN = 100_000
 
 
-def explore(dataset: xr.Dataset | str | Path, *, plugins: Sequence[ForceModel | str | Path] = ()) -> VBox:
+def explore(
+    dataset: xr.Dataset | str | Path,
+    *,
+    kind: str | None = None,
+    sel: Mapping[str, float | str] | None = None,
+    models: Sequence[str] | None = None,
+    plugins: Sequence[ForceModel | str | Path] = (),
+) -> VBox:
     """Show a result with controls in a notebook: the kind of picture, the models, and a slider for each axis.
+
+    A slider takes any number between the values of its axis, also typed into the field beside it; at a number that
+    is not on the grid the laws are integrated again. An axis whose inputs vary together keeps to its values.
 
     Parameters
     ----------
     dataset : a result, or its file
+    kind : the first kind of picture, see `plot`
+    sel : the first values of axes, such as `{"m2": 1.0}`; those of others are the first of the grid
+    models : keys of the models that are selected first; by default all
     plugins : see `plot`
 
     Returns
@@ -38,10 +72,11 @@ def explore(dataset: xr.Dataset | str | Path, *, plugins: Sequence[ForceModel | 
 
     Raises
     ------
-    UsageError : it is not a result with models, or ipywidgets is not installed
+    UsageError : it is not a result with models, it does not contain what the arguments select, or ipywidgets is
+        not installed
 
     >>> import impact
-    >>> controls = impact.explore(impact.sweep("configs/figure6.toml"))
+    >>> controls = impact.explore(impact.sweep("configs/figure6.toml"), kind="restitution")
     """
     try:
         import ipywidgets
@@ -50,16 +85,19 @@ def explore(dataset: xr.Dataset | str | Path, *, plugins: Sequence[ForceModel | 
     dataset = result_of(dataset)
     if "model" not in dataset.dims:
         raise UsageError("expected the result of a sweep, with models; impact.plot draws a time history")
-
-    axes = axes_of(dataset)
+    kinds, axes, plugin_set = kinds_to_offer(dataset), axes_of(dataset), read_plugins(plugins)
+    if kind is not None and kind not in kinds:
+        raise UsageError(f'kind: no kind "{kind}" of this result; {did_you_mean(kind, kinds)}')
     keys = [str(key) for key in dataset["model"].values]
-    kind = ipywidgets.Dropdown(
-        options=kinds_to_offer(dataset), value=default_kind(dataset).name, description="kind"
-    )
-    models = ipywidgets.SelectMultiple(options=keys, value=keys, description="models", rows=min(len(keys), 8))
+    shown = [keys[position] for position in law_positions(models, dataset)] if models else keys
+    swept = [name for name in axes if dataset.sizes[name] > 1]
+    config, reasons = _config_and_reasons(dataset, swept, plugin_set)
+
+    kind_menu = ipywidgets.Dropdown(options=kinds, value=kind or default_kind(dataset).name, description="kind")
+    model_list = ipywidgets.SelectMultiple(options=keys, value=shown, description="models", rows=min(len(keys), 8))
     # none to choose from where there is no friction
     laws = [str(key) for key in dataset["friction"].values] if "friction" in dataset.dims else []
-    frictions = ipywidgets.SelectMultiple(
+    friction_list = ipywidgets.SelectMultiple(
         options=laws, value=laws, description="frictions", rows=min(len(laws), 8)
     )
     first = x_axis(dataset, None) if axes else None
@@ -67,32 +105,41 @@ def explore(dataset: xr.Dataset | str | Path, *, plugins: Sequence[ForceModel | 
     others = [name for name in axes if name != first]
     x = ipywidgets.Dropdown(options=axes, value=first, description="x")
     y = ipywidgets.Dropdown(options=axes, value=others[0] if others else first, description="y")
-    sliders = {
-        name: ipywidgets.SelectionSlider(
-            options=_shown_values(dataset[name]), description=name, continuous_update=False
-        )
-        for name in axes
-        if dataset.sizes[name] > 1
-    }
-    picture = ipywidgets.Image(format="png")
-    message = ipywidgets.HTML()
+    sliders = {name: _slider(dataset[name], is_free=name not in reasons) for name in swept}
+    for name, value in (sel or {}).items():
+        if name not in sliders:
+            raise UsageError(f'sel: no axis "{name}" to select along; {did_you_mean(name, swept)}')
+        sliders[name].value = _first_value(dataset, name, value, is_free=name not in reasons)
+    picture = ipywidgets.Image(format="png", layout={"width": "100%", "max_width": MAX_PICTURE_WIDTH})
+    message = ipywidgets.HTML(layout={"min_height": "2em"})
 
-    def update(change: object = None) -> None:
-        found = find_kind(kind.value)
+    def draw() -> None:
+        message.value = COMPUTING
+        found = find_kind(kind_menu.value)
         drawn = found.inputs_along(x.value, y.value)
         x.disabled, y.disabled = "x" not in found.along, "y" not in found.along
         for name, slider in sliders.items():
             slider.disabled = name in drawn
-        sel = {name: slider.value for name, slider in sliders.items() if name not in drawn}
+        at = {
+            name: slider.value if name in reasons else value_shown(slider.value, dataset[name].values)
+            for name, slider in sliders.items()
+            if name not in drawn
+        }
+        selected, frictions = list(model_list.value), list(friction_list.value)
+        off_grid = {name: value for name, value in at.items() if value not in dataset[name].values}
         try:
+            result = dataset
+            if off_grid and config and found.source != "history":
+                result = integrate_at(dataset, config, at, plugin_set, models=selected, frictions=frictions)
             figure = plot(
-                dataset,
-                kind=kind.value,
+                result,
+                kind=kind_menu.value,
                 x=None if x.disabled else x.value,
                 y=None if y.disabled else y.value,
-                sel=sel,
-                models=list(models.value),
-                frictions=list(frictions.value),
+                sel=at,
+                models=selected,
+                frictions=frictions,
+                width=WIDTH_INCHES,
                 plugins=plugins,
             )
         except UsageError as error:
@@ -100,13 +147,166 @@ def explore(dataset: xr.Dataset | str | Path, *, plugins: Sequence[ForceModel | 
             return
         png = BytesIO()
         figure.savefig(png, dpi=DPI)
-        picture.value, message.value = png.getvalue(), ""
+        picture.value = png.getvalue()
+        values = ", ".join(f"{name} = {value:.6g}" for name, value in off_grid.items())
+        message.value = escape(f"{values}: between values of the grid, integrated again") if values else ""
 
-    controls = [kind, models, *([frictions] if laws else []), x, y, *sliders.values()]
+    waiting: list[asyncio.TimerHandle] = []
+
+    def update(change: object) -> None:
+        message.value = COMPUTING
+        while waiting:
+            waiting.pop().cancel()
+        try:
+            # changes that arrived while a picture was drawn are handled first, so that only the last one is drawn
+            waiting.append(asyncio.get_running_loop().call_later(DELAY_S, draw))
+        except RuntimeError:
+            draw()
+
+    controls = [kind_menu, model_list, *([friction_list] if laws else []), x, y, *sliders.values()]
+    # ch: the width of a digit in the font of the page
+    longest = min(max(len(control.description) for control in controls), MAX_LABEL_LETTERS)
     for control in controls:
+        control.layout.width, control.style.description_width = "auto", f"{longest + 1}ch"
         control.observe(update, names="value")
-    update()
-    return ipywidgets.VBox([ipywidgets.HBox([ipywidgets.VBox(controls), picture]), message])
+    notes = "".join(f"<li>{escape(name)}: {escape(reason)}</li>" for name, reason in reasons.items())
+    if notes:
+        controls.append(ipywidgets.HTML(f"Values of the grid only:<ul>{notes}</ul>"))
+    draw()
+    # the picture goes below the controls where both do not fit side by side
+    columns = [
+        ipywidgets.VBox(controls, layout={"flex": "1 1 280px", "min_width": "0"}),
+        ipywidgets.VBox([message, picture], layout={"flex": "3 1 440px", "min_width": "0"}),
+    ]
+    return ipywidgets.VBox([ipywidgets.Box(columns, layout={"flex_flow": "row wrap", "width": "100%"})])
+
+
+def _slider(coordinate: xr.DataArray, *, is_free: bool) -> Any:
+    """Make the slider of an axis: of any number in its range with a field, or of its values."""
+    import ipywidgets
+
+    name, unit, values = str(coordinate.name), unit_of(coordinate), coordinate.values
+    if not is_free:
+        return ipywidgets.SelectionSlider(
+            options=_shown_values(coordinate), description=name, continuous_update=False
+        )
+    least, most = float(values.min()), float(values.max())
+    is_log = is_geometric(np.sort(values))
+    # a hundred positions or more, at round numbers
+    step = 0.01 if is_log else 10.0 ** math.floor(math.log10((most - least) / 100.0))
+    limits = (math.log10(least), math.log10(most)) if is_log else (least, most)
+    return (ipywidgets.FloatLogSlider if is_log else ipywidgets.FloatSlider)(
+        min=limits[0],
+        max=limits[1],
+        step=step,
+        value=values[0],
+        description=name if unit == "1" else f"{name} [{unit}]",
+        # six digits, without zeros at the end
+        readout_format=".6",
+        continuous_update=False,
+    )
+
+
+def _first_value(dataset: xr.Dataset, name: str, value: float | str, *, is_free: bool) -> Any:
+    """Read a value that a slider begins with."""
+    number, values = in_si(dataset[name], value), dataset[name].values
+    if is_free and isinstance(number, float | int) and values.min() <= number <= values.max():
+        return number
+    # the message about a value that is not there
+    return select(dataset, {name: value})[name].values.ravel()[0].item()
+
+
+def value_shown(value: float, grid: np.ndarray) -> float:
+    """Round a number to what a slider shows of it; where a value of the grid is shown alike, it is that value.
+
+    >>> value_shown(0.333333, np.array([1 / 3, 0.5])) == 1 / 3, value_shown(0.4000000001, np.array([0.5]))
+    (True, 0.4)
+    """
+    nearest = float(grid[np.argmin(np.abs(grid - value))])
+    return nearest if f"{nearest:.6g}" == f"{value:.6g}" else float(f"{value:.6g}")
+
+
+def _config_and_reasons(
+    dataset: xr.Dataset, axes: Sequence[str], plugins: Plugins
+) -> tuple[Config | None, dict[str, str]]:
+    """Read the config of a result, and find why some axes take values of the grid only."""
+    if not axes:
+        return None, {}
+    try:
+        config = stored_config(dataset.attrs, (), plugins, "the result")
+    except ImpactError as error:
+        return None, dict.fromkeys(axes, safe_text(str(error), 200))
+    by_name = {axis.name: axis for axis in config.axes}
+    reasons = {name: _why_on_grid(dataset[name], by_name.get(name)) for name in axes}
+    return config, {name: reason for name, reason in reasons.items() if reason}
+
+
+def _why_on_grid(coordinate: xr.DataArray, axis: Axis | None) -> str:
+    """Explain why an axis takes values of the grid only; empty if it takes any number between them."""
+    if axis is None:
+        return "not an axis of the stored config"
+    if axis.numbered or len(axis.columns) > 1:
+        return f"{', '.join(axis.columns)} vary together"
+    if coordinate.dtype.kind != "f":
+        return "names"
+    if not np.isfinite(coordinate.values).all():
+        return "has an infinite value"
+    if not np.isin(coordinate.values, axis.columns[axis.name]).all():
+        return "has values that the stored config does not have"
+    return ""
+
+
+def integrate_at(
+    dataset: xr.Dataset,
+    config: Config,
+    at: Mapping[str, Any],
+    plugins: Plugins,
+    *,
+    models: Sequence[str] = (),
+    frictions: Sequence[str] = (),
+) -> xr.Dataset:
+    """Integrate a part of a result again, at values that need not be on its grid.
+
+    Parameters
+    ----------
+    dataset : a result
+    config : its config
+    at : values of axes; each is then the only value of its axis, and other axes are those of the result
+    plugins : the plug-ins that it was computed with
+    models, frictions : keys of laws to integrate; by default all
+
+    Raises
+    ------
+    UsageError : there are more than MAX_POINTS_AGAIN points
+
+    >>> import impact
+    >>> from impact.engine.plugins import Plugins
+    >>> result = impact.sweep("configs/figure6.toml")
+    >>> config = stored_config(result.attrs, (), Plugins(), "result")
+    >>> part = integrate_at(result, config, {"e": 0.333}, Plugins(), models=["gharib-hurmuzlu-2012"])
+    >>> shot = impact.run("configs/figure6.toml", model="gharib-hurmuzlu-2012", at={"e": 0.333})
+    >>> part["e_out"].item() == shot.values["e_out"]
+    True
+    """
+    on_grid = {name: value for name, value in at.items() if value in dataset[name].values}
+    part = config_of_part(config, select(dataset, on_grid))
+    axes = tuple(
+        replace(axis, columns={axis.name: (at[axis.name],)}) if axis.name in at.keys() - on_grid else axis
+        for axis in part.axes
+    )
+    part = replace(
+        part,
+        axes=axes,
+        models=tuple(law for law in config.models if not models or law.key in models),
+        frictions=tuple(law for law in config.frictions if not frictions or law.key in frictions),
+    )
+    plan = Plan(part, plugins.of(part.models))
+    if plan.points > MAX_POINTS_AGAIN:
+        raise UsageError(
+            f"got {plan.points:,} points to integrate, expected at most {MAX_POINTS_AGAIN:,} at values "
+            "that are not on the grid; select fewer models"
+        )
+    return sweep_in_memory(plan)
 
 
 def kinds_to_offer(dataset: xr.Dataset) -> list[str]:
