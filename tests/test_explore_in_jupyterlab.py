@@ -3,29 +3,29 @@
 from __future__ import annotations
 
 import base64
+import io
 import json
-import shutil
 import socket
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 from urllib.request import urlopen
 
+import numpy as np
 import pytest
+from matplotlib import image
 
-from .conftest import ROOT
+import impact
+from impact.plots.explore import DPI, WIDTH_INCHES
 
 # a server, a kernel and a browser: `make test-faults` runs them
 pytestmark = pytest.mark.slow
 
-SETUP = """\
-import json
-import impact
-config = {
+CONFIG: dict[str, Any] = {
     "models": ["hertz", "hunt-crossley-1975", "lankarani-nikravesh-1990"],
     "sweep": {
         "e": {"linspace": [0.05, 0.95, 41]},
@@ -35,20 +35,11 @@ config = {
         "K": 1e9,
     },
 }
-box = impact.explore(impact.sweep(config), kind="final-velocities", sel={"m2": 4.0})
-box"""
-# the picture of another sweep, at values that the controls are at
-EXPECTED = """\
-import base64, io
-sweep = {**config["sweep"], "m2": M2}
-buffer = io.BytesIO()
-other = impact.plot(impact.sweep({**config, "sweep": sweep}), kind="final-velocities", sel={"m2": M2}, width=5.5)
-other.savefig(buffer, dpi=150)
-shot = impact.run({**config, "sweep": sweep}, model="hunt-crossley-1975", at={"e": 0.05})
-print("expected", base64.b64encode(buffer.getvalue()).decode())"""
-START_S, CHANGE_S = 25.0, 60.0
-# of the window, and of the output of the cell
-MIN_CONTROL_PX, MIN_TRACK_PX, MIN_LABEL_PX = 240, 60, 20
+CELL = f"import impact\nimpact.explore(impact.sweep({CONFIG}), kind='restitution', sel={{'m2': 4.0}})"
+# a window with the file browser, and a phone, on which it is closed
+WINDOWS = {"phone": (400, 800), "notebook": (1280, 900), "desktop": (1600, 900)}
+START_S, CHANGE_S = 120.0, 60.0
+MIN_CONTROL_PX, MIN_TRACK_PX = 240, 80
 MEASURE = """
 (() => {
   const box = element => { const r = element.getBoundingClientRect(); return [r.left, r.top, r.right, r.bottom] };
@@ -59,10 +50,12 @@ MEASURE = """
     output: box(output),
     picture: box(output.querySelector('img')),
     controls: controls.map(element => [text(element.querySelector('label')), box(element)]),
-    parts: [...output.querySelectorAll('label, select, .noUi-target, .widget-readout, img')].map(box),
+    parts: [...output.querySelectorAll('label, select, .noUi-target, .widget-readout, img')]
+      .filter(part => part.offsetParent).map(part => [part.className || part.tagName, box(part)]),
     tracks: [...output.querySelectorAll('.noUi-target')].map(box),
-    cut: [...output.querySelectorAll('label')].filter(one => one.scrollWidth > one.clientWidth + 1).map(text),
-    scrolls: output.scrollWidth > output.clientWidth + 1,
+    // whose content is wider: cut labels, and boxes with a scroll bar
+    cut: [output, ...output.querySelectorAll('label, .widget-box')]
+      .filter(part => part.scrollWidth > part.clientWidth + 1).map(part => part.className),
   };
 })()
 """
@@ -79,6 +72,18 @@ RUN = """
   return !!prompt && prompt !== '[ ]:';
 })()
 """
+# the messages and the pictures from now on
+WATCH = """
+(() => {
+  window.messages = [];
+  window.pictures = 0;
+  const output = document.querySelector('.jp-OutputArea-output .widget-box');
+  const message = output.querySelector('img').parentElement.querySelector('.widget-html-content');
+  new MutationObserver(() => messages.push(message.textContent)).observe(message, {childList: true});
+  new MutationObserver(() => pictures++).observe(output.querySelector('img'), {attributeFilter: ['src']});
+})()
+"""
+KEY_CODES = {"ArrowRight": 39, "Enter": 13}
 PICTURE = "document.querySelector('.jp-OutputArea-output .widget-box img')"
 
 
@@ -109,7 +114,6 @@ class Page:
     def wait_for(self, expression: str, limit_s: float = CHANGE_S, every_s: float = 0.02) -> Any:
         end = time.monotonic() + limit_s
         while not (value := self.evaluate(expression)):
-            if time.monotonic() >= end: self.screenshot(Path("/tmp/dbg.png"))
             assert time.monotonic() < end, f"{expression} is {value} after {limit_s} s"
             time.sleep(every_s)
         return value
@@ -123,10 +127,14 @@ class Page:
     def screenshot(self, path: Path) -> None:
         path.write_bytes(base64.b64decode(self.call("Page.captureScreenshot")["data"]))
 
-    def press(self, key: str, code: int, text: str = "") -> None:
+    def press(self, key: str) -> None:
         for kind in ("keyDown", "keyUp"):
-            typed = {"text": text} if text and kind == "keyDown" else {}
-            self.call("Input.dispatchKeyEvent", type=kind, key=key, windowsVirtualKeyCode=code, **typed)
+            self.call("Input.dispatchKeyEvent", type=kind, key=key, windowsVirtualKeyCode=KEY_CODES[key])
+
+    def png(self) -> bytes:
+        """The picture that is shown."""
+        read = "r => r.arrayBuffer().then(a => btoa(String.fromCharCode(...new Uint8Array(a))))"
+        return base64.b64decode(self.evaluate(f"fetch({PICTURE}.src).then({read})"))
 
 
 def free_port() -> int:
@@ -154,10 +162,14 @@ def page(chromium: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Pa
     """JupyterLab with a notebook whose cells have run, in a browser."""
     pytest.importorskip("jupyterlab", reason="no JupyterLab here: how controls look in it is not tested")
     folder = tmp_path_factory.mktemp("lab")
-    code = {"cell_type": "code", "metadata": {}, "outputs": [], "execution_count": None}
-    cells = [{**code, "id": f"cell-{number}", "source": text} for number, text in enumerate((SETUP, "pass"))]
+    cell = {"cell_type": "code", "id": "explore", "metadata": {}, "outputs": [], "execution_count": None}
     kernel = {"name": "python3", "display_name": "Python", "language": "python"}
-    notebook = {"cells": cells, "metadata": {"kernelspec": kernel}, "nbformat": 4, "nbformat_minor": 5}
+    notebook = {
+        "cells": [{**cell, "source": CELL}],
+        "metadata": {"kernelspec": kernel},
+        "nbformat": 4,
+        "nbformat_minor": 5,
+    }
     (folder / "work").mkdir()
     (folder / "work" / "explore.ipynb").write_text(json.dumps(notebook), encoding="utf-8")
     # without the question about news, which covers a corner
@@ -167,7 +179,11 @@ def page(chromium: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Pa
     ports = free_port(), free_port()
     lab = [
         *(sys.executable, "-m", "jupyterlab", "--no-browser", "--allow-root", f"--port={ports[0]}"),
-        *("--IdentityProvider.token=", "--LabApp.expose_app_in_browser=True", f"--ServerApp.root_dir={folder}/work"),
+        *(
+            "--IdentityProvider.token=",
+            "--LabApp.expose_app_in_browser=True",
+            f"--ServerApp.root_dir={folder}/work",
+        ),
         *(f"--LabApp.user_settings_dir={folder}/settings", f"--LabApp.workspaces_dir={folder}/workspaces"),
     ]
     browser = [
@@ -189,3 +205,76 @@ def page(chromium: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Pa
         page.wait_for(RUN, START_S, every_s=3.0)
         page.wait_for(f"!!{PICTURE}?.naturalWidth", START_S)
         yield page
+
+
+def overlap(one: list[float], other: list[float]) -> bool:
+    return all(min(one[i + 2], other[i + 2]) - max(one[i], other[i]) > 1.0 for i in (0, 1))
+
+
+@pytest.mark.parametrize("window", WINDOWS)
+def test_controls_are_legible_and_nothing_overlaps(page: Page, window: str, tmp_path: Path) -> None:
+    page.resize(*WINDOWS[window])
+    opened = page.evaluate("!!document.querySelector('.jp-FileBrowser')?.offsetParent")
+    if opened == (window == "phone"):
+        page.evaluate("void jupyterapp.commands.execute('application:toggle-left-area')")
+    page.evaluate("document.querySelector('.jp-OutputArea-output').scrollIntoView()")
+    time.sleep(1.0)
+    page.screenshot(tmp_path / f"{window}.png")
+    shown = page.evaluate(MEASURE)
+    assert [name for name, _ in shown["controls"]] == ["kind", "models", "x", "y", "e", "v1 [m/s]", "m2 [kg]"]
+    assert min(right - left for _, (left, _, right, _) in shown["controls"]) >= MIN_CONTROL_PX
+    assert min(right - left for left, _, right, _ in shown["tracks"]) >= MIN_TRACK_PX
+    assert shown["cut"] == []
+    parts = shown["parts"]
+    assert [(a, b) for i, a in enumerate(parts) for b in parts[:i] if overlap(a[1], b[1])] == []
+    left, top, right, _ = shown["picture"]
+    assert shown["output"][0] <= left < right <= shown["output"][2]
+    assert right - left > 0.5 * (shown["output"][2] - shown["output"][0])
+    _, (_, _, controls_right, controls_bottom) = shown["controls"][-1]
+    assert (top >= controls_bottom) if window == "phone" else (left >= controls_right)
+
+
+def set_field(page: Page, number: int, text: str) -> None:
+    """Type a number into the field of a slider."""
+    field = f"document.querySelectorAll('.widget-readout')[{number}]"
+    page.evaluate(f"{field}.focus(); getSelection().selectAllChildren({field})")
+    page.call("Input.insertText", text=text)
+    page.press("Enter")
+
+
+def pixels(png: bytes) -> Any:
+    return image.imread(io.BytesIO(png))
+
+
+def test_a_number_off_the_grid_is_integrated_again(page: Page) -> None:
+    before = page.png()
+    page.evaluate(WATCH)
+    set_field(page, 2, "2.5")
+    page.wait_for("pictures > 0 && messages.at(-1)?.startsWith('m2 = 2.5')")
+    assert page.evaluate("messages[0]") == "computing …"
+    sweep = impact.sweep({**CONFIG, "sweep": {**CONFIG["sweep"], "m2": [2.5]}})
+    for model in CONFIG["models"]:
+        run = impact.run(CONFIG, model=model, at={"m2": 2.5, "v1": 0.01, "e": 0.05})
+        assert sweep["e_out"].sel(model=model, e=0.05, v1=0.01, m2=2.5).item() == pytest.approx(
+            run.values["e_out"], rel=1e-12
+        )
+    expected = io.BytesIO()
+    impact.plot(sweep, kind="restitution", width=WIDTH_INCHES).savefig(expected, dpi=DPI)
+    assert np.array_equal(pixels(page.png()), pixels(expected.getvalue()))
+    assert page.png() != before
+
+
+def test_a_slider_that_moves_fast_draws_its_last_value(page: Page) -> None:
+    page.evaluate(WATCH)
+    before = page.png()
+    page.evaluate("document.querySelectorAll('.noUi-handle')[1].focus()")
+    for _ in range(20):
+        page.press("ArrowRight")
+    time.sleep(1.0)
+    page.wait_for("pictures > 0 && messages.at(-1)?.startsWith('v1 = ')")
+    value = float(page.evaluate("document.querySelectorAll('.widget-readout')[1].textContent"))
+    # each press is a step of its slider; a picture for each would queue up
+    assert value == pytest.approx(0.01 * 10.0**0.2, rel=1e-5)
+    assert page.evaluate("pictures") < 10
+    assert page.evaluate("messages.at(-1)").startswith(f"v1 = {value:.6g}")
+    assert page.png() != before

@@ -7,6 +7,7 @@ import html
 import json
 import math
 import re
+import shutil
 import subprocess
 import time
 from collections.abc import Callable, Iterator, Sequence

@@ -33,9 +33,9 @@ if TYPE_CHECKING:
     import xarray as xr
     from ipywidgets import VBox
 
-# of a picture, which a window that is wide enough shows at its own size
-WIDTH_INCHES, DPI = 5.5, 150
-MAX_PICTURE_WIDTH = "825px"
+# of a picture whose texts are legible at half of its size, on a phone; the largest width on a page
+WIDTH_INCHES, DPI = 4.5, 160
+MAX_PICTURE_WIDTH = f"{WIDTH_INCHES * DPI:.0f}px"
 # a change is drawn after this time without another one
 DELAY_S = 0.1
 COMPUTING = "<b>computing …</b>"
@@ -110,7 +110,9 @@ def explore(
         if name not in sliders:
             raise UsageError(f'sel: no axis "{name}" to select along; {did_you_mean(name, swept)}')
         sliders[name].value = _first_value(dataset, name, value, is_free=name not in reasons)
-    picture = ipywidgets.Image(format="png", layout={"width": "100%", "max_width": MAX_PICTURE_WIDTH})
+    picture = ipywidgets.Image(
+        format="png", layout={"width": "100%", "max_width": MAX_PICTURE_WIDTH, "margin": "0"}
+    )
     message = ipywidgets.HTML(layout={"min_height": "2em"})
 
     def draw() -> None:
@@ -169,16 +171,19 @@ def explore(
     for control in controls:
         control.layout.width, control.style.description_width = "auto", f"{longest + 1}ch"
         control.observe(update, names="value")
-    notes = "".join(f"<li>{escape(name)}: {escape(reason)}</li>" for name, reason in reasons.items())
-    if notes:
-        controls.append(ipywidgets.HTML(f"Values of the grid only:<ul>{notes}</ul>"))
+    notes = [f"{name} keeps to the grid: {reason}." for name, reason in reasons.items()]
+    if len(reasons) < len(swept):
+        notes = ["Click a number to type another one.", *notes]
+    lines = "".join(f"<p style='line-height: 1.4'>{escape(note)}</p>" for note in notes)
+    controls.append(ipywidgets.HTML(lines))
     draw()
     # the picture goes below the controls where both do not fit side by side
     columns = [
         ipywidgets.VBox(controls, layout={"flex": "1 1 280px", "min_width": "0"}),
         ipywidgets.VBox([message, picture], layout={"flex": "3 1 440px", "min_width": "0"}),
     ]
-    return ipywidgets.VBox([ipywidgets.Box(columns, layout={"flex_flow": "row wrap", "width": "100%"})])
+    box = ipywidgets.Box(columns, layout={"flex_flow": "row wrap", "width": "100%", "grid_gap": "4px 16px"})
+    return ipywidgets.VBox([box])
 
 
 def _slider(coordinate: xr.DataArray, *, is_free: bool) -> Any:
