@@ -95,8 +95,8 @@ def controls_of(box: Any) -> tuple[dict[str, Any], Any, Any]:
     (columns,) = box.children
     controls, shown = columns.children
     message, picture = shown.children
-    # without units
-    named = {control.description.split(" ")[0]: control for control in controls.children}
+    # without units and laws
+    named = {re.split(r"[, ]", control.description)[0]: control for control in controls.children}
     return {name: control for name, control in named.items() if name}, picture, message
 
 
@@ -165,8 +165,11 @@ def test_a_number_off_the_grid_gives_what_a_run_gives(config: dict[str, Any], na
     config["models"] = ["hertz", "hunt-crossley-1975", "tsuji-1992"]
     result = impact.sweep(config)
     controls, picture, message = controls_of(impact.explore(result, kind="restitution"))
-    controls[name].value = value
+    controls[name.rpartition(".")[2]].value = value
     assert message.value == f"{name} = {value:.6g}: between values of the grid, integrated again"
+    controls["models"].value = ["hertz"]
+    assert message.value.startswith(name)
+    controls["models"].value = config["models"]
     stored = stored_config(result.attrs, (), Plugins(), "result")
     again = integrate_at(result, stored, {name: value}, Plugins())
     assert np.array_equal(pixels(picture.value), drawn(again, kind="restitution"))

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..config.grid import SAMPLE, Axis
+from ..config.input_names import InputName
 from ..config.load import Config
 from ..contact.model import ForceModel
 from ..engine.plan import Plan
@@ -40,7 +41,7 @@ MAX_PICTURE_WIDTH = f"{WIDTH_INCHES * DPI:.0f}px"
 DELAY_S = 0.1
 COMPUTING = "<b>computing …</b>"
 # of the label beside a control; the rest of a longer one appears under the mouse
-MAX_LABEL_LETTERS = 20
+MAX_LABEL_LETTERS = 11
 # points that are integrated again at values that are not on the grid, in some seconds
 MAX_POINTS_AGAIN = 100_000
 
@@ -105,11 +106,10 @@ def explore(
     others = [name for name in axes if name != first]
     x = ipywidgets.Dropdown(options=axes, value=first, description="x")
     y = ipywidgets.Dropdown(options=axes, value=others[0] if others else first, description="y")
-    sliders = {name: _slider(dataset[name], is_free=name not in reasons) for name in swept}
-    for name, value in (sel or {}).items():
-        if name not in sliders:
+    for name in sel or {}:
+        if name not in swept:
             raise UsageError(f'sel: no axis "{name}" to select along; {did_you_mean(name, swept)}')
-        sliders[name].value = _first_value(dataset, name, value, is_free=name not in reasons)
+    sliders = {name: _slider(dataset, name, name not in reasons, (sel or {}).get(name)) for name in swept}
     picture = ipywidgets.Image(
         format="png", layout={"width": "100%", "max_width": MAX_PICTURE_WIDTH, "margin": "0"}
     )
@@ -144,11 +144,12 @@ def explore(
                 width=WIDTH_INCHES,
                 plugins=plugins,
             )
-        except UsageError as error:
-            message.value = escape(safe_text(str(error), 400))
-            return
-        png = BytesIO()
-        figure.savefig(png, dpi=DPI)
+            figure.savefig(png := BytesIO(), dpi=DPI)
+        except Exception as error:
+            message.value = escape(safe_text(str(error) or repr(error), 400))
+            if isinstance(error, ImpactError):
+                return
+            raise
         picture.value = png.getvalue()
         values = ", ".join(f"{name} = {value:.6g}" for name, value in off_grid.items())
         message.value = escape(f"{values}: between values of the grid, integrated again") if values else ""
@@ -170,12 +171,9 @@ def explore(
     longest = min(max(len(control.description) for control in controls), MAX_LABEL_LETTERS)
     for control in controls:
         control.layout.width, control.style.description_width = "auto", f"{longest + 1}ch"
+        control.tooltip = control.description
         control.observe(update, names="value")
-    notes = [f"{name} keeps to the grid: {reason}." for name, reason in reasons.items()]
-    if len(reasons) < len(swept):
-        notes = ["Click a number to type another one.", *notes]
-    lines = "".join(f"<p style='line-height: 1.4'>{escape(note)}</p>" for note in notes)
-    controls.append(ipywidgets.HTML(lines))
+    controls.append(ipywidgets.HTML(_notes(swept, reasons)))
     draw()
     # the picture goes below the controls where both do not fit side by side
     columns = [
@@ -186,39 +184,42 @@ def explore(
     return ipywidgets.VBox([box])
 
 
-def _slider(coordinate: xr.DataArray, *, is_free: bool) -> Any:
-    """Make the slider of an axis: of any number in its range with a field, or of its values."""
+def _notes(swept: Sequence[str], reasons: Mapping[str, str]) -> str:
+    """Write how to type a number, and which axes take values of the grid only, as HTML."""
+    notes = ["Click a number to type another one."] if len(reasons) < len(swept) else []
+    notes += [f"{name} keeps to the grid: {reason}." for name, reason in reasons.items()]
+    return "".join(f"<p style='line-height: 1.4'>{escape(note)}</p>" for note in notes)
+
+
+def _slider(dataset: xr.Dataset, name: str, is_free: bool, value: float | str | None) -> Any:
+    """Make the slider of an axis, of any number in its range with a field or of its values, at a value."""
     import ipywidgets
 
-    name, unit, values = str(coordinate.name), unit_of(coordinate), coordinate.values
+    parsed, unit, values = InputName.parse(name), unit_of(dataset[name]), dataset[name].values
+    # the parameter before its law, which may be cut
+    label = ", ".join(filter(None, (parsed.key if unit == "1" else f"{parsed.key} [{unit}]", parsed.owner)))
+    first = values[0].item() if value is None else in_si(dataset[name], value)
+    if not (is_free and isinstance(first, float | int) and values.min() <= first <= values.max()):
+        # one of the grid, or the message that there is no such value
+        first = select(dataset, {name: first})[name].values.ravel()[0].item()
     if not is_free:
         return ipywidgets.SelectionSlider(
-            options=_shown_values(coordinate), description=name, continuous_update=False
+            options=_shown_values(dataset[name]), value=first, description=label, continuous_update=False
         )
     least, most = float(values.min()), float(values.max())
     is_log = is_geometric(np.sort(values))
-    # a hundred positions or more, at round numbers
+    # at least a hundred positions, at round numbers
     step = 0.01 if is_log else 10.0 ** math.floor(math.log10((most - least) / 100.0))
-    limits = (math.log10(least), math.log10(most)) if is_log else (least, most)
     return (ipywidgets.FloatLogSlider if is_log else ipywidgets.FloatSlider)(
-        min=limits[0],
-        max=limits[1],
+        min=math.log10(least) if is_log else least,
+        max=math.log10(most) if is_log else most,
         step=step,
-        value=values[0],
-        description=name if unit == "1" else f"{name} [{unit}]",
+        value=first,
+        description=label,
         # six digits, without zeros at the end
         readout_format=".6",
         continuous_update=False,
     )
-
-
-def _first_value(dataset: xr.Dataset, name: str, value: float | str, *, is_free: bool) -> Any:
-    """Read a value that a slider begins with."""
-    number, values = in_si(dataset[name], value), dataset[name].values
-    if is_free and isinstance(number, float | int) and values.min() <= number <= values.max():
-        return number
-    # the message about a value that is not there
-    return select(dataset, {name: value})[name].values.ravel()[0].item()
 
 
 def value_shown(value: float, grid: np.ndarray) -> float:
@@ -252,8 +253,8 @@ def _why_on_grid(coordinate: xr.DataArray, axis: Axis | None) -> str:
         return "not an axis of the stored config"
     if axis.numbered or len(axis.columns) > 1:
         return f"{', '.join(axis.columns)} vary together"
-    if coordinate.dtype.kind != "f":
-        return "names"
+    if coordinate.dtype.kind != "f" or isinstance(InputName.parse(axis.name).word(axis.labels[0]), str):
+        return "its values are words"
     if not np.isfinite(coordinate.values).all():
         return "has an infinite value"
     if not np.isin(coordinate.values, axis.columns[axis.name]).all():
@@ -299,11 +300,13 @@ def integrate_at(
         replace(axis, columns={axis.name: (at[axis.name],)}) if axis.name in at.keys() - on_grid else axis
         for axis in part.axes
     )
+    # an axis of a law needs that law
+    owners = [InputName.parse(axis.name).owner for axis in axes]
     part = replace(
         part,
         axes=axes,
-        models=tuple(law for law in config.models if not models or law.key in models),
-        frictions=tuple(law for law in config.frictions if not frictions or law.key in frictions),
+        models=tuple(law for law in config.models if not models or law.key in (*models, *owners)),
+        frictions=tuple(law for law in config.frictions if not frictions or law.key in (*frictions, *owners)),
     )
     plan = Plan(part, plugins.of(part.models))
     if plan.points > MAX_POINTS_AGAIN:
@@ -340,4 +343,5 @@ def axes_of(dataset: xr.Dataset) -> list[str]:
 
 def _shown_values(coordinate: xr.DataArray) -> list[tuple[str, Any]]:
     """List the texts and values of the positions of an axis."""
-    return [(safe_text(quantity(value, unit_of(coordinate))), value) for value in coordinate.values.tolist()]
+    word, unit = InputName.parse(coordinate.name).word, unit_of(coordinate)
+    return [(safe_text(quantity(word(value), unit)), value) for value in coordinate.values.tolist()]
