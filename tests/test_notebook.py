@@ -208,6 +208,11 @@ def test_inputs_that_vary_together_keep_to_the_grid() -> None:
     controls["v1"].value = 1.5
     assert message.value.startswith("v1 = 1.5: ")
     assert bytes(picture.value) != before
+    walls = impact.sweep({**TWO_AXES, "sweep": {**TWO_AXES["sweep"], "m2": [1.0, float("inf")]}})
+    assert "m2 keeps to the grid: it has an infinite value." in controls_text(impact.explore(walls))
+    result = impact.sweep(TWO_AXES)
+    both = xr.concat([result, walls.isel(m2=[1])], "m2", coords="minimal", compat="override", join="outer")
+    assert "e keeps to the grid: the axes of the result are not those" in controls_text(impact.explore(both))
     unnamed = impact.sweep(TWO_AXES)
     del unnamed.attrs["config"]
     assert "e keeps to the grid: the result: contains no config" in controls_text(impact.explore(unnamed))

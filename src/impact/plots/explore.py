@@ -21,7 +21,7 @@ from ..engine.plan import Plan
 from ..engine.plugins import Plugins, read_plugins
 from ..errors import ImpactError, UsageError, did_you_mean
 from ..formatting import quantity, safe_text
-from ..results.provenance import config_of_part, stored_config
+from ..results.provenance import changed_plugins, config_of_part, stored_config
 from ..results.selection import in_si, law_positions, select
 from ..results.sweep import sweep_in_memory
 from ..results.xarray_backend import result_of
@@ -236,30 +236,27 @@ def _config_and_reasons(
     dataset: xr.Dataset, axes: Sequence[str], plugins: Plugins
 ) -> tuple[Config | None, dict[str, str]]:
     """Read the config of a result, and find why some axes take values of the grid only."""
-    if not axes:
-        return None, {}
     try:
-        config = stored_config(dataset.attrs, (), plugins, "the result")
+        config = stored_config(dataset.attrs, (), plugins, "the result", allow_changed_plugins=True)
+        for changed in changed_plugins(dataset.attrs, plugins, "the result"):
+            raise UsageError(changed)
+        by_name = {axis.name: axis for axis in config_of_part(config, dataset).axes}
+        if any(name not in by_name or by_name[name].size != dataset.sizes[name] for name in axes):
+            raise UsageError("the axes of the result are not those of its config")
     except ImpactError as error:
         return None, dict.fromkeys(axes, safe_text(str(error), 200))
-    by_name = {axis.name: axis for axis in config.axes}
-    reasons = {name: _why_on_grid(dataset[name], by_name.get(name)) for name in axes}
+    reasons = {name: _why_on_grid(by_name[name]) for name in axes}
     return config, {name: reason for name, reason in reasons.items() if reason}
 
 
-def _why_on_grid(coordinate: xr.DataArray, axis: Axis | None) -> str:
+def _why_on_grid(axis: Axis) -> str:
     """Explain why an axis takes values of the grid only; empty if it takes any number between them."""
-    if axis is None:
-        return "not an axis of the stored config"
     if axis.numbered or len(axis.columns) > 1:
         return f"{', '.join(axis.columns)} vary together"
-    if coordinate.dtype.kind != "f" or isinstance(InputName.parse(axis.name).word(axis.labels[0]), str):
+    word = InputName.parse(axis.name).word
+    if any(isinstance(word(value), str) for value in axis.labels):
         return "its values are words"
-    if not np.isfinite(coordinate.values).all():
-        return "has an infinite value"
-    if not np.isin(coordinate.values, axis.columns[axis.name]).all():
-        return "has values that the stored config does not have"
-    return ""
+    return "" if np.isfinite(np.asarray(axis.labels, float)).all() else "it has an infinite value"
 
 
 def integrate_at(
@@ -271,19 +268,10 @@ def integrate_at(
     models: Sequence[str] = (),
     frictions: Sequence[str] = (),
 ) -> xr.Dataset:
-    """Integrate a part of a result again, at values that need not be on its grid.
+    """Integrate a part of a result again, by some or all laws, at values of axes that need not be on its grid.
 
-    Parameters
-    ----------
-    dataset : a result
-    config : its config
-    at : values of axes; each is then the only value of its axis, and other axes are those of the result
-    plugins : the plug-ins that it was computed with
-    models, frictions : keys of laws to integrate; by default all
-
-    Raises
-    ------
-    UsageError : there are more than MAX_POINTS_AGAIN points
+    Each of these is then the only value of its axis; other axes are those of the result. More points than
+    MAX_POINTS_AGAIN are a UsageError.
 
     >>> import impact
     >>> from impact.engine.plugins import Plugins
@@ -295,16 +283,13 @@ def integrate_at(
     True
     """
     on_grid = {name: value for name, value in at.items() if value in dataset[name].values}
-    part = config_of_part(config, select(dataset, on_grid))
-    axes = tuple(
-        replace(axis, columns={axis.name: (at[axis.name],)}) if axis.name in at.keys() - on_grid else axis
-        for axis in part.axes
-    )
+    off_grid = {name: {name: (value,)} for name, value in at.items() if name not in on_grid}
+    axes = config_of_part(config, select(dataset, on_grid)).axes
     # an axis of a law needs that law
     owners = [InputName.parse(axis.name).owner for axis in axes]
     part = replace(
-        part,
-        axes=axes,
+        config,
+        axes=tuple(replace(axis, columns=off_grid.get(axis.name, axis.columns)) for axis in axes),
         models=tuple(law for law in config.models if not models or law.key in (*models, *owners)),
         frictions=tuple(law for law in config.frictions if not frictions or law.key in (*frictions, *owners)),
     )
