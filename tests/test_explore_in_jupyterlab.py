@@ -124,7 +124,14 @@ class Page:
         self.call(
             "Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False
         )
-        time.sleep(1.0)
+
+    def settled(self, expression: str) -> Any:
+        """The value of an expression after it has not changed for half a second."""
+        before, value = None, self.evaluate(expression)
+        while value != before:
+            time.sleep(0.5)
+            before, value = value, self.evaluate(expression)
+        return value
 
     def screenshot(self, path: Path) -> None:
         path.write_bytes(base64.b64decode(self.call("Page.captureScreenshot")["data"]))
@@ -220,9 +227,8 @@ def test_controls_are_legible_and_nothing_overlaps(page: Page, window: str, tmp_
     if opened == (window == "phone"):
         page.evaluate("void jupyterapp.commands.execute('application:toggle-left-area')")
     page.evaluate("document.querySelector('.jp-OutputArea-output').scrollIntoView()")
-    time.sleep(1.0)
+    shown = page.settled(MEASURE)
     page.screenshot(tmp_path / f"{window}.png")
-    shown = page.evaluate(MEASURE)
     assert [name for name, _ in shown["controls"]] == ["kind", "models", "x", "y", *SLIDERS]
     assert min(right - left for _, (left, _, right, _) in shown["controls"]) >= MIN_CONTROL_PX
     assert min(right - left for left, _, right, _ in shown["tracks"]) >= MIN_TRACK_PX
@@ -272,11 +278,9 @@ def test_a_slider_that_moves_fast_draws_its_last_value(page: Page) -> None:
     page.evaluate("document.querySelectorAll('.noUi-handle')[1].focus()")
     for _ in range(20):
         page.press("ArrowRight")
-    time.sleep(1.0)
-    page.wait_for("pictures > 0 && messages.at(-1)?.startsWith('v1 = ')")
+    # each press is a step of the slider; a picture for each would queue up
     value = float(page.evaluate("document.querySelectorAll('.widget-readout')[1].textContent"))
-    # each press is a step of its slider; a picture for each would queue up
     assert value == pytest.approx(0.01 * 10.0**0.2, rel=1e-5)
-    assert page.evaluate("pictures") < 10
-    assert page.evaluate("messages.at(-1)").startswith(f"v1 = {value:.6g}")
+    page.wait_for(f"pictures > 0 && messages.at(-1)?.startsWith('v1 = {value:.6g}')")
+    assert page.settled("pictures") < 10
     assert page.png() != before
