@@ -19,6 +19,8 @@ NOTEBOOKS = Path(__file__).parents[1] / "docs" / "notebooks"
 TIMEOUT_S = 300
 # of a picture that is stored
 COLOURS = 48
+# controls, which need a running notebook
+CONTROLS = "application/vnd.jupyter.widget-view+json"
 
 
 def executed(path: Path) -> NotebookNode:
@@ -35,6 +37,7 @@ def executed(path: Path) -> NotebookNode:
         timeout=TIMEOUT_S,
         record_timing=False,
         coalesce_streams=True,
+        store_widget_state=False,
         resources={"metadata": {"path": str(path.parent)}},
     )
     client.execute()
@@ -42,8 +45,12 @@ def executed(path: Path) -> NotebookNode:
 
 
 def texts(notebook: NotebookNode) -> list[list[str]]:
-    """The outputs of each cell as text, with numbers of four digits; of a picture, that it is one."""
-    return [[_text(output) for output in cell.outputs] for cell in notebook.cells if cell.cell_type == "code"]
+    """The outputs of each cell but controls, as text with numbers of four digits; of a picture, that it is one."""
+    return [
+        [_text(output) for output in cell.outputs if CONTROLS not in output.get("data", {})]
+        for cell in notebook.cells
+        if cell.cell_type == "code"
+    ]
 
 
 def _text(output: NotebookNode) -> str:
@@ -58,9 +65,11 @@ def _text(output: NotebookNode) -> str:
     )
 
 
-def with_small_pictures(notebook: NotebookNode) -> NotebookNode:
-    """The notebook with pictures of few colours, a fourth of their size."""
+def as_stored(notebook: NotebookNode) -> NotebookNode:
+    """The notebook without controls, and with pictures of few colours, a fourth of their size."""
     for cell in notebook.cells:
+        if "outputs" in cell:
+            cell.outputs = [output for output in cell.outputs if CONTROLS not in output.get("data", {})]
         for data in (output.get("data", {}) for output in cell.get("outputs", ())):
             if "image/png" in data:
                 small = BytesIO()
@@ -72,7 +81,7 @@ def with_small_pictures(notebook: NotebookNode) -> NotebookNode:
 
 def main() -> None:
     for path in sorted(NOTEBOOKS.glob("*.ipynb")):
-        nbformat.write(with_small_pictures(executed(path)), path)
+        nbformat.write(as_stored(executed(path)), path)
 
 
 if __name__ == "__main__":

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import os
 import re
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Hashable, Iterable, Iterator
@@ -279,3 +280,14 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
         terminalreporter.line(f"skipped  {reason}")
     for key, reason in without_peer:
         terminalreporter.line(f"no peer  {key}: {reason}")
+
+
+@pytest.fixture(scope="session")
+def chromium() -> str:
+    """The program of a real browser."""
+    names = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
+    playwright = sorted(Path.home().glob(".cache/ms-playwright/chromium*/*/*chrome*"))
+    executable = next(filter(None, map(shutil.which, [*names, *map(str, playwright)])), None)
+    if executable is None:
+        pytest.skip("no Chromium here: how a page looks in a browser is not tested")
+    return executable

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import asyncio
 import io
 import re
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,7 +17,10 @@ from matplotlib import image
 
 import impact
 from impact import progress_display
+from impact.engine.plugins import Plugins
 from impact.errors import UsageError
+from impact.plots.explore import COMPUTING, DELAY_S, DPI, WIDTH_INCHES, integrate_at
+from impact.results.provenance import stored_config
 
 from .conftest import ROOT, Run
 
@@ -87,9 +92,28 @@ TWO_AXES: dict[str, Any] = {
 
 def controls_of(box: Any) -> tuple[dict[str, Any], Any, Any]:
     """The controls of `impact.explore` by their names, the picture and the message."""
-    columns, message = box.children
-    controls, picture = columns.children
-    return {control.description: control for control in controls.children}, picture, message
+    (columns,) = box.children
+    controls, shown = columns.children
+    message, picture = shown.children
+    # without units and laws
+    named = {re.split(r"[, ]", control.description)[0]: control for control in controls.children}
+    return {name: control for name, control in named.items() if name}, picture, message
+
+
+def controls_text(box: Any) -> str:
+    """The notes below the controls."""
+    return str(box.children[0].children[0].children[-1].value)
+
+
+def pixels(png: bytes) -> Any:
+    return image.imread(io.BytesIO(png))
+
+
+def drawn(*words: Any, **choice: Any) -> Any:
+    """The picture that `impact.plot` draws, of the size of those of `impact.explore`."""
+    png = io.BytesIO()
+    impact.plot(*words, width=WIDTH_INCHES, **choice).savefig(png, dpi=DPI)
+    return pixels(png.getvalue())
 
 
 @pytest.mark.slow
@@ -108,9 +132,8 @@ def test_controls_draw_what_they_select() -> None:
         assert message.value == "", name
         assert bytes(picture.value) not in seen, name
         seen.add(bytes(picture.value))
-    drawn = io.BytesIO()
-    impact.plot(result, kind="error", x="e", sel={"m2": 2.0}, models=["hertz"]).savefig(drawn, dpi=110)
-    assert np.array_equal(*(image.imread(io.BytesIO(png)) for png in (bytes(picture.value), drawn.getvalue())))
+    expected = drawn(result, kind="error", x="e", sel={"m2": 2.0}, models=["hertz"])
+    assert np.array_equal(pixels(picture.value), expected)
     controls["kind"].value = "map"
     assert [name for name, control in controls.items() if control.disabled] == ["e", "m2"]
 
@@ -123,6 +146,92 @@ def test_controls_explain_what_cannot_be_drawn() -> None:
     assert "needs two axes" in message.value
     controls["kind"].value = "restitution"
     assert (message.value, bytes(picture.value) == before) == ("", False)
+
+
+ALONG_E = {"e": [0.2, 0.5, 0.8], "v1": 1.0, "m1": 1.0, "m2": [1.0, 2.0], "K": 1e6}
+MATERIALS = {"material1": ["steel", "aluminium"], "material2": "steel"}
+
+
+@pytest.mark.parametrize(
+    ("config", "name", "value"),
+    [
+        ({"sweep": ALONG_E}, "m2", 1.25),
+        ({"sweep": {**ALONG_E, "v1": {"geomspace": [0.01, 10.0, 4]}}}, "v1", 0.0234),
+        ({"sweep": {name: value for name, value in {**ALONG_E, **MATERIALS}.items() if name != "K"}}, "m2", 1.25),
+        ({"sweep": ALONG_E, "model": {"tsuji-1992": {"K": [1e5, 1e6]}}}, "tsuji-1992.K", 345678.0),
+    ],
+)
+def test_a_number_off_the_grid_gives_what_a_run_gives(config: dict[str, Any], name: str, value: float) -> None:
+    config["models"] = ["hertz", "hunt-crossley-1975", "tsuji-1992"]
+    result = impact.sweep(config)
+    controls, picture, message = controls_of(impact.explore(result, kind="restitution"))
+    controls[name.rpartition(".")[2]].value = value
+    assert message.value == f"{name} = {value:.6g}: between values of the grid, integrated again"
+    controls["models"].value = ["hertz"]
+    assert message.value.startswith(name)
+    controls["models"].value = config["models"]
+    stored = stored_config(result.attrs, (), Plugins(), "result")
+    again = integrate_at(result, stored, {name: value}, Plugins())
+    assert np.array_equal(pixels(picture.value), drawn(again, kind="restitution"))
+    for model in config["models"]:
+        at = {name: value} if name in ALONG_E or name.startswith(model) else {}
+        shot = impact.run(config, model=model, at={**at, "e": 0.5})
+        first = {dim: 0 for dim in again.sizes if dim not in ("model", "e", name)}
+        e_out = again["e_out"].isel(first).sel({"model": model, "e": 0.5, name: value}).item()
+        assert e_out == pytest.approx(shot.values["e_out"], rel=1e-12)
+
+
+def test_controls_begin_with_what_is_given(tmp_path: Path) -> None:
+    result = impact.sweep(TWO_AXES)
+    impact.save(result, tmp_path / "r.h5")
+    shown = impact.explore(tmp_path / "r.h5", kind="error", sel={"m2": "1500 g"}, models=["hertz"])
+    controls, _, _ = controls_of(shown)
+    assert [controls[name].value for name in ("kind", "m2", "models")] == ["error", 1.5, ("hertz",)]
+    for choice, expected in (
+        ({"kind": "eror"}, 'kind: no kind "eror" of this result; did you mean "error"'),
+        ({"sel": {"m1": 1.0}}, 'sel: no axis "m1" to select along; known: e, m2'),
+        ({"sel": {"m2": 3.0}}, "no m2 = 3.0 in this result; m2 is 1, 2"),
+        ({"models": ["herz"]}, 'no model "herz" in this result; did you mean "hertz"'),
+    ):
+        with pytest.raises(UsageError, match=re.escape(expected)):
+            impact.explore(result, **choice)
+
+
+def test_inputs_that_vary_together_keep_to_the_grid() -> None:
+    sweep = {**ALONG_E, "m1": [1.0, 2.0], "m2": [1.0, 3.0], "zip": [["m1", "m2"]], "v1": [1.0, 2.0]}
+    box = impact.explore(impact.sweep({"models": ["hertz", "hunt-crossley-1975"], "sweep": sweep}))
+    controls, picture, message = controls_of(box)
+    assert [text for text, _ in controls["m1"].options] == ["1 kg", "2 kg"]
+    assert "m1 keeps to the grid: m1, m2 vary together." in controls_text(box)
+    before = bytes(picture.value)
+    controls["m1"].value = 2.0
+    controls["v1"].value = 1.5
+    assert message.value.startswith("v1 = 1.5: ")
+    assert bytes(picture.value) != before
+    walls = impact.sweep({**TWO_AXES, "sweep": {**TWO_AXES["sweep"], "m2": [1.0, float("inf")]}})
+    assert "m2 keeps to the grid: it has an infinite value." in controls_text(impact.explore(walls))
+    result = impact.sweep(TWO_AXES)
+    both = xr.concat([result, walls.isel(m2=[1])], "m2", coords="minimal", compat="override", join="outer")
+    assert "e keeps to the grid: the axes of the result are not those" in controls_text(impact.explore(both))
+    unnamed = impact.sweep(TWO_AXES)
+    del unnamed.attrs["config"]
+    assert "e keeps to the grid: the result: contains no config" in controls_text(impact.explore(unnamed))
+
+
+def test_changes_that_arrive_together_are_drawn_once() -> None:
+    async def change_all() -> None:
+        for value in (1.25, 1.5, 1.75):
+            controls["m2"].value = value
+            assert message.value == COMPUTING
+            await asyncio.sleep(0.01)
+        await asyncio.sleep(10.0 * DELAY_S)
+
+    controls, picture, message = controls_of(impact.explore(impact.sweep(TWO_AXES)))
+    pictures: list[bytes] = []
+    picture.observe(lambda change: pictures.append(change["new"]), names="value")
+    asyncio.run(change_all())
+    assert len(pictures) == 1
+    assert message.value.startswith("m2 = 1.75: ")
 
 
 UNCERTAIN = {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path
 
@@ -32,6 +33,16 @@ def test_there_is_a_notebook_for_each_question_and_each_has_its_pictures() -> No
         shown = texts(nbformat.read(path, as_version=4))
         assert ["picture"] in shown, path.name
         assert path.stat().st_size < 500_000, path.name
+
+
+def test_a_notebook_calls_the_controls_and_shows_a_picture_of_them() -> None:
+    sources = [cell.source for cell in nbformat.read(NOTEBOOKS / "teaching.ipynb", as_version=4).cells]
+    (call,) = (
+        number for number, source in enumerate(sources) if "impact.explore(" in source and "![" not in source
+    )
+    picture = re.fullmatch(r"!\[.+\]\((.+)\)", sources[call + 1])
+    assert picture
+    assert (NOTEBOOKS / picture[1]).is_file()
 
 
 def test_the_notebook_of_figure_6_describes_the_lines_of_its_picture(figure6: xr.Dataset) -> None:

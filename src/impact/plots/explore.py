@@ -2,34 +2,69 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import asyncio
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from html import escape
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..config.grid import SAMPLE
+import numpy as np
+
+from ..config.grid import SAMPLE, Axis
+from ..config.input_names import InputName
+from ..config.load import Config
 from ..contact.model import ForceModel
-from ..errors import UsageError
+from ..engine.plan import Plan
+from ..engine.plugins import Plugins, read_plugins
+from ..errors import ImpactError, UsageError, did_you_mean
 from ..formatting import quantity, safe_text
+from ..results.provenance import changed_plugins, config_of_part, stored_config
+from ..results.selection import in_si, law_positions, select
+from ..results.sweep import sweep_in_memory
 from ..results.xarray_backend import result_of
 from .draw import plot
 from .kinds import STUDIES, default_kind, find_kind, kinds_of, source_of
 from .slices import unit_of, x_axis
+from .style import is_geometric
 
 if TYPE_CHECKING:
     import xarray as xr
     from ipywidgets import VBox
 
-DPI = 110
+# of a picture whose texts are legible at half of its size, on a phone; the largest width on a page
+WIDTH_INCHES, DPI = 4.5, 160
+MAX_PICTURE_WIDTH = f"{WIDTH_INCHES * DPI:.0f}px"
+# a change is drawn after this time without another one
+DELAY_S = 0.1
+COMPUTING = "<b>computing …</b>"
+# of the label beside a control; the rest of a longer one appears under the mouse
+MAX_LABEL_LETTERS = 11
+# points that are integrated again at values that are not on the grid, in some seconds
+MAX_POINTS_AGAIN = 100_000
 
 
-def explore(dataset: xr.Dataset | str | Path, *, plugins: Sequence[ForceModel | str | Path] = ()) -> VBox:
+def explore(
+    dataset: xr.Dataset | str | Path,
+    *,
+    kind: str | None = None,
+    sel: Mapping[str, float | str] | None = None,
+    models: Sequence[str] | None = None,
+    plugins: Sequence[ForceModel | str | Path] = (),
+) -> VBox:
     """Show a result with controls in a notebook: the kind of picture, the models, and a slider for each axis.
+
+    A slider takes any number between the values of its axis, also typed into the field beside it; at a number that
+    is not on the grid the laws are integrated again. An axis whose inputs vary together keeps to its values.
 
     Parameters
     ----------
     dataset : a result, or its file
+    kind : the first kind of picture, see `plot`
+    sel : the first values of axes, such as `{"m2": 1.0}`; those of others are the first of the grid
+    models : keys of the models that are selected first; by default all
     plugins : see `plot`
 
     Returns
@@ -38,10 +73,11 @@ def explore(dataset: xr.Dataset | str | Path, *, plugins: Sequence[ForceModel | 
 
     Raises
     ------
-    UsageError : it is not a result with models, or ipywidgets is not installed
+    UsageError : it is not a result with models, it does not contain what the arguments select, or ipywidgets is
+        not installed
 
     >>> import impact
-    >>> controls = impact.explore(impact.sweep("configs/figure6.toml"))
+    >>> controls = impact.explore(impact.sweep("configs/figure6.toml"), kind="restitution")
     """
     try:
         import ipywidgets
@@ -50,16 +86,19 @@ def explore(dataset: xr.Dataset | str | Path, *, plugins: Sequence[ForceModel | 
     dataset = result_of(dataset)
     if "model" not in dataset.dims:
         raise UsageError("expected the result of a sweep, with models; impact.plot draws a time history")
-
-    axes = axes_of(dataset)
+    kinds, axes, plugin_set = kinds_to_offer(dataset), axes_of(dataset), read_plugins(plugins)
+    if kind is not None and kind not in kinds:
+        raise UsageError(f'kind: no kind "{kind}" of this result; {did_you_mean(kind, kinds)}')
     keys = [str(key) for key in dataset["model"].values]
-    kind = ipywidgets.Dropdown(
-        options=kinds_to_offer(dataset), value=default_kind(dataset).name, description="kind"
-    )
-    models = ipywidgets.SelectMultiple(options=keys, value=keys, description="models", rows=min(len(keys), 8))
+    shown = [keys[position] for position in law_positions(models, dataset)] if models else keys
+    swept = [name for name in axes if dataset.sizes[name] > 1]
+    config, reasons = _config_and_reasons(dataset, swept, plugin_set)
+
+    kind_menu = ipywidgets.Dropdown(options=kinds, value=kind or default_kind(dataset).name, description="kind")
+    model_list = ipywidgets.SelectMultiple(options=keys, value=shown, description="models", rows=min(len(keys), 8))
     # none to choose from where there is no friction
     laws = [str(key) for key in dataset["friction"].values] if "friction" in dataset.dims else []
-    frictions = ipywidgets.SelectMultiple(
+    friction_list = ipywidgets.SelectMultiple(
         options=laws, value=laws, description="frictions", rows=min(len(laws), 8)
     )
     first = x_axis(dataset, None) if axes else None
@@ -67,46 +106,200 @@ def explore(dataset: xr.Dataset | str | Path, *, plugins: Sequence[ForceModel | 
     others = [name for name in axes if name != first]
     x = ipywidgets.Dropdown(options=axes, value=first, description="x")
     y = ipywidgets.Dropdown(options=axes, value=others[0] if others else first, description="y")
-    sliders = {
-        name: ipywidgets.SelectionSlider(
-            options=_shown_values(dataset[name]), description=name, continuous_update=False
-        )
-        for name in axes
-        if dataset.sizes[name] > 1
-    }
-    picture = ipywidgets.Image(format="png")
-    message = ipywidgets.HTML()
+    for name in sel or {}:
+        if name not in swept:
+            raise UsageError(f'sel: no axis "{name}" to select along; {did_you_mean(name, swept)}')
+    sliders = {name: _slider(dataset, name, name not in reasons, (sel or {}).get(name)) for name in swept}
+    picture = ipywidgets.Image(
+        format="png", layout={"width": "100%", "max_width": MAX_PICTURE_WIDTH, "margin": "0"}
+    )
+    message = ipywidgets.HTML(layout={"min_height": "2em"})
 
-    def update(change: object = None) -> None:
-        found = find_kind(kind.value)
+    def draw() -> None:
+        message.value = COMPUTING
+        found = find_kind(kind_menu.value)
         drawn = found.inputs_along(x.value, y.value)
         x.disabled, y.disabled = "x" not in found.along, "y" not in found.along
         for name, slider in sliders.items():
             slider.disabled = name in drawn
-        sel = {name: slider.value for name, slider in sliders.items() if name not in drawn}
+        at = {
+            name: slider.value if name in reasons else value_shown(slider.value, dataset[name].values)
+            for name, slider in sliders.items()
+            if name not in drawn
+        }
+        selected, frictions = list(model_list.value), list(friction_list.value)
+        off_grid = {name: value for name, value in at.items() if value not in dataset[name].values}
         try:
+            result = dataset
+            if off_grid and config and found.source != "history":
+                result = integrate_at(dataset, config, at, plugin_set, models=selected, frictions=frictions)
             figure = plot(
-                dataset,
-                kind=kind.value,
+                result,
+                kind=kind_menu.value,
                 x=None if x.disabled else x.value,
                 y=None if y.disabled else y.value,
-                sel=sel,
-                models=list(models.value),
-                frictions=list(frictions.value),
+                sel=at,
+                models=selected,
+                frictions=frictions,
+                width=WIDTH_INCHES,
                 plugins=plugins,
             )
-        except UsageError as error:
-            message.value = escape(safe_text(str(error), 400))
-            return
-        png = BytesIO()
-        figure.savefig(png, dpi=DPI)
-        picture.value, message.value = png.getvalue(), ""
+            figure.savefig(png := BytesIO(), dpi=DPI)
+        except Exception as error:
+            message.value = escape(safe_text(str(error) or repr(error), 400))
+            if isinstance(error, ImpactError):
+                return
+            raise
+        picture.value = png.getvalue()
+        values = ", ".join(f"{name} = {value:.6g}" for name, value in off_grid.items())
+        message.value = escape(f"{values}: between values of the grid, integrated again") if values else ""
 
-    controls = [kind, models, *([frictions] if laws else []), x, y, *sliders.values()]
+    waiting: list[asyncio.TimerHandle] = []
+
+    def update(change: object) -> None:
+        message.value = COMPUTING
+        while waiting:
+            waiting.pop().cancel()
+        try:
+            # changes that arrived while a picture was drawn are handled first, so that only the last one is drawn
+            waiting.append(asyncio.get_running_loop().call_later(DELAY_S, draw))
+        except RuntimeError:
+            draw()
+
+    controls = [kind_menu, model_list, *([friction_list] if laws else []), x, y, *sliders.values()]
+    # ch: the width of a digit in the font of the page
+    longest = min(max(len(control.description) for control in controls), MAX_LABEL_LETTERS)
     for control in controls:
+        control.layout.width, control.style.description_width = "auto", f"{longest + 1}ch"
+        control.tooltip = control.description
         control.observe(update, names="value")
-    update()
-    return ipywidgets.VBox([ipywidgets.HBox([ipywidgets.VBox(controls), picture]), message])
+    controls.append(ipywidgets.HTML(_notes(swept, reasons)))
+    draw()
+    # the picture goes below the controls where both do not fit side by side
+    columns = [
+        ipywidgets.VBox(controls, layout={"flex": "1 1 280px", "min_width": "0"}),
+        ipywidgets.VBox([message, picture], layout={"flex": "3 1 440px", "min_width": "0"}),
+    ]
+    box = ipywidgets.Box(columns, layout={"flex_flow": "row wrap", "width": "100%", "grid_gap": "4px 16px"})
+    return ipywidgets.VBox([box])
+
+
+def _notes(swept: Sequence[str], reasons: Mapping[str, str]) -> str:
+    """Write how to type a number, and which axes take values of the grid only, as HTML."""
+    notes = ["Click a number to type another one."] if len(reasons) < len(swept) else []
+    notes += [f"{name} keeps to the grid: {reason}." for name, reason in reasons.items()]
+    return "".join(f"<p style='line-height: 1.4'>{escape(note)}</p>" for note in notes)
+
+
+def _slider(dataset: xr.Dataset, name: str, is_free: bool, value: float | str | None) -> Any:
+    """Make the slider of an axis, of any number in its range with a field or of its values, at a value."""
+    import ipywidgets
+
+    parsed, unit, values = InputName.parse(name), unit_of(dataset[name]), dataset[name].values
+    # the parameter before its law, which may be cut
+    label = ", ".join(filter(None, (parsed.key if unit == "1" else f"{parsed.key} [{unit}]", parsed.owner)))
+    first = values[0].item() if value is None else in_si(dataset[name], value)
+    if not (is_free and isinstance(first, float | int) and values.min() <= first <= values.max()):
+        # one of the grid, or the message that there is no such value
+        first = select(dataset, {name: first})[name].values.ravel()[0].item()
+    if not is_free:
+        return ipywidgets.SelectionSlider(
+            options=_shown_values(dataset[name]), value=first, description=label, continuous_update=False
+        )
+    least, most = float(values.min()), float(values.max())
+    is_log = is_geometric(np.sort(values))
+    # at least a hundred positions, at round numbers
+    step = 0.01 if is_log else 10.0 ** math.floor(math.log10((most - least) / 100.0))
+    return (ipywidgets.FloatLogSlider if is_log else ipywidgets.FloatSlider)(
+        min=math.log10(least) if is_log else least,
+        max=math.log10(most) if is_log else most,
+        step=step,
+        value=first,
+        description=label,
+        # six digits, without zeros at the end
+        readout_format=".6",
+        continuous_update=False,
+    )
+
+
+def value_shown(value: float, grid: np.ndarray) -> float:
+    """Round a number to what a slider shows of it; where a value of the grid is shown alike, it is that value.
+
+    >>> value_shown(0.333333, np.array([1 / 3, 0.5])) == 1 / 3, value_shown(0.4000000001, np.array([0.5]))
+    (True, 0.4)
+    """
+    nearest = float(grid[np.argmin(np.abs(grid - value))])
+    return nearest if f"{nearest:.6g}" == f"{value:.6g}" else float(f"{value:.6g}")
+
+
+def _config_and_reasons(
+    dataset: xr.Dataset, axes: Sequence[str], plugins: Plugins
+) -> tuple[Config | None, dict[str, str]]:
+    """Read the config of a result, and find why some axes take values of the grid only."""
+    try:
+        config = stored_config(dataset.attrs, (), plugins, "the result", allow_changed_plugins=True)
+        for changed in changed_plugins(dataset.attrs, plugins, "the result"):
+            raise UsageError(changed)
+        by_name = {axis.name: axis for axis in config_of_part(config, dataset).axes}
+        if any(name not in by_name or by_name[name].size != dataset.sizes[name] for name in axes):
+            raise UsageError("the axes of the result are not those of its config")
+    except ImpactError as error:
+        return None, dict.fromkeys(axes, safe_text(str(error), 200))
+    reasons = {name: _why_on_grid(by_name[name]) for name in axes}
+    return config, {name: reason for name, reason in reasons.items() if reason}
+
+
+def _why_on_grid(axis: Axis) -> str:
+    """Explain why an axis takes values of the grid only; empty if it takes any number between them."""
+    if axis.numbered or len(axis.columns) > 1:
+        return f"{', '.join(axis.columns)} vary together"
+    word = InputName.parse(axis.name).word
+    if any(isinstance(word(value), str) for value in axis.labels):
+        return "its values are words"
+    return "" if np.isfinite(np.asarray(axis.labels, float)).all() else "it has an infinite value"
+
+
+def integrate_at(
+    dataset: xr.Dataset,
+    config: Config,
+    at: Mapping[str, Any],
+    plugins: Plugins,
+    *,
+    models: Sequence[str] = (),
+    frictions: Sequence[str] = (),
+) -> xr.Dataset:
+    """Integrate a part of a result again, by some or all laws, at values of axes that need not be on its grid.
+
+    Each of these is then the only value of its axis; other axes are those of the result. More points than
+    MAX_POINTS_AGAIN are a UsageError.
+
+    >>> import impact
+    >>> from impact.engine.plugins import Plugins
+    >>> result = impact.sweep("configs/figure6.toml")
+    >>> config = stored_config(result.attrs, (), Plugins(), "result")
+    >>> part = integrate_at(result, config, {"e": 0.333}, Plugins(), models=["gharib-hurmuzlu-2012"])
+    >>> shot = impact.run("configs/figure6.toml", model="gharib-hurmuzlu-2012", at={"e": 0.333})
+    >>> part["e_out"].item() == shot.values["e_out"]
+    True
+    """
+    on_grid = {name: value for name, value in at.items() if value in dataset[name].values}
+    off_grid = {name: {name: (value,)} for name, value in at.items() if name not in on_grid}
+    axes = config_of_part(config, select(dataset, on_grid)).axes
+    # an axis of a law needs that law
+    owners = [InputName.parse(axis.name).owner for axis in axes]
+    part = replace(
+        config,
+        axes=tuple(replace(axis, columns=off_grid.get(axis.name, axis.columns)) for axis in axes),
+        models=tuple(law for law in config.models if not models or law.key in (*models, *owners)),
+        frictions=tuple(law for law in config.frictions if not frictions or law.key in (*frictions, *owners)),
+    )
+    plan = Plan(part, plugins.of(part.models))
+    if plan.points > MAX_POINTS_AGAIN:
+        raise UsageError(
+            f"got {plan.points:,} points to integrate, expected at most {MAX_POINTS_AGAIN:,} at values "
+            "that are not on the grid; select fewer models"
+        )
+    return sweep_in_memory(plan)
 
 
 def kinds_to_offer(dataset: xr.Dataset) -> list[str]:
@@ -135,4 +328,5 @@ def axes_of(dataset: xr.Dataset) -> list[str]:
 
 def _shown_values(coordinate: xr.DataArray) -> list[tuple[str, Any]]:
     """List the texts and values of the positions of an axis."""
-    return [(safe_text(quantity(value, unit_of(coordinate))), value) for value in coordinate.values.tolist()]
+    word, unit = InputName.parse(coordinate.name).word, unit_of(coordinate)
+    return [(safe_text(quantity(word(value), unit)), value) for value in coordinate.values.tolist()]

@@ -54,18 +54,18 @@ def select(dataset: xr.Dataset, sel: Mapping[str, float | str]) -> xr.Dataset:
             raise UsageError(f'no axis "{name}" in this result; {did_you_mean(name, axes)}')
         (dim,) = dataset[name].dims
         values = dataset[name].values
-        in_si = _in_si(dataset[name], value)
-        same = _matches_value(values, in_si)
+        number = in_si(dataset[name], value)
+        same = _matches_value(values, number)
         if dim in masks and same.any():
             same &= masks[dim]
         if not same.any():
-            shown = safe_text(_nearest_values(name, values, in_si))
+            shown = safe_text(_nearest_values(name, values, number))
             raise UsageError(f"no {name} = {value} in this result; {shown}")
         masks[dim] = same
     return dataset.isel({dim: _matching_positions(dataset[dim], same) for dim, same in masks.items()})
 
 
-def _in_si(coordinate: xr.DataArray, value: float | str) -> float | str:
+def in_si(coordinate: xr.DataArray, value: float | str) -> float | str:
     """Convert a text with a unit, such as "30 deg", to a number in the unit of a coordinate, if it is one."""
     unit = coordinate.attrs.get("units")
     if not isinstance(value, str) or unit is None:
