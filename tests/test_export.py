@@ -173,7 +173,12 @@ def test_a_script_with_a_wall_has_one_ball(name: str) -> None:
     """No text of a template is replaced twice, nothing that is infinite is written, and a wall is at rest."""
     code = CODES[name]
     assert code.wall
-    assert [code.template.count(text) for text in code.wall] == [1] * len(code.wall)
+    template = code.template
+    for text, oblique in code.oblique.items():
+        assert template.count(text) == 1
+        template = template.replace(text, oblique)
+    # each is in the script of a central impact, or in that of an oblique one
+    assert {code.template.count(text) or template.count(text) for text in code.wall} == {1}
     config = source("soft", "soft", v2=-0.5, **WALL) | {"models": default_law(name)}
     at = OWN_PARAMETERS.get(name, {})
     script = impact.export(name, source=config, at=at, script=True, code_version=code.newest).script
@@ -301,7 +306,7 @@ def test_what_is_delivered_at_dt_is_that_of_timestep() -> None:
     at = {"e": 0.5, "v1": 1.0}
     export = impact.export("lammps", at=at, dt=2e-5, code_version="22Jul2025")
     (row,) = impact.timestep("lammps-coeff-restitution-hertz", at=at, dt=[2e-5]).rows
-    assert export.at_dt == row
+    assert export.at_dt.as_dict(False) == row.as_dict(False)
 
 
 def test_an_unstable_step_delivers_no_restitution(cli: Run) -> None:
@@ -630,3 +635,51 @@ def test_the_list_of_codes_leaves_no_file_in_the_folder(cli: Run, tmp_path: Path
 def test_the_page_has_an_example_of_each_code() -> None:
     shown = {word for command, _ in EXAMPLES for word in re.findall(r"--to (\S+)", command)}
     assert shown == CODES.keys()
+
+
+OBLIQUE = {"mu": 0.3, "angle": "40 deg", "v1": 1.0, "e": 0.8, "m1": 1.0, "m2": math.inf, "R1": 0.05}
+
+
+@pytest.mark.parametrize(
+    ("friction", "parameters", "expected"),
+    [
+        ("lammps-linear-history", {"k_t": 2e5, "xt": 0.5}, "linear_history 200000.0 0.5 0.3"),
+        # k_t = kappa K for n = 1
+        ("lammps-linear-history", {"kt_over_kn": 0.25}, "linear_history 2500000.0 1.0 0.3"),
+        ("lammps-linear-nohistory", {"xt": 0.5}, "linear_nohistory 0.5 0.3"),
+        ("lammps-mindlin", {}, "mindlin NULL 1.0 0.3"),
+        # the coefficient is per contact radius, k_t/sqrt(R*)
+        ("lammps-mindlin-rescale", {"k_t": 1e9, "xt": 0.0}, f"mindlin_rescale {1e9 / math.sqrt(0.05)} 0.0 0.3"),
+    ],
+)
+def test_lammps_takes_the_numbers_of_a_friction_law(
+    friction: str, parameters: dict[str, float], expected: str
+) -> None:
+    is_linear = friction.startswith("lammps-linear")
+    key = "lammps-coeff-restitution-hooke" if is_linear else "lammps-coeff-restitution-hertz"
+    stiffness = {"K": 1e7} if is_linear else {}
+    at = {**OBLIQUE, **stiffness, **{f"friction.{friction}.{name}": value for name, value in parameters.items()}}
+    export = impact.export("lammps", key, at=at, friction=friction, code_version="22Jul2025", script=True)
+    (line,) = (line for line in export.lines if "tangential" in line)
+    assert f" tangential {expected} xplane" in line
+    assert not any("no friction" in remark for remark in export.header)
+    assert export.as_dict()["beta_at_dt"]["mean"] == pytest.approx(export.beta_continuous, abs=0.2)
+    assert "omega 0 0 0.0" in str(export.script)
+
+
+def test_friction_that_a_code_does_not_have_is_refused_or_left_out_with_a_warning() -> None:
+    at = {**OBLIQUE, "K": 1e7}
+    with pytest.raises(
+        UsageError, match='LAMMPS, pair style granular has no "lammps-mindln"; did you mean "lammps-'
+    ):
+        impact.export("lammps", default_law("lammps"), at=at, friction="lammps-mindln", code_version="22Jul2025")
+    with pytest.raises(UsageError, match='YADE has no "coulomb-1785"; no friction is written for it'):
+        impact.export("yade", at=OBLIQUE, friction="coulomb-1785", code_version="2023.02a")
+    config = {"models": "lammps-coeff-restitution-hooke", "frictions": "coulomb-1785", "sweep": {**at, "n": 1.0}}
+    export = impact.export("lammps", source=config, code_version="22Jul2025")
+    assert any(text.startswith("coulomb-1785: LAMMPS") and "no friction" in text for text in export.warnings)
+    assert "friction" not in export.as_dict()
+    straight = {**at, "angle": 0.0}
+    with pytest.raises(UsageError, match="there is no slip before the impact, and so no beta"):
+        impact.export("lammps", "lammps-coeff-restitution-hooke", at=straight, friction="lammps-linear-nohistory",
+                      code_version="22Jul2025", script=True)  # fmt: skip

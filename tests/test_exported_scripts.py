@@ -246,3 +246,43 @@ def test_a_script_runs_in_an_empty_folder(cli: Run, tmp_path: Path, name: str, w
     last = done.stdout.splitlines()[-1]
     predicted = impact.export(name, at={"e": 0.6}, code_version=version).at_dt.e_mean
     assert float(last.removeprefix("e_out = ")) == pytest.approx(predicted, abs=0.01)
+
+
+@pytest.mark.parametrize("second", ["ball", "wall"])
+@pytest.mark.parametrize("friction", CODES["lammps"].frictions)
+def test_a_script_of_an_oblique_impact_measures_beta(
+    friction: str, second: str, record_property: Callable[[str, object], None]
+) -> None:
+    """Against a wall to rounding; of two balls, whose normal turns, within a part of the indentation over R*."""
+    is_linear = friction.startswith("lammps-linear")
+    key = "lammps-coeff-restitution-hooke" if is_linear else "lammps-coeff-restitution-hertz"
+    code, program, version = code_and_version("lammps", key)
+    parameters = {"k_t": 3e6} if friction == "lammps-linear-history" else {}
+    sweep: Values = {"v1": 1.0, "m1": 0.5, "R1": 0.05, "e": 0.8, "mu": 0.3, "angle": "40 deg", "omega1": -3.0}
+    sweep |= {"K": 1e7, "n": 1.0} if is_linear else {"material": "soft"}
+    sweep |= {"m2": math.inf, "R2": math.inf} if second == "wall" else {"m2": 1.0, "R2": 0.08, "omega2": 5.0}
+    config: Values = {"models": key, "frictions": friction, "sweep": sweep, "materials": MATERIALS}
+    config["friction"] = {friction: parameters}
+    problem = prepare_export(code, key, version, config, {}, (), friction)
+    verification = verify_scripts(problem, program, problem.law.contact_time / 31.0)
+    variant = f"{friction}, {second}, beta"
+    worst = (verification.beta_difference, verification.beta_uncertainty)
+    record_property("peer", (code.name, version, key, variant, len(verification.beta_measured), *worst))
+    assert verification.agrees
+    assert len(set(verification.beta_measured)) > 1
+    if second == "wall":
+        assert verification.beta_uncertainty <= 1e-9
+
+
+def test_an_oblique_script_prints_beta_and_spins_before_e_out(cli: Run) -> None:
+    key = "lammps-coeff-restitution-hooke"
+    _, program, _ = code_and_version("lammps", key)
+    at = ("e=0.8", "K=1e7", "mu=0.3", "angle=40deg", "m1=1", "m2=inf", "R1=0.05", "v1=1")
+    words = [word for value in at for word in ("--at", value)]
+    options = ("--script", "--friction", "lammps-linear-nohistory", "--program", program)
+    written = cli("export", "--to", "lammps", "--model", key, *options, *words)
+    command = [program, "-log", "none"]
+    done = subprocess.run(command, input=written.stdout, capture_output=True, text=True, check=True)
+    names = [line.split(" = ")[0] for line in done.stdout.splitlines() if " = " in line]
+    assert names[-4:] == ["beta", "omega1", "omega2", "e_out"]
+    assert done.stdout.splitlines()[-1].startswith("e_out = ")

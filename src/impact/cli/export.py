@@ -13,7 +13,15 @@ from ..display import Table, dump, print_blocks, show
 from ..errors import UsageError
 from . import exits
 from .completion import complete_code, complete_model
-from .options import AtOption, JsonOption, OverwriteOption, ParameterOption, SetOption, SourceArgument
+from .options import (
+    AtOption,
+    FrictionKeyOption,
+    JsonOption,
+    OverwriteOption,
+    ParameterOption,
+    SetOption,
+    SourceArgument,
+)
 
 
 def export(
@@ -41,6 +49,7 @@ def export(
         ),
     ] = None,
     parameter: ParameterOption = None,
+    friction: FrictionKeyOption = None,
     code_version: Annotated[
         str | None,
         typer.Option(
@@ -86,6 +95,7 @@ def export(
         at=dict(at or ()),
         dt=dt,
         parameter=parameter,
+        friction=friction,
         code_version=code_version,
         program=program,
         script=script,

@@ -25,6 +25,7 @@ class Collision:
     materials : names of the materials of both balls; "" where none is given
     has_user_stiffness : K is set in the config, and does not follow from the materials
     has_wall : ball 2 is a plane wall: its mass is infinite, and the config gives it no finite radius
+    friction : key of the friction law, whose parameters, mu, u1, u2, omega1 and omega2 are among the values; or ""
     gap : between the surfaces at the start, so that the contact begins at the requested phase of a step
     steps : number of steps until the contact is over
     """
@@ -38,6 +39,7 @@ class Collision:
     dt: float
     gap: float
     steps: int
+    friction: str = ""
 
     def __getitem__(self, name: str) -> float:
         return self.values[name]
@@ -90,6 +92,14 @@ class Collision:
             "v2": v2,
         }
         values |= {name: self[name] for name in ("R1", "R2", "m1", "m2", "v0")}
+        if self.friction:
+            u1, u2 = (self["u1"] - self["u2"], 0.0) if self.has_wall else (self["u1"], self["u2"])
+            rim2 = 0.0 if self.has_wall else self["R2"]
+            slip = u1 + self["R1"] * self["omega1"] - u2 + rim2 * self["omega2"]
+            if slip == 0.0:
+                raise UsageError("--script: there is no slip before the impact, and so no beta")
+            values |= {"u1": u1, "u2": u2, "rim2": rim2, "slip": slip}
+            values |= {name: self[name] for name in ("omega1", "omega2")}
         return {name: repr(value) for name, value in values.items()}
 
 
@@ -117,6 +127,9 @@ class Code:
     warnings : what a user has to know before using the lines
     template : a complete input that prints `e_out = VALUE` last, see `script`; "" if none was ever run
     wall : what the template has for a plane wall, by the text for ball 2 that it replaces; empty without one
+    frictions : what the code calls each of its friction laws, by key of the catalogue
+    oblique : what the template has for an oblique impact, by the text that it replaces, before a wall; it prints
+        `beta = VALUE` and the spins before `e_out`
     wall_inputs : the inputs that a wall acts with where they differ from those of a plane of infinite mass, by
         config name, from the key of the law, the version and the values of `Collision`
     suffix, program, install : of the file of a script; what runs it, "" without one; how to get that
@@ -141,6 +154,8 @@ class Code:
     warnings: Callable[[Collision], list[str]] = lambda collision: []
     template: str = ""
     wall: Mapping[str, str] = field(default_factory=dict)
+    frictions: Mapping[str, str] = field(default_factory=dict)
+    oblique: Mapping[str, str] = field(default_factory=dict)
     wall_inputs: Callable[[str, str, Mapping[str, float]], Mapping[str, float]] = lambda key, version, values: {}
     suffix: str = ".py"
     program: str = ""
@@ -155,6 +170,8 @@ class Code:
         template = self.template
         if collision.has_wall and not self.wall:
             raise UsageError(f"--script: m2: got inf, expected a finite mass: no wall of {self.title} was run")
+        for central, oblique in self.oblique.items() if collision.friction else ():
+            template = template.replace(central, oblique)
         for ball, wall in self.wall.items() if collision.has_wall else ():
             template = template.replace(ball, wall)
         lines = self.lines(collision, parameters)

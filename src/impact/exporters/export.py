@@ -67,6 +67,7 @@ class Export(Displayed):
     warnings : what a user has to know before using the lines
     verification : what the code delivered; None if no script was run
     comment : what begins and ends a comment among the lines
+    friction, beta_continuous : key of the friction law, "" without one, and the beta of the continuous laws
     """
 
     code: str
@@ -85,6 +86,8 @@ class Export(Displayed):
     warnings: tuple[str, ...]
     verification: Verification | None
     comment: tuple[str, str]
+    friction: str = ""
+    beta_continuous: float = math.nan
 
     @property
     def text(self) -> str:
@@ -106,6 +109,13 @@ class Export(Displayed):
             "header": list(self.header),
             "warnings": list(self.warnings),
         }
+        if self.friction:
+            beta = {"mean": row.beta_mean, "least": row.beta_least, "largest": row.beta_largest}
+            data |= {
+                "friction": self.friction,
+                "beta_continuous": self.beta_continuous,
+                "beta_at_dt": {"dt": row.dt, **beta},
+            }
         if self.script is not None:
             data["script"] = self.script
         if self.verification is not None:
@@ -146,6 +156,7 @@ def export(
     at: Mapping[str, float | str] | None = None,
     dt: float | str | None = None,
     parameter: str | None = None,
+    friction: str | None = None,
     code_version: str | None = None,
     script: bool = False,
     verify: bool = False,
@@ -167,6 +178,7 @@ def export(
     dt : time step [s], or a text such as "2 us"; by default the contact time of the continuous law over 50
     parameter : see `timestep`; by default what sets the time scale of the law, where a given `dt` is too large
         for every phase to be within 1 %
+    friction : key of a friction law of an oblique impact that the code has; by default the first one of the source
     code_version : release of the code, letters, digits, spaces and `._+()-`; by default that of the program, or
         else the newest known one
     script : write a complete input with two balls that prints the e that it measures
@@ -199,7 +211,7 @@ def export(
     check_outputs([output], [source], overwrite=overwrite)
     code = find_code(to)
     program_path, version = choose_version(code, program, code_version, verify=verify)
-    problem = prepare_export(code, model, version, source, at or {}, overrides)
+    problem = prepare_export(code, model, version, source, at or {}, overrides, friction)
     check_outputs([output], [source, *problem.point.config.files], overwrite=overwrite)
     if (script or verify) and not code.template:
         raise UsageError(f"--script: there is none for {code.title}: {code.tested}")
@@ -238,6 +250,8 @@ def export(
         e=problem.law.e,
         e_continuous=problem.e_continuous,
         contact_time=contact_time,
+        friction=collision.friction,
+        beta_continuous=problem.outputs.get("beta", math.nan),
         at_dt=at_dt,
         needed=needed,
         parameters=parameters,
@@ -291,6 +305,9 @@ def _warnings(problem: ExportProblem, collision: Collision, row: TimestepRow) ->
             f"{key} delivers {number(problem.e_continuous)} where e = {requested} is asked for; impact solve "
             f"--model {key} --for e --target e_out={requested} finds the e to ask for"
         )
+    if problem.left_out:
+        laws = ", ".join(problem.left_out)
+        warnings.append(f"{laws}: {problem.code.title} has no such friction law, the lines have no friction")
     return [*warnings, *row.warnings(problem.law.phases)]
 
 
@@ -349,6 +366,11 @@ def _header(
         spread = f"{decimals(row.e_least)} to {decimals(row.e_largest)} by the phase in the step"
         delivered = row.failure(law.phases) if row.failed else f"mean e {decimals(row.e_mean)}, {spread}"
         header.append(f"{steps}: {delivered} ({code.scheme})")
+        if law.oblique is not None and not row.failed:
+            beta = f"{decimals(row.beta_least)} to {decimals(row.beta_largest)}"
+            header.append(
+                f"friction: {law.oblique.pair.friction.key}, mean beta {decimals(row.beta_mean)}, {beta}"
+            )
         if row.e_to_ask == row.e_to_ask:
             header.append(
                 f"a mean of {number(problem.requested_e)} at this dt: ask for e = {decimals(row.e_to_ask)}"

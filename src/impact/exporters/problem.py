@@ -14,6 +14,7 @@ from ..contact.models import find
 from ..engine.build_impacts import build_impacts
 from ..engine.plan import Plan
 from ..engine.plugins import Plugins
+from ..errors import UsageError, did_you_mean
 from ..formatting import number, quantity
 from ..inverse.solve import PointWithE, point_with_e
 from ..inverse.timestep import FixedStepLaw, fixed_step_law
@@ -28,6 +29,8 @@ PHASES = 400
 STEPS_BEFORE, CONTACTS_RUN = 3, 2.5
 # a ball whose radius is not known and does not matter is larger than its peak indentation by this factor
 RADIUS_PER_PEAK = 100.0
+# the tangential inputs of a collision
+OBLIQUE_VALUES = ("u1", "u2", "omega1", "omega2", "mu")
 
 
 @dataclass(frozen=True)
@@ -43,6 +46,7 @@ class ExportProblem:
     better_fit : the law of a calibration that fits best, where it is none of the code; else ""
     missing_law : the default law of the newest release, where this one lacks it and none was requested; else ""
     defaults : values of Table 1 of the paper that enter, since nothing else gives them
+    left_out : friction laws of the source, where the code has none of them
     """
 
     code: Code
@@ -54,6 +58,7 @@ class ExportProblem:
     better_fit: str
     missing_law: str
     defaults: tuple[str, ...]
+    left_out: tuple[str, ...]
 
     @property
     def model(self) -> ForceModel:
@@ -80,6 +85,10 @@ class ExportProblem:
             if math.isnan(values[name]):
                 is_wall = name == "R2" and self.has_wall
                 values[name] = math.inf if is_wall else RADIUS_PER_PEAK * self.outputs["peak_indentation"]
+        oblique = self.law.oblique
+        if oblique is not None:
+            values |= {name: float(getattr(oblique.impact, name).item()) for name in OBLIQUE_VALUES}
+            values |= {name: float(value.item()) for name, value in oblique.impact.parameters.items()}
         names = self.point.config.scalars
         material1, material2 = (
             str(names.get(f"material{ball}", names.get("material", ""))) for ball in ("1", "2")
@@ -93,6 +102,7 @@ class ExportProblem:
             has_wall=self.has_wall,
             dt=dt,
             gap=(STEPS_BEFORE - phase) * dt * values["v0"],
+            friction=oblique.pair.friction.key if oblique else "",
             steps=STEPS_BEFORE + math.ceil(CONTACTS_RUN * self.law.contact_time / dt),
         )
 
@@ -118,6 +128,7 @@ def prepare_export(
     source: ConfigSource,
     at: Mapping[str, float | str],
     overrides: Sequence[str],
+    friction: str | None = None,
 ) -> ExportProblem:
     """Choose the law, and reduce the source to one impact; the damping of a law without e is solved for."""
     missing, point_source = "", open_source(source, overrides, Plugins(()))
@@ -128,8 +139,13 @@ def prepare_export(
     else:
         key, newest = (first_law(code, tuple(code.laws), release) for release in (version, code.newest))
         missing = "" if key == newest else newest
-    point = point_with_e(point_source, find(key), at, lambda config: wall_inputs(config, code, version))
-    fixed, outputs = fixed_step_law(point.config, PHASES, code.scheme)
+    chosen, left_out = _choose_friction(code, point_source, key, friction)
+    point = point_with_e(
+        point_source, find(key), at, lambda config: wall_inputs(config, code, version), friction=chosen
+    )
+    if chosen:
+        Plan(point.config).pair_notes("frictions")
+    fixed, outputs = fixed_step_law(point.config, PHASES, code.scheme, of_friction=chosen is not None)
     calibration = point_source.calibration
     better_fit, fit_notes = _fit_notes(code, version, key, calibration) if calibration else ("", ())
     return ExportProblem(
@@ -142,7 +158,22 @@ def prepare_export(
         better_fit=better_fit,
         missing_law=missing,
         defaults=_defaults(point_source, at, point.config) if point_source.is_starter else (),
+        left_out=left_out,
     )
+
+
+def _choose_friction(
+    code: Code, source: PointSource, model: str, friction: str | None
+) -> tuple[str | None, tuple[str, ...]]:
+    """Choose the friction law that is asked for, or the first of the source that a code has; else list those."""
+    if friction is not None and friction not in code.frictions:
+        expected = (
+            did_you_mean(friction, list(code.frictions)) if code.frictions else "no friction is written for it"
+        )
+        raise UsageError(f'--friction: {code.title} has no "{friction}"; {expected}')
+    keys = [law.key for law in source.draft(model).frictions]
+    chosen = friction or next((key for key in keys if key in code.frictions), None)
+    return chosen, () if chosen else tuple(keys)
 
 
 def _defaults(source: PointSource, at: Mapping[str, object], config: Config) -> tuple[str, ...]:

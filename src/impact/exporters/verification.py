@@ -26,6 +26,8 @@ PHASES = 4
 TIMEOUT_S = 300
 # uncertainties of an extrapolation below this are rounding
 FLOOR = 1e-7
+# times the indentation over R*: tolerance on beta where codes turn the normal, or shorten the arms of the force
+TURNING = 4.0
 
 
 @dataclass(frozen=True)
@@ -38,6 +40,8 @@ class Verification(Displayed):
     phases : phases of a step, one for each row; NaN for an extrapolation to dt = 0 of the mean over the phases
     measured, predicted : the restitution by the code and by this program; one that is not a number differs
     uncertainty : tolerance on the restitution
+    beta_measured, beta_predicted : the tangential restitution likewise; empty without friction
+    beta_uncertainty : tolerance on it
     """
 
     program: str
@@ -46,6 +50,9 @@ class Verification(Displayed):
     measured: tuple[float, ...]
     predicted: tuple[float, ...]
     uncertainty: float
+    beta_measured: tuple[float, ...] = ()
+    beta_predicted: tuple[float, ...] = ()
+    beta_uncertainty: float = 0.0
 
     def as_dict(self) -> dict[str, Any]:
         """Return the comparison as plain data."""
@@ -58,8 +65,10 @@ class Verification(Displayed):
 
     def records(self) -> Sequence[Mapping[str, Any]]:
         """List a row for each time step and phase."""
-        columns = zip(self.dt, self.phases, self.measured, self.predicted, strict=True)
-        return [dict(zip(("dt", "phase", "measured", "predicted"), row, strict=True)) for row in columns]
+        columns = {"dt": self.dt, "phase": self.phases, "measured": self.measured, "predicted": self.predicted}
+        if self.beta_measured:
+            columns |= {"beta_measured": self.beta_measured, "beta_predicted": self.beta_predicted}
+        return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
     def sections(self, width: int) -> Iterator[Block]:
         """A row for each time step and phase, and whether the code agrees."""
@@ -77,7 +86,10 @@ class Verification(Displayed):
         yield ""
         word = "agrees" if self.agrees else "DIFFERS"
         largest = self.not_numbers or f"largest difference {number(self.difference, 2)}"
-        yield f"{word}: {largest}, uncertainty {number(self.uncertainty, 2)}"
+        beta = ""
+        if self.beta_measured:
+            beta = f"; of beta {number(self.beta_difference, 2)}, uncertainty {number(self.beta_uncertainty, 2)}"
+        yield f"{word}: {largest}, uncertainty {number(self.uncertainty, 2)}{beta}"
 
     @property
     def difference(self) -> float:
@@ -86,8 +98,14 @@ class Verification(Displayed):
             return float(np.abs(np.subtract(self.measured, self.predicted)).max())
 
     @property
+    def beta_difference(self) -> float:
+        """The largest difference of the tangential restitution; 0 without friction."""
+        with np.errstate(invalid="ignore"):
+            return float(np.abs(np.subtract(self.beta_measured, self.beta_predicted)).max(initial=0.0))
+
+    @property
     def agrees(self) -> bool:
-        return self.difference <= self.uncertainty
+        return self.difference <= self.uncertainty and self.beta_difference <= self.beta_uncertainty
 
     @property
     def not_numbers(self) -> str:
@@ -100,8 +118,8 @@ class Verification(Displayed):
         return ""
 
 
-def run_script(code: Code, program: str, script: str) -> float:
-    """Run a script in an empty folder, and return the restitution that it prints."""
+def run_script(code: Code, program: str, script: str) -> dict[str, float]:
+    """Run a script in an empty folder, and return the numbers that it prints by name; the last one is e_out."""
     with tempfile.TemporaryDirectory(prefix="impact-export-") as folder:
         file = f"two_balls{code.suffix}"
         Path(folder, file).write_text(script, encoding="utf-8")
@@ -109,21 +127,21 @@ def run_script(code: Code, program: str, script: str) -> float:
             done = run_program(code.command(program, file), folder, TIMEOUT_S)
         except (OSError, subprocess.SubprocessError) as error:
             raise UsageError(f"--verify: {code.title}: {error}") from None
-    e_out = _restitution((done.stdout.strip().splitlines() or [""])[-1])
-    if done.returncode or e_out is None:
+    printed = done.stdout.strip().splitlines() or [""]
+    if done.returncode or "e_out" not in _number_in(printed[-1]):
         lines = (done.stderr.strip() or done.stdout.strip() or "no output").splitlines()
         error_lines = [line for line in lines if "error" in line.lower()] or lines[-1:]
         raise UsageError(f"--verify: {code.title} ended with exit code {done.returncode}: {error_lines[0]}")
-    return e_out
+    return {name: value for line in printed for name, value in _number_in(line).items()}
 
 
-def _restitution(line: str) -> float | None:
-    """Read the restitution in a line, also nan or inf; None if it has none."""
-    match = re.fullmatch(r"e_out = (\S+)", line)
+def _number_in(line: str) -> dict[str, float]:
+    """Read a number with its name in a line, also nan or inf; empty if it has none."""
+    match = re.fullmatch(r"(e_out|beta|omega1|omega2) = (\S+)", line)
     try:
-        return float(match[1]) if match else None
+        return {match[1]: float(match[2])} if match else {}
     except ValueError:
-        return None
+        return {}
 
 
 def verify_scripts(problem: ExportProblem, program: str, dt: float) -> Verification:
@@ -137,9 +155,8 @@ def verify_scripts(problem: ExportProblem, program: str, dt: float) -> Verificat
     code = problem.code
     phases = (np.arange(PHASES) + 0.5) / PHASES
     steps = np.array([dt] if code.scheme is not None else [dt, dt / 2, dt / 4])
-    measured = np.array(
-        [[_measure(problem, program, dt, phase) for phase in phases.tolist()] for dt in steps.tolist()]
-    )
+    runs = [[_measure(problem, program, dt, phase) for phase in phases.tolist()] for dt in steps.tolist()]
+    measured = np.array([[run["e_out"] for run in row] for row in runs])
     if code.scheme is None and np.isfinite(measured).all():
         value, uncertainty = extrapolate(measured)
         return Verification(
@@ -155,13 +172,31 @@ def verify_scripts(problem: ExportProblem, program: str, dt: float) -> Verificat
         if code.scheme is None
         else replace(problem.law, phases=PHASES).restitution(steps)
     )
-    return Verification(
+    verification = Verification(
         program=program,
         dt=tuple(np.repeat(steps, PHASES).tolist()),
         phases=tuple(np.tile(phases, steps.size).tolist()),
         measured=tuple(measured.ravel().tolist()),
         predicted=tuple(predicted.ravel().tolist()),
         uncertainty=code.uncertainty_of(problem.model.key),
+    )
+    return verification if problem.law.oblique is None else _with_friction(verification, problem, steps, runs)
+
+
+def _with_friction(
+    verification: Verification, problem: ExportProblem, steps: Array, runs: list[list[dict[str, float]]]
+) -> Verification:
+    """Add the tangential restitution; the normal of two balls turns, by a part of the indentation over R*."""
+    predicted = replace(problem.law, phases=PHASES).tangential_restitution(steps)
+    uncertainty = verification.uncertainty
+    if not problem.has_wall:
+        uncertainty = TURNING * problem.outputs["peak_indentation"] / float(problem.law.impact.R_eff[0])
+    return replace(
+        verification,
+        uncertainty=uncertainty,
+        beta_measured=tuple(run.get("beta", math.nan) for row in runs for run in row),
+        beta_predicted=tuple(predicted.ravel().tolist()),
+        beta_uncertainty=uncertainty,
     )
 
 
@@ -172,7 +207,7 @@ def extrapolate(restitutions: Array) -> tuple[float, float]:
     return float(second), float(abs(second - first) + np.ptp(restitutions[2]) / 2)
 
 
-def _measure(problem: ExportProblem, program: str, dt: float, phase: float) -> float:
-    """Run the script of a collision that begins at a phase of a step dt [s], and return its restitution."""
+def _measure(problem: ExportProblem, program: str, dt: float, phase: float) -> dict[str, float]:
+    """Run the script of a collision that begins at a phase of a step dt [s], and return what it prints."""
     code, collision = problem.code, problem.collision(dt, phase)
     return run_script(code, program, code.script(collision, code.parameters(collision)))
