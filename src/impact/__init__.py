@@ -46,6 +46,7 @@ Errors and warnings: ImpactError, ConfigError, ModelError, ResultError, StoreErr
 from __future__ import annotations
 
 from importlib import import_module
+from types import FunctionType
 from typing import TYPE_CHECKING, Any
 
 from ._version import __version__ as __version__
@@ -171,7 +172,12 @@ if not TYPE_CHECKING:
     def __getattr__(name: str) -> Any:
         if name not in _MODULES:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-        return getattr(import_module(f".{_MODULES[name]}", __name__), name)
+        member = getattr(import_module(f".{_MODULES[name]}", __name__), name)
+        if isinstance(member, FunctionType):
+            member = import_module(".arguments", __name__).name_wrong_types(member)
+        # found here from now on, also when it is unpickled
+        globals()[name] = member
+        return member
 
 
 def __dir__() -> list[str]:

@@ -17,7 +17,7 @@ from ..config.tables import SWEEP_QUANTITIES
 from ..display import Block, Displayed
 from ..engine.plugins import Plugins
 from ..errors import UsageError
-from ..formatting import decimals, number, quantity, safe_text
+from ..formatting import argument, decimals, number, quantity, safe_text
 from ..inverse.timestep import (
     NeededParameter,
     NeededSteps,
@@ -202,9 +202,9 @@ def export(
     problem = prepare_export(code, model, version, source, at or {}, overrides)
     check_outputs([output], [source, *problem.point.config.files], overwrite=overwrite)
     if (script or verify) and not code.template:
-        raise UsageError(f"--script: there is none for {code.title}: {code.tested}")
+        raise UsageError(f"{argument('script')}: there is none for {code.title}: {code.tested}")
     contact_time = problem.law.contact_time
-    given = [] if dt is None else [read_number(dt, SWEEP_QUANTITIES["dt"], "--dt")]
+    given = [] if dt is None else [read_number(dt, SWEEP_QUANTITIES["dt"], argument("dt"))]
     (dt,) = time_steps(contact_time, [] if given else [STEPS_PER_CONTACT], given)
     collision = problem.collision(dt, 0.5)
     parameters = code.parameters(collision)
@@ -224,7 +224,9 @@ def export(
             )
     if parameter:
         if code.scheme is None:
-            raise UsageError(f"--for: what {code.title} delivers at a time step is not predicted")
+            raise UsageError(
+                f"{argument('parameter')}: what {code.title} delivers at a time step is not predicted"
+            )
         needed = needed_parameter(
             problem.point, Plugins(), parameter, dt, ADVISED_TOL, problem.law, problem.outputs
         )

@@ -14,7 +14,7 @@ from ..contact.models import find
 from ..engine.build_impacts import build_impacts
 from ..engine.plan import Plan
 from ..engine.plugins import Plugins
-from ..formatting import number, quantity
+from ..formatting import argument, number, quantity
 from ..inverse.solve import PointWithE, point_with_e
 from ..inverse.timestep import FixedStepLaw, fixed_step_law
 from ..results.calibration import position_of_law, unidentified_notes
@@ -165,6 +165,6 @@ def _fit_notes(code: Code, version: str, key: str, calibration: Calibration) -> 
     notes = [f"{calibration.name}: {named[chosen]}, law {chosen + 1} of {len(laws)} by AICc"]
     others = [name for position, name in enumerate(named) if is_in_code[position] and position != chosen]
     if others:
-        notes.append(f"--model exports another law that was fitted: {'; '.join(others)}")
+        notes.append(f"{argument('model')} exports another law that was fitted: {'; '.join(others)}")
     notes += unidentified_notes(calibration.dataset.isel(model=[chosen]))
     return "" if is_in_code[0] else named[0], tuple(notes)

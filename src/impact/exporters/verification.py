@@ -16,7 +16,7 @@ import numpy as np
 from ..array_types import Array
 from ..display import Block, Displayed, Table
 from ..errors import UsageError
-from ..formatting import decimals, number, quantity
+from ..formatting import argument, decimals, number, quantity
 from .code import Code
 from .problem import ExportProblem
 from .programs import run_program
@@ -108,12 +108,14 @@ def run_script(code: Code, program: str, script: str) -> float:
         try:
             done = run_program(code.command(program, file), folder, TIMEOUT_S)
         except (OSError, subprocess.SubprocessError) as error:
-            raise UsageError(f"--verify: {code.title}: {error}") from None
+            raise UsageError(f"{argument('verify')}: {code.title}: {error}") from None
     e_out = _restitution((done.stdout.strip().splitlines() or [""])[-1])
     if done.returncode or e_out is None:
         lines = (done.stderr.strip() or done.stdout.strip() or "no output").splitlines()
         error_lines = [line for line in lines if "error" in line.lower()] or lines[-1:]
-        raise UsageError(f"--verify: {code.title} ended with exit code {done.returncode}: {error_lines[0]}")
+        raise UsageError(
+            f"{argument('verify')}: {code.title} ended with exit code {done.returncode}: {error_lines[0]}"
+        )
     return e_out
 
 

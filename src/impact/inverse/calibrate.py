@@ -31,6 +31,7 @@ from ..engine.plan import Plan
 from ..engine.plugins import Plugins, read_plugins
 from ..engine.trajectories import PlanLaw, model_of
 from ..errors import UsageError
+from ..formatting import argument
 from ..results.calibration import calibration_template, fitted_config, position_of_law
 from ..results.schema import FIT_STATUSES
 from ..results.xarray_backend import save
@@ -116,15 +117,18 @@ def calibrate(
     check_outputs([output, best], [source, *plugins, *config.files], overwrite=overwrite)
     if model is not None:
         if best is None:
-            raise UsageError("--model: set without --best FILE, which is written for that law")
-        position_of_law(list(laws_to_fit(config)), model, "--model")
+            best_file = argument("best", "FILE")
+            raise UsageError(f"{argument('model')}: set without {best_file}, which is written for that law")
+        position_of_law(list(laws_to_fit(config)), model, argument("model"))
     for note in config.notes:
         warnings.warn(note, stacklevel=2)
     result = calibrate_config(config, plugin_set.of(config.models), jobs)
     if output is not None:
         save(result, output, overwrite=overwrite)
     if best is not None:
-        position = 0 if model is None else position_of_law(result["model"].values.tolist(), model, "--model")
+        position = (
+            0 if model is None else position_of_law(result["model"].values.tolist(), model, argument("model"))
+        )
         text = fitted_config(config, result.isel(model=position))
         write_file(Path(best), text.encode(), overwrite=overwrite)
     return result

@@ -46,7 +46,7 @@ from ..engine.build_impacts import build_impacts, rayleigh_time_at
 from ..engine.plan import Plan
 from ..engine.plugins import Plugins, read_plugins
 from ..errors import UsageError
-from ..formatting import decimals, number, quantity
+from ..formatting import argument, decimals, number, quantity
 from ..results.single_impact import open_source
 from .solve import PointWithE, config_name, point_with_e, solve_damping, unknown_of
 
@@ -295,12 +295,12 @@ def timestep(
     (0.4945, 0.48, 0.519, 0.5054)
     """
     if phases < 1:
-        raise UsageError(f"--phases: got {phases}, expected a whole number >= 1")
-    given = read_numbers(dt, SWEEP_QUANTITIES["dt"], "--dt")
-    counts = read_numbers(steps_per_contact, SWEEP_QUANTITIES["steps_per_contact"], "--steps-per-contact")
-    tol = None if tol is None else read_number(tol, TOLERANCE, "--tol")
+        raise UsageError(f"{argument('phases')}: got {phases}, expected a whole number >= 1")
+    given = read_numbers(dt, SWEEP_QUANTITIES["dt"], argument("dt"))
+    counts = read_numbers(steps_per_contact, SWEEP_QUANTITIES["steps_per_contact"], argument("steps_per_contact"))
+    tol = None if tol is None else read_number(tol, TOLERANCE, argument("tol"))
     if parameter is not None and (tol is None or len(given) != 1):
-        raise UsageError("--for: expected one --dt and --tol as well")
+        raise UsageError(f"{argument('parameter')}: expected one {argument('dt')} and {argument('tol')} as well")
     plugin_set = read_plugins(plugins)
     point_source = open_source(source, overrides, plugin_set)
     point = point_with_e(point_source, find(model, plugin_set.models), at or {})
@@ -422,7 +422,7 @@ def needed_steps(
     """Bisect for the smallest number of steps per contact with which every phase is within a tolerance."""
     target = law.e if law.has_e else e_continuous
     if not target > 0.0:
-        raise UsageError("--tol is relative to e, expected e > 0")
+        raise UsageError(f"{argument('tol')} is relative to e, expected e > 0")
     if abs(e_continuous - target) >= tol * target:
         # no step does what the continuous law does not
         return None
@@ -480,7 +480,7 @@ def needed_parameter(
     nearby = collide_at(NEARBY * value)[1]
     slope = math.log(nearby.contact_time / law.contact_time) / math.log(NEARBY)
     if abs(slope) < MIN_SLOPE:
-        raise UsageError(f"--for: {name} does not set the contact time of {model.key}")
+        raise UsageError(f"{argument('parameter')}: {name} does not set the contact time of {model.key}")
     changed = config
     for _ in range(MAX_SECANTS):
         needed = needed_steps(law, tol, collision["e_out"], MAX_SECANT_STEPS)

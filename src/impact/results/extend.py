@@ -29,7 +29,7 @@ from ..engine.plugins import Plugins, read_plugins
 from ..engine.run import ProgressCallback, Run, ignore, never
 from ..engine.trajectories import TrajectoryMap, TrajectoryRange, keys_of, model_of
 from ..errors import ResultError, UsageError
-from ..formatting import safe_text
+from ..formatting import argument, safe_text
 from .attributes import read_attribute
 from .kinds import require_sweep
 from .layouts import FillSlab
@@ -255,8 +255,8 @@ def _check_changes(old: Plan, new: Plan, name: str) -> None:
     ]
     if changed or moved:
         raise UsageError(
-            f"{name}: --set changes {', '.join([*changed, *moved])}, expected more values of an axis, "
-            "such as --set 'sweep.m2=[1.0, 2.0]', or more models"
+            f"{name}: {argument('overrides')} changes {', '.join([*changed, *moved])}, expected more values of an "
+            f"axis, such as {argument('overrides', ['sweep.m2=[1.0, 2.0]'])}, or more models"
         )
     if old.laws == new.laws and old.config.axes == new.config.axes:
         raise UsageError(f"{name}: already has all of these; expected more values of an axis, or more models")
@@ -281,8 +281,8 @@ def _check_none_lost(old: Plan, axes: Sequence[_AxisPositions], name: str) -> No
             row = {column: safe_text(str(values[lost[0]]), 40) for column, values in axis.columns.items()}
             values = ", ".join(f"{column}={value}" for column, value in row.items())
             raise UsageError(
-                f"{name}: --set leaves out {values}, expected all values that the result has, and more; columns "
-                "that vary together are given together"
+                f"{name}: {argument('overrides')} leaves out {values}, expected all values that the result has, "
+                "and more; columns that vary together are given together"
             )
 
 
@@ -304,8 +304,8 @@ def _axis_positions(axis: Axis, old: Inputs, name: str) -> _AxisPositions:
         changed = [number for number, row in enumerate(before) if rows[number : number + 1] != [row]]
         if changed:
             raise UsageError(
-                f"{name}: --set changes {axis.name} {changed[0]}, expected the cases that the result "
-                "has, in their order, and more after them"
+                f"{name}: {argument('overrides')} changes {axis.name} {changed[0]}, expected the cases that the "
+                "result has, in their order, and more after them"
             )
         positions = [number if number < size else -1 for number in range(axis.size)]
     else:

@@ -13,7 +13,7 @@ from ..config.grid import MAX_POINTS
 from ..config.load import Config, Purpose, build
 from ..engine.plugins import Plugins
 from ..errors import ResultError, UsageError
-from ..formatting import safe_text
+from ..formatting import argument, safe_text
 from .attributes import PluginRecord, read_attribute
 from .selection import match_labels
 
@@ -136,4 +136,4 @@ def _how_to_supply(record: PluginRecord) -> str:
     """State how a user supplies a plug-in."""
     if record.package:
         return "the package installed"
-    return "plugins=[...]" if record.file is None else "--plugin FILE"
+    return "plugins=[...]" if record.file is None else argument("plugins", ["FILE"])

@@ -21,7 +21,7 @@ from ..contact.status import FIRST_FAILURE, FrictionStatus, Status
 from ..contact.variables import OUTPUTS
 from ..display import Block, Displayed, Table, html_of
 from ..errors import UsageError, did_you_mean
-from ..formatting import label, number, percentage, safe_text
+from ..formatting import argument, label, number, percentage, safe_text
 from .kinds import require_sweep
 from .replay_command import describe_point
 from .schema import columns_along, foreign_dims
@@ -284,21 +284,22 @@ def recommend(
     tol = read_number(tol, TOLERANCE, "tol")
     criterion = BY_ERROR if target is None else _criterion_of(target)
     if frictions and not OUTPUTS[criterion.names[0]].of_friction:
-        raise UsageError("--friction: expected a --target that depends on friction, such as beta=0.4")
+        origin, of = argument("frictions"), argument("target")
+        raise UsageError(f"{origin}: expected a {of} that depends on friction, such as beta=0.4")
     return rank_models(rankable_parts(dataset, sel or {}, models, criterion, frictions), tol, criterion)
 
 
 def _criterion_of(target: Mapping[str, float]) -> Criterion:
     """Check a target."""
     if len(target) != 1:
-        raise UsageError(f"--target: got {len(target)} targets, expected one, such as beta=0.4")
+        example = argument("target", {"beta": 0.4})
+        raise UsageError(f"{argument('target')}: got {len(target)} targets, expected one, such as {example}")
     ((name, value),) = target.items()
     if name not in TARGETS:
-        raise UsageError(
-            f'--target: got "{name}", expected an output of the order of 1; {did_you_mean(name, TARGETS)}'
-        )
+        expected = f"an output of the order of 1; {did_you_mean(name, TARGETS)}"
+        raise UsageError(f'{argument("target")}: got "{name}", expected {expected}')
     if not (isinstance(value, int | float) and math.isfinite(value)):
-        raise UsageError(f"--target {name}: got {value}, expected a finite number")
+        raise UsageError(f"{argument('target', key=name)}: got {value}, expected a finite number")
     return Criterion(name, float(value))
 
 

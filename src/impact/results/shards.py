@@ -29,6 +29,7 @@ from ..engine.plugins import read_plugins
 from ..engine.run import ProgressCallback, ProgressCounter, Run, ignore, never, report_kept_ranges
 from ..engine.trajectories import TrajectoryRange
 from ..errors import ResultError, StoreError, UnfinishedError, UsageError, warn
+from ..formatting import argument
 from .outcome import SweepOutcome
 from .provenance import stored_config
 from .schema import dataset_template
@@ -58,7 +59,7 @@ class Shard:
         match = re.fullmatch(r"([0-9]{1,9})/([0-9]{1,9})", text)
         shard = cls(*map(int, match.groups())) if match else cls(0, 0)
         if not 1 <= shard.number <= shard.of:
-            raise UsageError(f"--shard {text}: expected K/N with K from 1 to N, such as 3/16")
+            raise UsageError(f"{argument('shard', text)}: expected K/N with K from 1 to N, such as 3/16")
         return shard
 
     def has(self, trajectory_range: TrajectoryRange) -> bool:

@@ -19,7 +19,7 @@ from ..config.grid import MAX_POINTS
 from ..config.tables import Output
 from ..contact.variables import OUTPUTS
 from ..errors import ResultError, UnfinishedError, UsageError
-from ..formatting import safe_text
+from ..formatting import argument, safe_text
 from .hdf5_structure import byte_reader, check_root
 from .kinds import kind_of, require_sweep
 from .layouts import LAYOUTS
@@ -253,10 +253,9 @@ def expand(
         dataset = dataset.isel(model=law_positions(models, dataset))
     points = math.prod(dataset.sizes.values())
     if points > max_points:
-        raise UsageError(
-            f"{shown}: got {points:,} points, expected at most {max_points:,} (--max-points); select a part, such "
-            "as --sel e=0.5"
-        )
+        part = f"a part, such as {argument('sel', {'e': 0.5})}"
+        most = f"{max_points:,} ({argument('max_points')})"
+        raise UsageError(f"{shown}: got {points:,} points, expected at most {most}; select {part}")
     save(dataset, output, overwrite=overwrite, should_stop=should_stop)
     return points
 
