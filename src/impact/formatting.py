@@ -57,8 +57,8 @@ def argument(name: str, value: object = None, *, key: str = "") -> str:
         ((key, value),) = value.items()
     elif isinstance(value, list):
         value = shlex.quote(str(value[0]))
-    word = "=".join(str(part) for part in (key or None, value) if part is not None and part is not True)
-    return f"--{OPTIONS.get(name, name).replace('_', '-')} {word}".rstrip()
+    words = [str(part) for part in (key or None, value) if part is not None and part is not True]
+    return " ".join([f"--{OPTIONS.get(name, name).replace('_', '-')}", *(["=".join(words)] if words else [])])
 
 
 def number(value: object, digits: int = 6) -> str:

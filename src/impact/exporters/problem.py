@@ -165,6 +165,6 @@ def _fit_notes(code: Code, version: str, key: str, calibration: Calibration) -> 
     notes = [f"{calibration.name}: {named[chosen]}, law {chosen + 1} of {len(laws)} by AICc"]
     others = [name for position, name in enumerate(named) if is_in_code[position] and position != chosen]
     if others:
-        notes.append(f"{argument('model')} exports another law that was fitted: {'; '.join(others)}")
+        notes.append(f"{argument('model', 'KEY')} exports another law that was fitted: {'; '.join(others)}")
     notes += unidentified_notes(calibration.dataset.isel(model=[chosen]))
     return "" if is_in_code[0] else named[0], tuple(notes)
