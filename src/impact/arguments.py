@@ -12,6 +12,7 @@ from types import UnionType
 from typing import Any, ParamSpec, TypeVar, get_origin
 
 from .errors import ImpactError, UsageError
+from .formatting import argument
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -43,12 +44,19 @@ def name_wrong_types(function: Callable[P, T]) -> Callable[P, T]:
     return call
 
 
+def require_counts(**counts: int) -> None:
+    """Refuse numbers of processes, threads or others that are not at least 1."""
+    for name, count in counts.items():
+        if count < 1:
+            raise UsageError(f"{argument(name)}: got {count}, expected a whole number >= 1")
+
+
 def type_problem(function: Callable[..., object], args: Any, kwargs: Any) -> str:
     """Describe the first argument that is not of its annotated type; empty if there is none.
 
     >>> from impact.results.ranking import recommend
     >>> type_problem(recommend, ["r.h5"], {"target": 0.6})
-    'target: got a float, expected Mapping[str, float] | None'
+    'target: got a float, expected Mapping[str, object] | None'
     """
     signature = inspect.signature(function)
     try:
@@ -68,9 +76,10 @@ def type_problem(function: Callable[..., object], args: Any, kwargs: Any) -> str
 def _is_of(value: object, text: str, names: dict[str, Any]) -> bool:
     """Check a value against one alternative of an annotation, but not the elements of the value."""
     name, _, attribute = text.split("[")[0].partition(".")
-    kind = ABSTRACT.get(name) or names.get(name) or getattr(builtins, name, None)
-    kind = getattr(kind, attribute) if kind is not None and attribute else kind
-    if isinstance(kind, UnionType):
-        return any(isinstance(value, get_origin(one) or one) for one in kind.__args__)
-    # a class that is imported for type checkers only is compared by its name
-    return isinstance(value, kind) if isinstance(kind, type) else type(value).__name__ == (attribute or name)
+    kind: Any = ABSTRACT.get(name) or names.get(name) or getattr(builtins, name, None)
+    if kind is None:
+        # a class that is imported for type checkers only is compared by its name
+        return type(value).__name__ == (attribute or name)
+    kind = getattr(kind, attribute) if attribute else kind
+    kinds = kind.__args__ if isinstance(kind, UnionType) else [kind]
+    return any(isinstance(value, get_origin(one) or one) for one in kinds)

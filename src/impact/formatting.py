@@ -6,6 +6,7 @@ import json
 import math
 import re
 import shlex
+from pathlib import Path
 from unicodedata import category
 
 # control, format (bidi marks, zero-width), lone surrogate, private, unassigned, line and paragraph separator
@@ -51,14 +52,25 @@ def argument(name: str, value: object = None, *, key: str = "") -> str:
     if not _is_command_line:
         if key:
             return f'{name}["{key}"]'
-        text = str(value) if isinstance(value, bool) else json.dumps(value, ensure_ascii=False, default=str)
-        return name if value is None else f"{name}={text}"
+        return name if value is None else f"{name}={_python_text(value)}"
     if isinstance(value, dict):
         ((key, value),) = value.items()
     elif isinstance(value, list):
         value = shlex.quote(str(value[0]))
     words = [str(part) for part in (key or None, value) if part is not None and part is not True]
     return " ".join([f"--{OPTIONS.get(name, name).replace('_', '-')}", *(["=".join(words)] if words else [])])
+
+
+def _python_text(value: object) -> str:
+    """Write a value as Python code, with double quotes."""
+    match value:
+        case dict():
+            return f"{{{', '.join(f'{_python_text(key)}: {_python_text(item)}' for key, item in value.items())}}}"
+        case list():
+            return f"[{', '.join(map(_python_text, value))}]"
+        case str() | Path():
+            return json.dumps(str(value), ensure_ascii=False)
+    return repr(value)
 
 
 def number(value: object, digits: int = 6) -> str:

@@ -67,7 +67,11 @@ class Setting:
         return self.text or override_text(self.path, to_plain_data(self.value)[0])
 
 
-def settings_of(overrides: str | Iterable[str | Setting] | Mapping[str, object]) -> list[Setting]:
+# changes of a config: texts PATH=VALUE, or values by path
+Overrides = str | Iterable[str | Setting] | Mapping[str, object]
+
+
+def settings_of(overrides: Overrides) -> list[Setting]:
     """Read changes of a config: texts PATH=VALUE, values by path, or settings.
 
     >>> [setting.override for setting in settings_of({"sweep.e": [0.5, 1.0], "models": "hertz"})]

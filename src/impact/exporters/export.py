@@ -143,7 +143,7 @@ def export(
     model: str | None = None,
     *,
     source: ConfigSource = None,
-    at: Mapping[str, float | str] | None = None,
+    at: Mapping[str, object] | None = None,
     dt: float | str | None = None,
     parameter: str | None = None,
     code_version: str | None = None,
@@ -152,7 +152,7 @@ def export(
     program: str | None = None,
     output: str | Path | None = None,
     overwrite: bool = False,
-    overrides: Sequence[str] = (),
+    overrides: Sequence[str] | Mapping[str, object] = (),
 ) -> Export:
     """Write a law as a code takes it, with the restitution that the code delivers at its time step.
 

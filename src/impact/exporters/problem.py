@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
+from ..config.draft import Overrides
 from ..config.load import Config
 from ..config.tables import SWEEP_QUANTITIES
 from ..contact.impacts import INPUTS, Impacts
@@ -116,8 +117,8 @@ def prepare_export(
     model: str | None,
     version: str,
     source: ConfigSource,
-    at: Mapping[str, float | str],
-    overrides: Sequence[str],
+    at: Mapping[str, object],
+    overrides: Overrides,
 ) -> ExportProblem:
     """Choose the law, and reduce the source to one impact; the damping of a law without e is solved for."""
     missing, point_source = "", open_source(source, overrides, Plugins(()))

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
+from ..arguments import require_counts
 from ..array_types import Array
 from ..atomic import check_outputs, write_file
 from ..config.files import override_text
@@ -75,7 +76,7 @@ def calibrate(
     best: str | Path | None = None,
     model: str | None = None,
     overwrite: bool = False,
-    overrides: Sequence[str] = (),
+    overrides: Sequence[str] | Mapping[str, object] = (),
     plugins: Sequence[ForceModel | str | Path] = (),
     jobs: int = 1,
 ) -> xr.Dataset:
@@ -111,6 +112,7 @@ def calibrate(
     >>> round(fit["estimate"].item(), 6), round(fit["chi2_reduced"].item(), 6)
     (0.5, 1.0)
     """
+    require_counts(jobs=jobs)
     plugin_set = read_plugins(plugins)
     read = Path(source) if isinstance(source, str) else source
     config = read_config(read, overrides, plugin_set.models, purpose="calibrate")

@@ -44,6 +44,7 @@ from ..engine.plan import Plan
 from ..engine.plugins import Plugins, read_plugins
 from ..errors import UsageError, did_you_mean
 from ..formatting import argument, number, quantity
+from ..results.ranking import target_value
 from ..results.single_impact import PointSource, open_source, single_point
 from ..results.sweep import sweep_in_memory
 
@@ -149,13 +150,13 @@ def _laws(model: str, friction: str) -> str:
 def solve(
     model: str,
     name: str,
-    target: Mapping[str, float],
+    target: Mapping[str, object],
     *,
     friction: str | None = None,
     source: str | Path | Mapping[str, object] | None = None,
-    at: Mapping[str, float | str] | None = None,
+    at: Mapping[str, object] | None = None,
     over: Mapping[str, object] | None = None,
-    overrides: Sequence[str] = (),
+    overrides: Sequence[str] | Mapping[str, object] = (),
     plugins: Sequence[ForceModel | str | Path] = (),
 ) -> SolveResult:
     """Find the value of an input of a law that gives a target: which coefficient gives the rebound I want?
@@ -260,7 +261,7 @@ class PointWithE:
 def point_with_e(
     source: PointSource,
     law: ForceModel,
-    at: Mapping[str, float | str],
+    at: Mapping[str, object],
     replacing: Callable[[Config], Mapping[str, float] | None] = lambda config: None,
 ) -> PointWithE:
     """Reduce a source to one impact, and replace inputs; an e for a law without one is reached by its damping."""
@@ -293,7 +294,7 @@ def solve_damping(config: Config, plugins: Plugins, e: float) -> Config:
     return replace(config, scalars={**config.scalars, config_name(law, unknown): result.roots[0].value})
 
 
-def solve_input(config: Config, plugins: Plugins, unknown: Parameter, target: Mapping[str, float]) -> SolveResult:
+def solve_input(config: Config, plugins: Plugins, unknown: Parameter, target: Mapping[str, object]) -> SolveResult:
     """Find all values of an input that give a target; with an axis, the value nearest to it everywhere."""
     names = [name for name, variable in OUTPUTS.items() if variable.dtype == "f8" and "model" in variable.dims]
     if len(target) != 1:
@@ -307,10 +308,9 @@ def solve_input(config: Config, plugins: Plugins, unknown: Parameter, target: Ma
             f"{argument('target', key=name)}: got no friction law, expected {argument('friction', 'KEY')}"
         )
     Plan(config, plugins).pair_notes("frictions")
-    if not (isinstance(value, int | float) and math.isfinite(value)):
-        raise UsageError(f"{argument('target', key=name)}: got {value}, expected a finite number")
+    wanted = target_value(name, value)
     problem = SolveProblem(config, plugins, unknown, name)
-    return _best_over_axis(problem, float(value)) if config.axes else _all_roots(problem, float(value))
+    return _best_over_axis(problem, wanted) if config.axes else _all_roots(problem, wanted)
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import elementwise
 
+from ..arguments import require_counts
 from ..array_types import Array
 from ..config.files import read_number, read_numbers
 from ..config.input_names import InputName
@@ -247,14 +248,14 @@ def timestep(
     model: str,
     *,
     source: str | Path | Mapping[str, object] | None = None,
-    at: Mapping[str, float | str] | None = None,
+    at: Mapping[str, object] | None = None,
     steps_per_contact: float | Sequence[float] = (),
     dt: float | str | Sequence[float | str] = (),
     phases: int = 400,
     tol: float | str | None = None,
     parameter: str | None = None,
     scheme: str | None = None,
-    overrides: Sequence[str] = (),
+    overrides: Sequence[str] | Mapping[str, object] = (),
     plugins: Sequence[ForceModel | str | Path] = (),
 ) -> TimestepResult:
     """Show what a code with a fixed time step delivers: mean, smallest and largest restitution over the phase.
@@ -294,8 +295,7 @@ def timestep(
     >>> round(row.e_mean, 4), round(row.e_least, 3), round(row.e_largest, 3), round(row.e_to_ask, 4)
     (0.4945, 0.48, 0.519, 0.5054)
     """
-    if phases < 1:
-        raise UsageError(f"{argument('phases')}: got {phases}, expected a whole number >= 1")
+    require_counts(phases=phases)
     given = read_numbers(dt, SWEEP_QUANTITIES["dt"], argument("dt"))
     counts = read_numbers(steps_per_contact, SWEEP_QUANTITIES["steps_per_contact"], argument("steps_per_contact"))
     tol = None if tol is None else read_number(tol, TOLERANCE, argument("tol"))

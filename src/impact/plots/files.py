@@ -41,7 +41,7 @@ def plot_to_files(
     x: str | None = None,
     y: str | None = None,
     variable: str | None = None,
-    sel: Mapping[str, float | str] | None = None,
+    sel: Mapping[str, object] | None = None,
     models: Sequence[str] | None = None,
     log: str = "",
     points: str | Path | None = None,

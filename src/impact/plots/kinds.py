@@ -62,7 +62,7 @@ class Choice:
     x: str | None = None
     y: str | None = None
     variable: str | None = None
-    sel: Mapping[str, float | str] | None = None
+    sel: Mapping[str, object] | None = None
     models: Sequence[str] | None = None
     log: str = ""
     equations: bool = False

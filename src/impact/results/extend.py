@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from .._version import __version__
 from ..atomic import check_outputs
+from ..config.draft import settings_of
 from ..config.files import override_text
 from ..config.grid import MAX_POINTS, Axis
 from ..config.input_names import InputName
@@ -46,7 +47,7 @@ CHECKED_STATUSES = (Status.NO_IMPACT, Status.INVALID_PARAMETER, Status.OUT_OF_RA
 
 def extend(
     result: str | Path,
-    overrides: Sequence[str],
+    overrides: Sequence[str] | Mapping[str, object],
     *,
     output: str | Path | None = None,
     overwrite: bool = False,
@@ -90,7 +91,7 @@ def extend(
 
 def extend_to_file(
     result: str | Path,
-    overrides: Sequence[str],
+    overrides: Sequence[str] | Mapping[str, object],
     *,
     output: str | Path | None = None,
     overwrite: bool = False,
@@ -126,13 +127,14 @@ def extend_to_file(
     3
     """
     source, target = Path(result), Path(result if output is None else output)
+    changes = [setting.override for setting in settings_of(overrides)]
     run = Run(
         backend or SERIAL, resume, overwrite, max_points, on_progress or ignore, should_stop=should_stop or never
     )
     check_outputs([target], plugins, overwrite=True)
     plugin_set = read_plugins(plugins)
     with run.connected() as connected:
-        outcome = _extend_into(target, source, overrides, plugin_set, connected)
+        outcome = _extend_into(target, source, changes, plugin_set, connected)
     run.check_stop(f"{target} is complete")
     return outcome
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 import xarray as xr
 
-from ..config.draft import Draft, open_text, settings_of
+from ..config.draft import Draft, Overrides, open_text, settings_of
 from ..config.grid import MAX_POINTS
 from ..config.load import Config, Purpose, build
 from ..engine.plugins import Plugins
@@ -20,7 +20,7 @@ from .selection import match_labels
 
 def stored_config(
     attributes: Mapping[str, object],
-    overrides: Sequence[str],
+    overrides: Overrides,
     plugins: Plugins,
     name: str,
     max_points: int = MAX_POINTS,

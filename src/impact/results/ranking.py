@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ..array_types import Mask
 from ..config.files import read_number
 from ..config.input_names import InputName
+from ..config.quantities import Quantity
 from ..config.tables import TOLERANCE
 from ..contact.status import FIRST_FAILURE, FrictionStatus, Status
 from ..contact.variables import OUTPUTS
@@ -242,9 +243,9 @@ def recommend(
     dataset: xr.Dataset | str | Path,
     *,
     tol: float | str = DEFAULT_TOL,
-    sel: Mapping[str, float | str] | None = None,
+    sel: Mapping[str, object] | None = None,
     models: str | Sequence[str] | None = None,
-    target: Mapping[str, float] | None = None,
+    target: Mapping[str, object] | None = None,
     frictions: Sequence[str] | None = None,
 ) -> Ranking:
     """Rank the models of a result by the error of their restitution, over all points of the sweep.
@@ -289,7 +290,7 @@ def recommend(
     return rank_models(rankable_parts(dataset, sel or {}, models, criterion, frictions), tol, criterion)
 
 
-def _criterion_of(target: Mapping[str, float]) -> Criterion:
+def _criterion_of(target: Mapping[str, object]) -> Criterion:
     """Check a target."""
     if len(target) != 1:
         example = argument("target", {"beta": 0.4})
@@ -298,14 +299,17 @@ def _criterion_of(target: Mapping[str, float]) -> Criterion:
     if name not in TARGETS:
         expected = f"an output of the order of 1; {did_you_mean(name, TARGETS)}"
         raise UsageError(f'{argument("target")}: got "{name}", expected {expected}')
-    if not (isinstance(value, int | float) and math.isfinite(value)):
-        raise UsageError(f"{argument('target', key=name)}: got {value}, expected a finite number")
-    return Criterion(name, float(value))
+    return Criterion(name, target_value(name, value))
+
+
+def target_value(name: str, value: object) -> float:
+    """Read the target of an output, a number that may have a unit."""
+    return read_number(value, Quantity(OUTPUTS[name].unit, OUTPUTS[name].meaning), argument("target", key=name))
 
 
 def rankable_parts(
     dataset: xr.Dataset,
-    sel: Mapping[str, float | str],
+    sel: Mapping[str, object],
     models: Sequence[str] | None,
     criterion: Criterion = BY_ERROR,
     frictions: Sequence[str] | None = None,

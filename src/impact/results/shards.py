@@ -111,7 +111,7 @@ def sweep_shard(
     shard: str,
     output: str | Path,
     *,
-    overrides: Sequence[str] = (),
+    overrides: Sequence[str] | Mapping[str, object] = (),
     plugins: Sequence[ForceModel | str | Path] = (),
     backend: AbstractContextManager[ExecutorSpec] | None = None,
     max_points: int = MAX_POINTS,
@@ -190,7 +190,7 @@ class _ShardRecord:
 
 
 def merge(
-    folders: Sequence[str | Path],
+    folders: str | Path | Sequence[str | Path],
     output: str | Path,
     *,
     plugins: Sequence[ForceModel | str | Path] = (),
@@ -229,7 +229,10 @@ def merge(
     output = Path(output)
     run = Run(overwrite=overwrite, on_progress=on_progress or ignore, should_stop=should_stop or never)
     plugin_set = read_plugins(plugins)
-    distinct = {Path(folder).resolve(): Path(folder) for folder in folders}.values()
+    listed = [folders] if isinstance(folders, str | Path) else folders
+    distinct = {Path(folder).resolve(): Path(folder) for folder in listed}.values()
+    if not distinct:
+        raise UsageError("folders: got none, expected the work folders of all shards")
     records = {folder: _read_record(folder) for folder in distinct}
     first, first_record = next(iter(records.items()))
     config = stored_config(first_record.attributes, [], plugin_set, str(first))

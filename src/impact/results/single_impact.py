@@ -11,13 +11,13 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import xarray as xr
 
 from .._version import __version__
 from ..config.design import distribution_paths
 from ..config.draft import (
     Draft,
+    Overrides,
     Setting,
     listed_names,
     open_config,
@@ -26,7 +26,7 @@ from ..config.draft import (
     settings_of,
     without_default_masses,
 )
-from ..config.files import as_table
+from ..config.files import as_table, to_plain_data
 from ..config.grid import Axis
 from ..config.input_names import SWEEP_INPUTS, InputName, input_values
 from ..config.load import Config, build, inline_files
@@ -245,8 +245,8 @@ def run(
     *,
     model: str | None = None,
     friction: str | None = None,
-    at: Mapping[str, float | str] | None = None,
-    overrides: Sequence[str] = (),
+    at: Mapping[str, object] | None = None,
+    overrides: Sequence[str] | Mapping[str, object] = (),
     plugins: Sequence[ForceModel | str | Path] = (),
     times: int | None = None,
 ) -> Impact:
@@ -403,7 +403,7 @@ def history_dataset(
 def histories(
     dataset: xr.Dataset,
     models: Sequence[str] | None,
-    at: Mapping[str, float | str],
+    at: Mapping[str, object],
     plugins: Plugins,
     frictions: Sequence[str] | None = None,
 ) -> list[xr.Dataset]:
@@ -528,7 +528,7 @@ class PointSource:
         return self.calibration.draft(self.calibration.law(model, friction or ""), model, self.plugins)
 
 
-def open_source(source: ConfigSource, overrides: Sequence[str], plugins: Plugins) -> PointSource:
+def open_source(source: ConfigSource, overrides: Overrides, plugins: Plugins) -> PointSource:
     """Open the config of a source, with overrides; None is the starter config at e = 0.5.
 
     A part of a result fixes the values at which it was selected. A plug-in that has changed since the result was
@@ -549,7 +549,7 @@ def open_source(source: ConfigSource, overrides: Sequence[str], plugins: Plugins
     return PointSource(draft.with_settings(settings_of(overrides)), plugins)
 
 
-def _open_stored(dataset: xr.Dataset, overrides: Sequence[str], plugins: Plugins, name: str) -> PointSource:
+def _open_stored(dataset: xr.Dataset, overrides: Overrides, plugins: Plugins, name: str) -> PointSource:
     calibration, settings = None, tuple(settings_of(overrides))
     if is_calibration(dataset):
         config = stored_config(dataset.attrs, (), plugins, name, allow_changed_plugins=True, purpose="calibrate")
@@ -567,7 +567,7 @@ def _open_stored(dataset: xr.Dataset, overrides: Sequence[str], plugins: Plugins
 def single_point(
     source: PointSource,
     model: str | None = None,
-    at: Mapping[str, float | str] | None = None,
+    at: Mapping[str, object] | None = None,
     over: Mapping[str, object] | None = None,
     *,
     friction: str | None = None,
@@ -588,9 +588,9 @@ def single_point(
     law = None if model is None else find(model, source.plugins.models)
     friction_law = None if friction is None else find_friction(friction)
     laws = (law or next(iter(draft.models), None), friction_law or next(iter(draft.frictions), None))
-    fixed = {str(_input_name(name, *laws)): value for name, value in (at or {}).items()}
+    fixed = {str(_input_name(name, *laws)): to_plain_data(value)[0] for name, value in (at or {}).items()}
     for name, value in fixed.items():
-        if isinstance(value, Mapping) or np.ndim(value):
+        if isinstance(value, dict | list):
             raise UsageError(f"{argument('at', {name: value})}: got several values, expected one")
     if {"e", "alpha"} <= fixed.keys():
         raise UsageError(f"{argument('at', key='alpha')}: got alpha and e, expected one of the two")

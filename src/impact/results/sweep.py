@@ -76,7 +76,7 @@ def sweep(
     models: str | Sequence[str] | None = None,
     frictions: str | Sequence[str] | None = None,
     output: str | Path | None = None,
-    overrides: Sequence[str] = (),
+    overrides: Sequence[str] | Mapping[str, object] = (),
     plugins: Sequence[ForceModel | str | Path] = (),
     jobs: int = 1,
     threads: int = 1,
@@ -176,7 +176,7 @@ def sweep_to_file(
     source: str | Path | Mapping[str, object] | None,
     output: str | Path,
     *,
-    overrides: Sequence[str | Setting] = (),
+    overrides: Sequence[str | Setting] | Mapping[str, object] = (),
     plugins: Sequence[ForceModel | str | Path] = (),
     backend: AbstractContextManager[ExecutorSpec] | None = None,
     max_points: int = MAX_POINTS,
@@ -237,7 +237,7 @@ def sweep_to_file(
 
 def read_plan(
     source: str | Path | Mapping[str, object] | None,
-    overrides: Sequence[str | Setting] = (),
+    overrides: Sequence[str | Setting] | Mapping[str, object] = (),
     plugins: Sequence[ForceModel | str | Path] = (),
     run: Run = DEFAULT_RUN,
 ) -> Plan:

@@ -184,17 +184,13 @@ def load(path: str | Path) -> xr.Dataset:
         return dataset.load() if table_of_result(dataset) is None else in_memory(dataset)
 
 
-def result_of(result: object) -> xr.Dataset:
-    """Open what a function takes as a result: a dataset, or the file of one; a selected law stays a dimension.
-
-    Raises
-    ------
-    UsageError : it is something else
-    """
+def result_of(result: xr.Dataset | str | Path) -> xr.Dataset:
+    """Open what a function takes as a result: a dataset, or the file of one; a selected law stays a dimension."""
     if isinstance(result, str | Path):
         return load(result)
     if not isinstance(result, xr.Dataset):
-        raise UsageError(f"result: got a {type(result).__name__}, expected a dataset, or the file of a result")
+        # the public function names its argument
+        raise TypeError(f"got a {type(result).__name__}, expected a dataset, or the file of a result")
     for dim in ("friction", "model"):
         if dim in result.coords and result[dim].ndim == 0 and kind_of(result) == "sweep":
             metadata = ("exponent", *MODEL_METADATA) if dim == "model" else ()
@@ -208,7 +204,7 @@ def expand(
     result: str | Path,
     output: str | Path,
     *,
-    sel: Mapping[str, float | str] | None = None,
+    sel: Mapping[str, object] | None = None,
     models: Sequence[str] | None = None,
     overwrite: bool = False,
     max_points: int = MAX_POINTS,

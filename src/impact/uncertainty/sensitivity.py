@@ -39,7 +39,7 @@ def sensitivity(
     of: str = "e_out",
     output: str | Path | None = None,
     overwrite: bool = False,
-    overrides: Sequence[str] = (),
+    overrides: Sequence[str] | Mapping[str, object] = (),
     plugins: Sequence[ForceModel | str | Path] = (),
     max_points: int = MAX_POINTS,
     execute: Callable[..., xr.Dataset] | None = None,
@@ -96,11 +96,11 @@ def sensitivity(
 
 def sensitivities(
     source: str | Path | Mapping[str, object],
-    of: Sequence[str],
+    of: str | Sequence[str],
     *,
     output: str | Path | None = None,
     overwrite: bool = False,
-    overrides: Sequence[str] = (),
+    overrides: Sequence[str] | Mapping[str, object] = (),
     plugins: Sequence[ForceModel | str | Path] = (),
     max_points: int = MAX_POINTS,
     execute: Callable[..., xr.Dataset] | None = None,
@@ -126,6 +126,7 @@ def sensitivities(
     [187.75797, 0.00998]
     """
     names = [name for name, variable in OUTPUTS.items() if not variable.flags]
+    of = [of] if isinstance(of, str) else of
     for name in of:
         if name not in names:
             raise UsageError(f'{argument("of")}: no output "{name}"; {did_you_mean(name, names)}')
