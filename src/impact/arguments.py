@@ -81,5 +81,6 @@ def _is_of(value: object, text: str, names: dict[str, Any]) -> bool:
         # a class that is imported for type checkers only is compared by its name
         return type(value).__name__ == (attribute or name)
     kind = getattr(kind, attribute) if attribute else kind
-    kinds = kind.__args__ if isinstance(kind, UnionType) else [kind]
-    return any(isinstance(value, get_origin(one) or one) for one in kinds)
+    kinds = [get_origin(one) or one for one in (kind.__args__ if isinstance(kind, UnionType) else [kind])]
+    # a type such as ArrayLike is for type checkers
+    return any(not isinstance(one, type) or isinstance(value, one) for one in kinds)

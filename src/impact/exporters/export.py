@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, SupportsFloat
 
 from .._version import __version__
 from ..atomic import check_outputs, write_file
@@ -144,7 +144,7 @@ def export(
     *,
     source: ConfigSource = None,
     at: Mapping[str, object] | None = None,
-    dt: float | str | None = None,
+    dt: SupportsFloat | str | None = None,
     parameter: str | None = None,
     code_version: str | None = None,
     script: bool = False,

@@ -14,10 +14,10 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, SupportsFloat
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import elementwise
 
 from ..arguments import require_counts
@@ -249,10 +249,10 @@ def timestep(
     *,
     source: str | Path | Mapping[str, object] | None = None,
     at: Mapping[str, object] | None = None,
-    steps_per_contact: float | Sequence[float] = (),
-    dt: float | str | Sequence[float | str] = (),
+    steps_per_contact: ArrayLike = (),
+    dt: ArrayLike = (),
     phases: int = 400,
-    tol: float | str | None = None,
+    tol: SupportsFloat | str | None = None,
     parameter: str | None = None,
     scheme: str | None = None,
     overrides: Sequence[str] | Mapping[str, object] = (),
@@ -270,7 +270,7 @@ def timestep(
     source, overrides, plugins : see `solve`
     at : values of inputs by config name; an e for a law that takes none is reached by its damping parameter
     steps_per_contact : contact times of the continuous law over dt; by default 10, 20, 50 and 100
-    dt : further time steps [s], or texts such as "2 us"
+    dt : one or more further time steps [s], or texts such as "2 us"
     phases : number of phases, (i + 1/2)/phases
     tol : relative tolerance for which the smallest number of steps per contact is found
     parameter : a parameter of the law, "K" or "materials.NAME.E", whose value from which on `tol` holds at the

@@ -7,7 +7,7 @@ from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, Literal, overload
+from typing import Any, Literal, SupportsFloat, overload
 
 import numpy as np
 import xarray as xr
@@ -242,7 +242,7 @@ class Ranking(Displayed, Sequence[Ranked]):
 def recommend(
     dataset: xr.Dataset | str | Path,
     *,
-    tol: float | str = DEFAULT_TOL,
+    tol: SupportsFloat | str = DEFAULT_TOL,
     sel: Mapping[str, object] | None = None,
     models: str | Sequence[str] | None = None,
     target: Mapping[str, object] | None = None,
