@@ -45,6 +45,7 @@ Errors and warnings: ImpactError, ConfigError, ModelError, ResultError, StoreErr
 
 from __future__ import annotations
 
+from functools import cache
 from importlib import import_module
 from types import FunctionType
 from typing import TYPE_CHECKING, Any
@@ -168,15 +169,15 @@ _MODULES = {
 __all__ = list(_MODULES)
 
 if not TYPE_CHECKING:
-
+    # the same function each time, which can be pickled
+    @cache
     def __getattr__(name: str) -> Any:
         if name not in _MODULES:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
         member = getattr(import_module(f".{_MODULES[name]}", __name__), name)
-        if isinstance(member, FunctionType):
-            member = import_module(".arguments", __name__).name_wrong_types(member)
-        # found here from now on, also when it is unpickled
-        globals()[name] = member
+        # formulas of laws call `power`, also with symbols
+        if isinstance(member, FunctionType) and name != "power":
+            return import_module(".arguments", __name__).name_wrong_types(member)
         return member
 
 

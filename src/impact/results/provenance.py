@@ -76,7 +76,7 @@ def check_plugins(attributes: Mapping[str, object], plugins: Plugins, name: str)
 
     >>> check_plugins({"plugins": '{"mine": {"file": "my.py", "sha256": "12ab"}}'}, Plugins(), "results.h5")
     Traceback (most recent call last):
-    impact.errors.UsageError: results.h5: made with mine of my.py; give it again with --plugin FILE
+    impact.errors.UsageError: results.h5: made with mine of my.py; give it again with plugins=["FILE"]
     """
     stored = _stored_plugins(attributes, name)
     current = _current_plugins(plugins)
