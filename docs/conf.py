@@ -35,6 +35,8 @@ html_static_path = ["_static"]
 html_css_files = ["site.css"]
 # headings are targets of links, as on GitHub
 myst_heading_anchors = 4
+# it is a part of the page of the package
+exclude_patterns = ["types.md"]
 napoleon_google_docstring = False
 default_role = "literal"
 autodoc_typehints = "none"
@@ -117,7 +119,9 @@ def api_page() -> str:
         for name in names.replace(",", " ").split():
             kind = "autoclass" if isinstance(getattr(impact, name), type) else "autofunction"
             lines += ["", f"### {name}", "", "```{eval-rst}", f".. {kind}:: impact.{name}", "```"]
-    return "\n".join(lines) + "\n"
+    # the page of types, one level lower
+    types = (Path(__file__).parent / "types.md").read_text(encoding="utf-8")
+    return "\n".join(lines) + "\n\n" + re.sub("^#", "##", types, flags=re.MULTILINE)
 
 
 def module_page() -> str:

@@ -18,6 +18,7 @@ from impact.results.kinds import Kind
 from impact.results.schema import SCHEMA, SCHEMA_VERSION, udunits
 from models_page import models_page
 from models_pictures import pictures
+from types_page import types_page
 
 ROOT = Path(__file__).parent.parent
 # the figures of the paper that show a single impact, and their kinds
@@ -186,6 +187,7 @@ PAGES = {
     "models.md": models_page,
     "frictions.md": frictions_page,
     "gallery.md": gallery_page,
+    "types.md": types_page,
 }
 
 

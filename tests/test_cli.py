@@ -660,9 +660,9 @@ def test_a_signal_while_storing_is_not_lost(
 def test_an_internal_error_is_one_line_and_a_report(forked: ForkServer, tmp_path: Path, stored: Path) -> None:
     # a function that is replaced by a failing one stands for a bug
     code = (
-        "import tempfile, impact.results.info as module\n"
+        "import tempfile, impact\n"
         "def broken(*a, **k): raise ZeroDivisionError('of our own')\n"
-        "module.info = broken\n"
+        "impact.info = broken\n"
         f"tempfile.tempdir = {str(tmp_path)!r}\n"
     )
     done = forked("info", stored, code=code)

@@ -431,7 +431,7 @@ HOSTILE = (
 def test_a_release_with_text_that_would_be_code_is_refused(name: str) -> None:
     release = CODES[name].newest
     for version in ("", " ", "x" * 60, "9" * 5000, *HOSTILE, *(release + hostile for hostile in HOSTILE)):
-        with pytest.raises(UsageError, match=r"^--code-version: got [ -~…]*$"):
+        with pytest.raises(UsageError, match=r"^code_version: got [ -~…]*$"):
             impact.export(name, at={"e": 0.6}, code_version=version)
 
 

@@ -57,7 +57,7 @@ def test_the_best_law_that_the_code_has_is_exported_with_its_fitted_parameters(f
     assert (
         warning == f"the law that fits best, {weights['kuwabara-kono-1987']}, is none of {CODES['lammps'].title}"
     )
-    assert f"--model exports another law that was fitted: {weights['kelvin-voigt']}" in export.header
+    assert f'model="KEY" exports another law that was fitted: {weights["kelvin-voigt"]}' in export.header
     # a later release has the law that was fitted
     part = dataset.sel(model=["lammps-tsuji", "tsuji-1992"])
     newer = impact.export("lammps", source=part, at={"v1": 1.0}, code_version="1Sep2026")
@@ -104,9 +104,9 @@ def test_the_config_of_another_law_than_the_best_is_written(fit: Path, tmp_path:
     assert swept["model"].item() == "kelvin-voigt"
     assert swept["kelvin-voigt.C"].item() == estimate(fit, "kelvin-voigt", "kelvin-voigt.C")
     # refused before anything is fitted
-    with pytest.raises(UsageError, match='--model: no fit of "kelvin"; did you mean "kelvin-voigt"'):
+    with pytest.raises(UsageError, match='model: no fit of "kelvin"; did you mean "kelvin-voigt"'):
         impact.calibrate(DROPS, best=tmp_path / "other.toml", model="kelvin")
-    with pytest.raises(UsageError, match="--model: set without --best FILE"):
+    with pytest.raises(UsageError, match='model: set without best="FILE"'):
         impact.calibrate(DROPS, model="kelvin-voigt")
 
 

@@ -204,8 +204,8 @@ def assert_refused(path: Path, overrides: list[str], expected: str) -> None:
 @pytest.mark.parametrize(
     ("override", "expected"),
     [
-        ("sweep.K=2e9", "--set changes K, expected more values of an axis"),
-        ("solver.rtol=1e-6", "--set changes solver, expected more values of an axis"),
+        ("sweep.K=2e9", "overrides changes K, expected more values of an axis"),
+        ("solver.rtol=1e-6", "overrides changes solver, expected more values of an axis"),
         ("sweep.e=[0.3, 0.6]", "already has all of these"),
         ("sweep.n=1.5", "already has all of these"),
         ("sweep.m2=[]", "sweep.m2"),
@@ -222,7 +222,7 @@ def test_an_extension_changes_nothing_but_values_of_axes(
 def test_an_extension_does_not_change_what_is_stored_of_a_point(stored_sweep: StoredSweep, override: str) -> None:
     key = override.partition("=")[0]
     overrides = ["sweep.e=[0.1, 0.3, 0.6]", override]
-    assert_refused(stored_sweep(), overrides, f"r.h5: --set changes {key}, expected more values")
+    assert_refused(stored_sweep(), overrides, f"r.h5: overrides changes {key}, expected more values")
 
 
 @BOTH_LAYOUTS
@@ -234,7 +234,7 @@ def test_an_extension_does_not_change_what_is_stored_of_a_point(stored_sweep: St
     ],
 )
 def test_an_extension_never_drops_a_point(stored_sweep: StoredSweep, layout: str, overrides: list[str]) -> None:
-    assert_refused(stored_sweep(ZIPPED, layout), overrides, "--set leaves out e=0.3, v1=1.0")
+    assert_refused(stored_sweep(ZIPPED, layout), overrides, "overrides leaves out e=0.3, v1=1.0")
 
 
 def test_the_work_folder_of_another_sweep_is_not_cleared(stored_sweep: StoredSweep, tmp_path: Path) -> None:

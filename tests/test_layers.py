@@ -13,7 +13,7 @@ import pytest
 SOURCE = Path(__file__).parent.parent / "src" / "impact"
 # the floors of docs/architecture.md, from the lowest; a part imports from those before it, and from itself
 FLOORS = {
-    "foundations": ("_version", "array_types", "formatting", "errors", "atomic", "display"),
+    "foundations": ("_version", "array_types", "formatting", "errors", "arguments", "atomic", "display"),
     "numerics": ("ode", "contact"),
     "config": ("config",),
     "sweeps": ("engine", "progress_display", "results"),

@@ -288,7 +288,7 @@ def test_models_beyond_the_largest_number_of_panels_are_reported(many: xr.Datase
         ({"variable": "e_eror"}, 'no variable "e_eror" in this result; did you mean "e_error"?'),
         ({"variable": "\x1b[31m"}, r'no variable "\x1b[31m" in this result; known: closed_form_error'),
         ({"x": "v3"}, 'cannot draw over "v3"'),
-        ({"x": "e"}, "cannot draw over e, which varies over alpha, v1; select one with --sel"),
+        ({"x": "e"}, "cannot draw over e, which varies over alpha, v1; select one with sel"),
         ({"x": "v1", "y": "v1"}, "map needs two axes; v1 and v1 vary together"),
         ({"sel": {"v1": 6.0, "m2": 1.0}, "y": "e", "x": "alpha"}, "map needs two axes; alpha and e vary together"),
         ({"sel": {"m3": 1.0}}, 'no axis "m3" in this result'),
@@ -309,7 +309,7 @@ def test_a_result_that_cannot_be_drawn_is_an_error_of_one_line(figure6: xr.Datas
             field_map(dataset, **choice) if kind == "map" else validity(dataset)
         return str(caught.value)
 
-    alone = "needs two axes; this result has e alone; sweep a second, or use --kind restitution"
+    alone = 'needs two axes; this result has e alone; sweep a second, or use kind="restitution"'
     assert refused(figure6) == f"map {alone}"
     assert refused(figure6, "validity") == f"validity {alone}"
     assert refused(figure6.isel(e=0)).startswith("map needs two axes; this result has none")
@@ -320,7 +320,7 @@ def test_a_result_that_cannot_be_drawn_is_an_error_of_one_line(figure6: xr.Datas
     assert refused(twice, y="v1") == "map needs different values along each axis; v1 has a value twice"
     assert (
         refused(many.assign_coords(v1=np.arange(5.0)), y="v1", log="y")
-        == "--log y: v1 got values <= 0, expected values > 0"
+        == 'log="y": v1 got values <= 0, expected values > 0'
     )
     assert refused(many.drop_vars("e_error"), "validity").startswith('no variable "e_error" in this result')
     empty = many.assign(e_error=many["e_error"] * np.nan, kind=("model", ["a"] * 13))

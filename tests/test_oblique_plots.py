@@ -234,7 +234,7 @@ def test_more_pairs_than_can_be_told_apart_are_drawn_on_request(beads: xr.Datase
     many = sweep(models=models, frictions=[COULOMB, MINDLIN], friction={MINDLIN: {"xt": 0.0}})
     some = curves_of(many, "beta")
     assert len(of_pairs(some)) == MAX_PAIRS
-    assert some.not_drawn == ("2 more pairs; choose some with --model and --friction",)
+    assert some.not_drawn == ("2 more pairs; choose some with models and frictions",)
     assert len(of_pairs(curves_of(many, "beta", frictions=[COULOMB, MINDLIN]))) == 10
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 from collections.abc import Callable
+from concurrent.futures import Executor, Future
 from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
@@ -16,6 +17,8 @@ import pytest
 import xarray as xr
 
 import impact
+
+from .conftest import ROOT, Run
 
 unit = pint.UnitRegistry()
 BASE = {
@@ -73,8 +76,95 @@ def test_a_range_and_lengths_with_units_are_axes() -> None:
 def test_another_type_is_named(source: object) -> None:
     with pytest.raises(impact.UsageError, match=f"^source: got a {type(source).__name__}, expected a mapping"):
         impact.sweep(source)  # type: ignore[arg-type]
-    with pytest.raises(impact.UsageError, match=f"^result: got a {type(source).__name__}, expected a dataset"):
+    with pytest.raises(impact.UsageError, match=f"^dataset: got a {type(source).__name__}, expected xr.Dataset"):
         impact.plot(source)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: impact.run(at=[("e", 0.5)]), "at: got a list, expected Mapping[str, object] | None"),
+        (lambda: impact.run(model=["hertz"]), "model: got a list, expected str | None"),
+        (lambda: impact.solve("hertz", "K", 0.5), "target: got a float, expected Mapping[str, object]"),
+        (
+            lambda: impact.cite("hertz", 5),
+            "laws: got a int, expected str | Path | xr.Dataset | ForceModel | FrictionLaw",
+        ),
+        (lambda: impact.check_model("hertz"), "model: got a str, expected ForceModel"),
+        (lambda: impact.info(5), "result: got a int, expected xr.Dataset | str | Path"),
+        (lambda: impact.load(5), "path: got a int, expected str | Path"),
+        (lambda: impact.estimate(BASE, jobs=0), "jobs: got 0, expected a whole number >= 1"),
+        (lambda: impact.merge([], "r.h5"), "folders: got none, expected the work folders of all shards"),
+        (lambda: impact.run("hertz"), 'No such file or directory; did you mean model="hertz"?'),
+        (lambda: impact.sweep("hertz"), 'No such file or directory; did you mean models="hertz"?'),
+        (lambda: impact.models("hertz"), "did you mean pattern='hertz'?"),
+        (lambda: impact.run(at={"e": 2}), 'at["e"]: sweep.e: got 2, expected'),
+        (lambda: impact.run(overrides={"sweep.e": 2}), 'overrides["sweep.e"]: sweep.e: got 2, expected'),
+        (lambda: impact.run(overrides=["sweep.e=2"]), 'overrides="sweep.e=2": sweep.e: got 2, expected'),
+        (lambda: impact.solve("hertz", "A", {"e_out": 0.5}), "name: hertz has no parameter"),
+        (lambda: impact.solve("tsuji-1992", "e", {"e_out": "x"}), 'target["e_out"]: got "x", expected'),
+        (lambda: impact.timestep("tsuji-1992", steps_per_contact=-1), "steps_per_contact: got -1, expected"),
+        (lambda: impact.timestep("tsuji-1992", parameter="K"), "parameter: expected one dt and tol as well"),
+        (lambda: impact.export("lamps"), 'to: no code "lamps"; did you mean "lammps"?'),
+        (lambda: impact.plot(impact.sweep(BASE), kind="foo"), 'kind: no kind "foo"'),
+        (lambda: impact.plot(impact.sweep(BASE), sel={"e": [1, 2]}), 'sel={"e": [1, 2]}: got no single value'),
+        (lambda: impact.save(impact.sweep(BASE), ROOT / "README.md"), "or overwrite it (overwrite=True)"),
+    ],
+)
+def test_a_message_names_the_argument_as_python_does(call: Callable[[], object], message: str) -> None:
+    with pytest.raises(impact.ImpactError) as refusal:
+        call()
+    assert message in str(refusal.value)
+    assert "--" not in str(refusal.value)
+
+
+def test_what_fails_for_another_reason_stays_the_error_that_it_is() -> None:
+    with pytest.raises(TypeError, match="unexpected keyword argument 'modle'"):
+        impact.run(modle="hertz")  # type: ignore[call-arg]
+    with pytest.raises(ZeroDivisionError):
+        impact.sweep(BASE, executor=Broken())
+
+
+class Broken(Executor):
+    """An executor that fails."""
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        raise ZeroDivisionError
+
+
+@pytest.mark.parametrize(
+    "words", [["run", "hertz"], ["solve", "hertz", "--model", "hertz", "--for", "K", "--target", "e_out=1"]]
+)
+def test_the_command_line_names_options(cli: Run, words: list[str]) -> None:
+    done = cli(*words)
+    hint = "did you mean --model hertz?"
+    assert (done.returncode, done.stderr) == (2, f"hertz: cannot be read: No such file or directory; {hint}\n")
+
+
+def test_public_functions_are_pickled_by_their_name() -> None:
+    for name in impact.__all__:
+        assert pickle.loads(pickle.dumps(getattr(impact, name))) is getattr(impact, name)
+
+
+@pytest.mark.parametrize("target", [0.6, "60 %", np.float32(0.6), 0.6 * unit.dimensionless, xr.DataArray(0.6)])
+def test_a_target_is_a_number_of_any_library(target: object) -> None:
+    (root,) = impact.solve("mujoco-solref", "dampratio", {"e_out": target}).roots
+    assert root.value == pytest.approx(0.180858, abs=1e-5)
+    assert impact.recommend(impact.sweep(BASE), target={"e_out": target})[0].model == "tsuji-1992"
+
+
+def test_a_selected_value_is_a_number_of_any_library(result: xr.Dataset) -> None:
+    titles = [
+        impact.plot(result, kind="loop", models=["tsuji-1992"], sel={"e": half}).axes[0].get_title()
+        for half in (0.5, "50 %", np.array(0.5), Fraction(1, 2), 0.5 * unit.dimensionless, result["e"][1])
+    ]
+    assert len(set(titles)) == 1
+
+
+def test_an_extension_takes_values_by_path(tmp_path: Path) -> None:
+    impact.sweep(BASE, output=tmp_path / "r.h5")
+    extended = impact.extend(tmp_path / "r.h5", {"sweep.e": np.array([0.25, 0.5, 0.75])})
+    assert extended["e"].values.tolist() == [0.25, 0.5, 0.75]
 
 
 def test_a_result_may_be_given_by_its_file(result: xr.Dataset, tmp_path: Path) -> None:

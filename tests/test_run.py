@@ -275,7 +275,7 @@ def test_at_selects_a_case_by_its_number_and_a_material_by_its_property(cli: Run
     for at, message in (
         ({"case": 3.0}, "case = 3.0: not on the zipped axis case; these values vary together"),
         ({"case": 1.0, "e": 0.9}, "case = 1.0, e = 0.9: not on the zipped axis case"),
-        ({"materials.steel.E": -1.0}, "--at materials.steel.E=-1.0: materials.steel.E: got -1.0, expected"),
+        ({"materials.steel.E": -1.0}, 'at["materials.steel.E"]: materials.steel.E: got -1.0, expected'),
         ({"materials.steel.G": 1.0}, 'no input "materials.steel.G" here; did you mean'),
     ):
         with pytest.raises(impact.ImpactError, match=f"^{re.escape(message)}"):
@@ -296,7 +296,7 @@ def test_values_of_numpy_are_values() -> None:
         for over in (speeds, speeds.tolist())
     ]
     assert roots[0] == roots[1] != ()
-    with pytest.raises(impact.ImpactError, match=r"^--at e=1\.5: sweep\.e: got 1\.5, expected"):
+    with pytest.raises(impact.ImpactError, match=r"^at\[\"e\"\]: sweep\.e: got 1\.5, expected"):
         impact.run(model="bilinear", at={"e": np.float64(1.5)})
 
 
@@ -304,7 +304,7 @@ def test_values_of_numpy_are_values() -> None:
     "values", [(0.2, 0.3), [0.2, 0.3], np.array([0.2, 0.3]), {"linspace": [0, 1, 3]}], ids=repr
 )
 def test_several_values_of_an_input_are_refused_in_one_line(values: Any) -> None:
-    with pytest.raises(UsageError, match=r"^--at e=[^\n]*: got several values, expected one$"):
+    with pytest.raises(UsageError, match=r"^at=\{\"e\": [^\n]*\}: got several values, expected one$"):
         impact.run(model="hertz", at={"e": values})
 
 

@@ -241,10 +241,10 @@ def test_a_shard_of_another_sweep_is_not_continued_but_can_be_overwritten(cli: R
 
 @pytest.mark.parametrize("text", ["3", "0/4", "5/4", "1/0", "-1/2", "1/2/3", "a/b", ""])
 def test_an_invalid_number_of_a_shard_is_refused(cli: Run, folder: Path, text: str) -> None:
-    message = f"--shard {text}: expected K/N with K from 1 to N, such as 3/16"
-    with pytest.raises(UsageError, match=re.escape(message)):
+    expected = "expected K/N with K from 1 to N, such as 3/16"
+    with pytest.raises(UsageError, match=re.escape(f'shard="{text}": {expected}')):
         run_shards(folder, text)
-    assert_refused(cli("sweep", "c.toml", f"--shard={text}", cwd=folder), message)
+    assert_refused(cli("sweep", "c.toml", f"--shard={text}", cwd=folder), f"--shard {text}: {expected}")
 
 
 @pytest.mark.slow

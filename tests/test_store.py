@@ -239,7 +239,7 @@ def test_a_sweep_whose_file_cannot_be_read_back_leaves_no_file(
 def test_an_output_that_exists_is_kept(figure6: xr.Dataset, tmp_path: Path) -> None:
     path = tmp_path / "precious.h5"
     path.write_text("precious")
-    with pytest.raises(UsageError, match="--overwrite"):
+    with pytest.raises(UsageError, match="overwrite=True"):
         impact.save(figure6, path)
     assert path.read_text() == "precious"
     impact.save(figure6, path, overwrite=True)

@@ -45,7 +45,9 @@ Errors and warnings: ImpactError, ConfigError, ModelError, ResultError, StoreErr
 
 from __future__ import annotations
 
+from functools import cache
 from importlib import import_module
+from types import FunctionType
 from typing import TYPE_CHECKING, Any
 
 from ._version import __version__ as __version__
@@ -167,11 +169,16 @@ _MODULES = {
 __all__ = list(_MODULES)
 
 if not TYPE_CHECKING:
-
+    # the same function each time, which can be pickled
+    @cache
     def __getattr__(name: str) -> Any:
         if name not in _MODULES:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-        return getattr(import_module(f".{_MODULES[name]}", __name__), name)
+        member = getattr(import_module(f".{_MODULES[name]}", __name__), name)
+        # formulas of laws call `power`, also with symbols
+        if isinstance(member, FunctionType) and name != "power":
+            return import_module(".arguments", __name__).name_wrong_types(member)
+        return member
 
 
 def __dir__() -> list[str]:

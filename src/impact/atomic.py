@@ -17,7 +17,7 @@ from secrets import token_hex
 from typing import Any
 
 from .errors import StoreError, UsageError
-from .formatting import safe_text
+from .formatting import argument, safe_text
 
 try:
     import fcntl
@@ -204,7 +204,7 @@ def check_output(path: Path, *, overwrite: bool, source: Path | None = None) -> 
     if source is not None and source.exists() and path.samefile(source):
         raise UsageError(f"{path}: is the file to be read, and is not modified")
     if not overwrite:
-        raise UsageError(f"{path}: exists; give another name, or overwrite it (--overwrite)")
+        raise UsageError(f"{path}: exists; give another name, or overwrite it ({argument('overwrite', True)})")
 
 
 def check_outputs(outputs: Iterable[str | Path | None], inputs: Iterable[object], *, overwrite: bool) -> None:

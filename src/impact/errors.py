@@ -39,7 +39,7 @@ class ImpactError(Exception):
     ...     impact.run(at={"e": 1.4})
     ... except impact.ImpactError as error:
     ...     print(error)
-    --at e=1.4: sweep.e: got 1.4, expected a number from 0 to 1
+    at["e"]: sweep.e: got 1.4, expected a number from 0 to 1
     """
 
     def __init__(self, *problems: str) -> None:

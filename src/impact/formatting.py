@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import math
 import re
+import shlex
+from pathlib import Path
 from unicodedata import category
 
 # control, format (bidi marks, zero-width), lone surrogate, private, unassigned, line and paragraph separator
@@ -15,6 +18,59 @@ SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}
 # units whose first factor takes a prefix
 PREFIXED = re.compile(r"(m|s|N|J|Pa|W|Hz)(?![\^A-Za-z])")
+
+# parameters of public functions whose option has another name
+OPTIONS = {
+    "frictions": "friction",
+    "kinds": "kind",
+    "labels": "label",
+    "models": "model",
+    "name": "for",
+    "overrides": "set",
+    "parameter": "for",
+    "plugins": "plugin",
+}
+_is_command_line = False
+
+
+def name_options() -> None:
+    """Name arguments as options from now on, for a process that is the command line."""
+    global _is_command_line
+    _is_command_line = True
+
+
+def argument(name: str, value: object = None, *, key: str = "") -> str:
+    """Name an argument of a public function, or with a value what to write, in the words of the user.
+
+    On the command line these are `--at e=0.6`, `--kind loop`, `--overwrite` and `--sel e=0.5`.
+
+    >>> argument("at", 0.6, key="e"), argument("kind", "loop"), argument("overwrite", True)
+    ('at["e"]', 'kind="loop"', 'overwrite=True')
+    >>> argument("max_points"), argument("sel", {"e": 0.5}), argument("plugins", ["FILE"])
+    ('max_points', 'sel={"e": 0.5}', 'plugins=["FILE"]')
+    """
+    if not _is_command_line:
+        if key:
+            return f'{name}["{key}"]'
+        return name if value is None else f"{name}={_python_text(value)}"
+    if isinstance(value, dict):
+        ((key, value),) = value.items()
+    elif isinstance(value, list):
+        value = shlex.quote(str(value[0]))
+    words = [str(part) for part in (key or None, value) if part is not None and part is not True]
+    return " ".join([f"--{OPTIONS.get(name, name).replace('_', '-')}", *(["=".join(words)] if words else [])])
+
+
+def _python_text(value: object) -> str:
+    """Write a value as Python code, with double quotes."""
+    match value:
+        case dict():
+            return f"{{{', '.join(f'{_python_text(key)}: {_python_text(item)}' for key, item in value.items())}}}"
+        case list():
+            return f"[{', '.join(map(_python_text, value))}]"
+        case str() | Path():
+            return json.dumps(str(value), ensure_ascii=False)
+    return repr(value)
 
 
 def number(value: object, digits: int = 6) -> str:

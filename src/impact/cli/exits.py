@@ -19,7 +19,7 @@ from typing import TextIO
 from typer import TyperException
 
 from ..errors import ImpactError, Interruption, InUseError, StoreError, UnfinishedError
-from ..formatting import escape_controls, safe_text
+from ..formatting import escape_controls, name_options, safe_text
 
 # a shell reports 130 and 143 for a process that SIGINT or SIGTERM ended
 EXIT_OK, EXIT_NOT_EQUAL, EXIT_USAGE, EXIT_POINTS_FAILED, EXIT_STORAGE, EXIT_IN_USE = 0, 1, 2, 3, 4, 5
@@ -77,6 +77,7 @@ def print_line(line: str, *, error: bool = False) -> None:
 
 def run_command_line(command: Callable[[], object], *, debug: bool) -> int:
     """Run the command line and return its exit code; expected errors are printed without a traceback."""
+    name_options()
     # output to a stream that was closed before the start is discarded
     sys.stdout = sys.stdout or open(os.devnull, "w")  # noqa: SIM115
     sys.stderr = sys.stderr or open(os.devnull, "w")  # noqa: SIM115

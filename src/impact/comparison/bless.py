@@ -12,7 +12,7 @@ import xarray as xr
 
 from ..atomic import check_output
 from ..errors import ResultError, UsageError
-from ..formatting import safe_text
+from ..formatting import argument, safe_text
 from ..results.replay_command import command_start, describe_point, inputs_of_model
 from ..results.summary import summarize
 from ..results.xarray_backend import load, save_with_attributes
@@ -58,9 +58,9 @@ def bless(
     'first'
     """
     if not reason.strip():
-        raise UsageError("--reason: got an empty text, expected the reason for the change")
+        raise UsageError(f"{argument('reason')}: got an empty text, expected the reason for the change")
     if re.search("[\0\ud800-\udfff]", reason):
-        raise UsageError(f'--reason: got "{safe_text(reason, 60)}", expected UTF-8 text without NUL')
+        raise UsageError(f'{argument("reason")}: got "{safe_text(reason, 60)}", expected UTF-8 text without NUL')
     new, baseline = Path(new), Path(baseline)
     check_output(baseline, overwrite=True, source=new)
     result = load(new)
@@ -86,7 +86,7 @@ def _check_no_failures(result: xr.Dataset, path: Path) -> None:
     summary = summarize(result[names] if names else result)
     if summary.not_counted:
         count = f"{summary.not_counted:,} points are too many to look for failures"
-        raise UsageError(f"{path}: {count}; expected fewer, or --allow-failed")
+        raise UsageError(f"{path}: {count}; expected fewer, or {argument('allow_failed', True)}")
     if summary.failed:
         count = f"{summary.failed:,} of {summary.points:,} points failed"
         first = ""
@@ -94,7 +94,7 @@ def _check_no_failures(result: xr.Dataset, path: Path) -> None:
             point = result[name].isel(dict(zip(result[name].dims, (*laws, *indices), strict=True)))
             at = inputs_of_model({str(dim): point[dim].item() for dim in result[name].dims})
             first = f", the first at {describe_point(at)} ({status.name.lower()})"
-        raise UsageError(f"{path}: {count}{first}; expected none, or --allow-failed")
+        raise UsageError(f"{path}: {count}{first}; expected none, or {argument('allow_failed', True)}")
 
 
 def _load_baseline(baseline: Path) -> xr.Dataset | None:

@@ -13,7 +13,7 @@ from ..config.input_names import is_input
 from ..contact.fixed_step import EXACT
 from ..contact.variables import OUTPUTS
 from ..errors import UsageError
-from ..formatting import number, safe_text
+from ..formatting import argument, number, safe_text
 from ..results.attributes import read_attribute
 from ..results.kinds import is_calibration, kind_of, require_sweep
 from ..results.replay_command import command_start
@@ -90,7 +90,7 @@ def compare(
         notes = _sweep_notes(a, b, aligned)
         notes += [safe_text(f"not judged: {', '.join(unknown)}")] if unknown else []
         if any(fault.kind == "labels" for fault in faults) and not subset:
-            notes.append("--subset compares only what both results contain")
+            notes.append(f"{argument('subset', True)} compares only what both results contain")
         missing = _missing_variables(a, b)
         notes += [fault.text for fault in missing] if subset else []
         faults += [] if subset else missing

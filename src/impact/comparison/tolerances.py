@@ -11,6 +11,7 @@ import numpy as np
 
 from ..contact.variables import OUTPUTS
 from ..errors import ResultError, UsageError, did_you_mean
+from ..formatting import argument
 from ..results.attributes import read_attribute
 
 Tolerances = Mapping[str, float]
@@ -54,10 +55,10 @@ def calibration_tolerances(tol: float | Tolerances | None) -> dict[str, float]:
     requested = _by_variable(tol)
     for name, value in requested.items():
         if name != ALL_VARIABLES:
-            expected = "expected one for all, such as --tol 1e-5"
-            raise UsageError(f"--tol {name}: got a tolerance for one variable, {expected}")
+            expected = "expected one for all, such as 1e-5"
+            raise UsageError(f"{argument('tol', key=name)}: got a tolerance for one variable, {expected}")
         if not 0.0 <= value < math.inf:
-            raise UsageError(f"--tol {value}: expected a number >= 0, such as --tol 1e-5")
+            raise UsageError(f"{argument('tol', value)}: expected a number >= 0, such as 1e-5")
     return {ALL_VARIABLES: CALIBRATION_TOLERANCE} | requested
 
 
@@ -75,10 +76,12 @@ def _check_tolerances(tolerances: Mapping[str, Any]) -> None:
                 "reported": "has no tolerance, it is not judged;",
             }
             how = has_none[OUTPUTS[name].scale] if name in OUTPUTS else "not a variable of a result;"
-            raise UsageError(f"--tol {name}: {how} {did_you_mean(str(name), TOLERANCE_VARIABLES)}")
+            raise UsageError(
+                f"{argument('tol', key=str(name))}: {how} {did_you_mean(str(name), TOLERANCE_VARIABLES)}"
+            )
         if not _is_number(value) or not 0.0 <= value <= sys.float_info.max:
-            shown = value if name == ALL_VARIABLES else f"{name}={value}"
-            raise UsageError(f"--tol {shown}: expected a number >= 0, such as --tol 1e-8")
+            shown = value if name == ALL_VARIABLES else {name: value}
+            raise UsageError(f"{argument('tol', shown)}: expected a number >= 0, such as 1e-8")
 
 
 def _is_number(value: object) -> TypeGuard[float]:

@@ -18,8 +18,8 @@ from pydantic_core import PydanticCustomError
 from ..contact.friction import FrictionLaw
 from ..contact.model import ForceModel
 from ..contact.models import catalogue
-from ..errors import ConfigError, UsageError
-from ..formatting import safe_text
+from ..errors import ConfigError, MissingFileError, UsageError
+from ..formatting import argument, safe_text
 from .files import (
     as_table,
     override_text,
@@ -47,7 +47,7 @@ class Setting:
 
     path: KeyPath  # empty for a text that is not PATH=VALUE
     value: object  # any, which is checked with the rest of the config
-    shown: str  # the option that sets it, for messages: "--at e=0.6"
+    shown: str  # the argument that sets it, for messages: `at["e"]` or "--at e=0.6"
     text: str = ""  # PATH=VALUE, as it is stored with a result; empty for that of the path and the value
 
     @classmethod
@@ -59,7 +59,7 @@ class Setting:
         (('sweep', 'e', 'linspace'), [0, 1, 11])
         """
         path, value_text = read_override(text)
-        return cls(path, read_value(value_text), f"--set {text}", text)
+        return cls(path, read_value(value_text), argument("overrides", text), text)
 
     @property
     def override(self) -> str:
@@ -67,14 +67,21 @@ class Setting:
         return self.text or override_text(self.path, to_plain_data(self.value)[0])
 
 
-def settings_of(overrides: str | Iterable[str | Setting] | Mapping[str, object]) -> list[Setting]:
+# changes of a config: texts PATH=VALUE, or values by path
+Overrides = str | Iterable[str | Setting] | Mapping[str, object]
+
+
+def settings_of(overrides: Overrides) -> list[Setting]:
     """Read changes of a config: texts PATH=VALUE, values by path, or settings.
 
     >>> [setting.override for setting in settings_of({"sweep.e": [0.5, 1.0], "models": "hertz"})]
     ['sweep.e=[0.5, 1.0]', 'models="hertz"']
     """
     if isinstance(overrides, Mapping):
-        return [Setting(read_override(f"{path}=")[0], value, f"--set {path}") for path, value in overrides.items()]
+        return [
+            Setting(read_override(f"{path}=")[0], value, argument("overrides", key=path))
+            for path, value in overrides.items()
+        ]
     items = [overrides] if isinstance(overrides, str) else overrides
     return [item if isinstance(item, Setting) else Setting.parse(item) for item in items]
 
@@ -235,7 +242,7 @@ def _library_setting(name: str, without: Iterable[str] = ()) -> Setting:
     path = ("materials", name)
     properties = {key: value for key, value in library()[name].items() if key not in without}
     text = override_text(path, properties)
-    return Setting(path, properties, f"--set {text}", text)
+    return Setting(path, properties, argument("overrides", text), text)
 
 
 def open_config(source: Path | Mapping[str, object] | None, plugins: Sequence[ForceModel] = ()) -> Draft:
@@ -255,6 +262,13 @@ def open_config(source: Path | Mapping[str, object] | None, plugins: Sequence[Fo
     data, problems = to_plain_data(source)
     text = "" if problems else json.dumps(data, separators=(",", ":"), default=str)
     return Draft(data, text, "config", catalogue(plugins), Path(), problems=tuple(problems))
+
+
+def reject_law_key(source: object, parameter: str, plugins: Sequence[ForceModel] = ()) -> None:
+    """Raise an error if a source is the key of a law and no file; it names the parameter that takes the key."""
+    if isinstance(source, str | Path) and str(source) in catalogue(plugins) and not Path(source).exists():
+        hint = f"did you mean {argument(parameter, str(source))}?"
+        raise MissingFileError(f"{source}: cannot be read: No such file or directory; {hint}")
 
 
 def open_text(text: str, name: str, plugins: Sequence[ForceModel] = ()) -> Draft:

@@ -10,6 +10,7 @@ from pydantic import ValidationError
 
 from ..contact.variables import default_variables
 from ..errors import did_you_mean
+from ..formatting import argument
 from .draft import Draft
 from .input_names import InputName
 from .quantities import MAX_PROBLEMS, ConfigProblem, KeyPath, Names, Numbers, Range, as_text
@@ -22,7 +23,6 @@ MAX_COUNTED_POINTS = 2**62
 SAMPLE = "sample"
 # HDF5 arrays have at most 32 dimensions, and the models take one, friction laws another
 MAX_AXES = 31
-FULL_LAYOUT_HINT = ' in layout "full" (--max-points); layout = "factored" stores any number'
 # chunks of a result and points of a chunk: a reader opens every chunk, and holds a whole one in memory
 MAX_STORED_CHUNKS, MAX_CHUNK_POINTS = 100_000, 2**22
 
@@ -103,7 +103,8 @@ def build_grid(
         times = "models and friction laws" if draft.frictions else "models"
         number_of_bytes = 8 * len(default_variables(bool(draft.frictions))) * points
         size = f"{points:,} points (axes times {times}), up to {number_of_bytes / 1e9:,.0f} GB"
-        hint = FULL_LAYOUT_HINT if in_full else ""
+        option = argument("max_points")
+        hint = f' in layout "full" ({option}); layout = "factored" stores any number' if in_full else ""
         problems.append((("sweep",), f"got {size}, expected at most {limit:,} points{hint}"))
     columns: dict[str, AxisValues] = {}
     for name in axis_names:

@@ -23,6 +23,7 @@ from .design import design_problems, distribution_paths, draw_columns, unit_samp
 from .draft import (
     Draft,
     Measurements,
+    Overrides,
     Setting,
     add_library_materials,
     open_config,
@@ -77,7 +78,7 @@ class Config:
 
 def read_config(
     source: Path | Mapping[str, object] | None,
-    overrides: Sequence[str | Setting] = (),
+    overrides: Overrides = (),
     plugins: Sequence[ForceModel] = (),
     max_points: int = MAX_POINTS,
     purpose: Purpose = "sweep",
@@ -98,7 +99,7 @@ def read_config(
 
 def parse_config(
     text: str,
-    overrides: Sequence[str] = (),
+    overrides: Overrides = (),
     plugins: Sequence[ForceModel] = (),
     name: str = "<text>",
     max_points: int = MAX_POINTS,

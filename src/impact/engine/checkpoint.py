@@ -24,13 +24,12 @@ from ..contact.records import Record
 from ..contact.simulate import TABLE_COLUMNS
 from ..contact.tangential import TangentialResult
 from ..errors import ImpactError, InUseError, StoreError, UsageError
-from ..formatting import safe_text
+from ..formatting import argument, safe_text
 from .plan import Plan
 from .run import Run
 from .trajectories import RANGE_TRAJECTORIES, TrajectoryRange
 
 PLAN_FILE, LOCK_FILE = "plan.json", "lock"
-OTHER_SWEEP_HINT = "give the sweep that it is of, another output, or --overwrite to start again"
 MAX_DIFFERENCES = 3  # between two sweeps, in a message
 
 
@@ -151,8 +150,8 @@ def _prepare_folder(folder: Path, record: Mapping[str, Any], run: Run) -> None:
         has_leftovers = any(path.name != LOCK_FILE for path in folder.iterdir())
         if has_leftovers and not run.resume and not run.overwrite:
             raise UsageError(
-                f"{folder}: is left of an interrupted sweep; use --resume to continue or --overwrite to start "
-                "again"
+                f"{folder}: is left of an interrupted sweep; use {argument('resume', True)} to continue or "
+                f"{argument('overwrite', True)} to start again"
             )
         if has_leftovers and _can_resume(folder, record, resume=run.resume):
             return
@@ -196,7 +195,8 @@ def _can_resume(folder: Path, record: Mapping[str, Any], *, resume: bool) -> boo
         return False
     difference = _difference_from(folder, record)
     if difference:
-        raise UsageError(f"{folder}: {difference}; {OTHER_SWEEP_HINT}")
+        hint = f"give the sweep that it is of, another output, or {argument('overwrite', True)} to start again"
+        raise UsageError(f"{folder}: {difference}; {hint}")
     return True
 
 

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
+from ..arguments import require_counts
 from ..errors import UsageError
 
 # ranges submitted for each worker: the one being integrated, and those that follow while the driver is busy
@@ -62,6 +63,7 @@ SERIAL = ExecutorSpec(_SerialExecutor, lambda: 1, shares_memory=True)
 
 def choose_executor(jobs: int = 1, threads: int = 1, executor: Executor | None = None) -> ExecutorSpec:
     """Choose by a number of processes, a number of threads, or an executor of `concurrent.futures`."""
+    require_counts(jobs=jobs, threads=threads)
     is_set = {f"jobs = {jobs}": jobs > 1, f"threads = {threads}": threads > 1, "an executor": executor is not None}
     arguments = [argument for argument, is_requested in is_set.items() if is_requested]
     if len(arguments) > 1:

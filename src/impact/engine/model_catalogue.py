@@ -20,7 +20,7 @@ from ..contact.models import catalogue
 from ..contact.numba.dispatch import serves
 from ..display import Block, Displayed, Styled, Table, Wrapped, html_of
 from ..errors import UsageError, did_you_mean
-from ..formatting import decimals, number, with_year
+from ..formatting import argument, decimals, number, with_year
 from .plugins import read_plugins
 
 # requested e of which a table of the catalogue shows the delivered restitution
@@ -252,7 +252,7 @@ def models(
     if pattern.startswith("family:"):
         pattern, family = "*", pattern.removeprefix("family:")
     if family is not None and family not in families:
-        raise UsageError(f'--family: no family "{family}"; {did_you_mean(family, families)}')
+        raise UsageError(f'{argument("family")}: no family "{family}"; {did_you_mean(family, families)}')
     candidates = {key: model for key, model in all_models.items() if family in (None, model.family)}
     return Models(matching_laws(candidates, "model", pattern, search))
 
@@ -273,7 +273,9 @@ def matching_laws(
         words = search.casefold().split()
         matching = {key: law for key, law in matching.items() if _contains(law, words)}
         if not matching:
-            raise UsageError(f'--search: no {noun} has "{search[:60]}" in its title, equation or reference')
+            raise UsageError(
+                f'{argument("search")}: no {noun} has "{search[:60]}" in its title, equation or reference'
+            )
     return matching
 
 

@@ -22,6 +22,7 @@ from ..contact.model import ForceModel
 from ..contact.numba.dispatch import is_installed, serves
 from ..contact.status import FrictionStatus
 from ..errors import ConfigError, UsageError
+from ..formatting import argument
 from .build_impacts import build_impacts, build_oblique, exponents
 from .inputs import Inputs
 from .plugins import Plugins
@@ -131,7 +132,8 @@ class Plan:
         total = sum(count for count in cells if count > MAX_CELLS)
         if total > most:
             raise UsageError(
-                f"{name}: sweep: got {total:,} trajectories to integrate, expected at most {most:,} (--max-points)"
+                f"{name}: sweep: got {total:,} trajectories to integrate, expected at most {most:,} "
+                f"({argument('max_points')})"
             )
 
     def pair_notes(self, name: str) -> list[str]:

@@ -107,7 +107,10 @@ def read_plugins(sources: Sequence[ForceModel | str | Path | PythonFile]) -> Plu
     True
     """
     if isinstance(sources, str | Path | ForceModel):
-        raise UsageError(f"plugins: got {sources!r}, expected a list of models and paths")
+        hint = (
+            f"; did you mean pattern={sources!r}?" if isinstance(sources, str) and sources in catalogue() else ""
+        )
+        raise UsageError(f"plugins: got {sources!r}, expected a list of models and paths{hint}")
     origins = dict.fromkeys(catalogue(), "built in")
     plugins: list[Plugin] = []
     named_plugins = [(str(plugin.package), plugin) for plugin in installed()]

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 from ..contact.model import ForceModel
 from ..errors import UsageError
-from ..formatting import number
+from ..formatting import argument, number
 
 Parameters = Mapping[str, float | str]
 
@@ -75,7 +75,7 @@ class Collision:
         for name in ("m1", "R1") if self.has_wall else ("m1", "m2", "R1", "R2"):
             if not math.isfinite(self[name]):
                 expected = "m2 = inf for a wall" if name == "m1" else "a finite value, or m2 = R2 = inf for a wall"
-                raise UsageError(f"--script: {name}: got {number(self[name])}, expected {expected}")
+                raise UsageError(f"{argument('script')}: {name}: got {number(self[name])}, expected {expected}")
         v1, v2 = (self["v0"], 0.0) if self.has_wall else (self["v1"], self["v2"])
         radii = self["R1"] + (0.0 if self.has_wall else self["R2"])
         values = {
@@ -97,7 +97,7 @@ class Collision:
             rim2 = 0.0 if self.has_wall else self["R2"]
             slip = u1 + self["R1"] * self["omega1"] - u2 + rim2 * self["omega2"]
             if slip == 0.0:
-                raise UsageError("--script: there is no slip before the impact, and so no beta")
+                raise UsageError(f"{argument('script')}: there is no slip before the impact, and so no beta")
             values |= {"u1": u1, "u2": u2, "rim2": rim2, "slip": slip}
             values |= {name: self[name] for name in ("omega1", "omega2")}
         return {name: repr(value) for name, value in values.items()}
@@ -169,7 +169,8 @@ class Code:
         """
         template = self.template
         if collision.has_wall and not self.wall:
-            raise UsageError(f"--script: m2: got inf, expected a finite mass: no wall of {self.title} was run")
+            expected = f"a finite mass: no wall of {self.title} was run"
+            raise UsageError(f"{argument('script')}: m2: got inf, expected {expected}")
         for central, oblique in self.oblique.items() if collision.friction else ():
             template = template.replace(central, oblique)
         for ball, wall in self.wall.items() if collision.has_wall else ():

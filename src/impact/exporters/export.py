@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, SupportsFloat
 
 from .._version import __version__
 from ..atomic import check_outputs, write_file
@@ -17,7 +17,7 @@ from ..config.tables import SWEEP_QUANTITIES
 from ..display import Block, Displayed
 from ..engine.plugins import Plugins
 from ..errors import UsageError
-from ..formatting import decimals, number, quantity, safe_text
+from ..formatting import argument, decimals, number, quantity, safe_text
 from ..inverse.timestep import (
     NeededParameter,
     NeededSteps,
@@ -153,8 +153,8 @@ def export(
     model: str | None = None,
     *,
     source: ConfigSource = None,
-    at: Mapping[str, float | str] | None = None,
-    dt: float | str | None = None,
+    at: Mapping[str, object] | None = None,
+    dt: SupportsFloat | str | None = None,
     parameter: str | None = None,
     friction: str | None = None,
     code_version: str | None = None,
@@ -163,7 +163,7 @@ def export(
     program: str | None = None,
     output: str | Path | None = None,
     overwrite: bool = False,
-    overrides: Sequence[str] = (),
+    overrides: Sequence[str] | Mapping[str, object] = (),
 ) -> Export:
     """Write a law as a code takes it, with the restitution that the code delivers at its time step.
 
@@ -214,9 +214,9 @@ def export(
     problem = prepare_export(code, model, version, source, at or {}, overrides, friction)
     check_outputs([output], [source, *problem.point.config.files], overwrite=overwrite)
     if (script or verify) and not code.template:
-        raise UsageError(f"--script: there is none for {code.title}: {code.tested}")
+        raise UsageError(f"{argument('script')}: there is none for {code.title}: {code.tested}")
     contact_time = problem.law.contact_time
-    given = [] if dt is None else [read_number(dt, SWEEP_QUANTITIES["dt"], "--dt")]
+    given = [] if dt is None else [read_number(dt, SWEEP_QUANTITIES["dt"], argument("dt"))]
     (dt,) = time_steps(contact_time, [] if given else [STEPS_PER_CONTACT], given)
     collision = problem.collision(dt, 0.5)
     parameters = code.parameters(collision)
@@ -236,7 +236,9 @@ def export(
             )
     if parameter:
         if code.scheme is None:
-            raise UsageError(f"--for: what {code.title} delivers at a time step is not predicted")
+            raise UsageError(
+                f"{argument('parameter')}: what {code.title} delivers at a time step is not predicted"
+            )
         needed = needed_parameter(
             problem.point, Plugins(), parameter, dt, ADVISED_TOL, problem.law, problem.outputs
         )

@@ -7,7 +7,7 @@ import re
 from datetime import datetime
 
 from ..errors import UsageError
-from ..formatting import number
+from ..formatting import argument, number
 from .code import Code, Collision, Parameters
 from .programs import printed_version
 
@@ -131,7 +131,8 @@ def law_for_version(key: str, version: str) -> str:
     _, damping, limit = OPTIONS[key]
     for name, since in (("coeff_restitution", COEFF_RESTITUTION_SINCE), ("limit_damping", LIMIT_SINCE)):
         if name in (damping, limit.strip()) and version < since:
-            raise UsageError(f"--code-version: LAMMPS {version} has no {name}, expected {since} or later")
+            origin = argument("code_version")
+            raise UsageError(f"{origin}: LAMMPS {version} has no {name}, expected {since} or later")
     if damping != "tsuji":
         return key
     stem = key.removesuffix("-limit").removesuffix("-without-root")
@@ -244,7 +245,7 @@ def notes(collision: Collision) -> list[str]:
 def warnings(collision: Collision) -> list[str]:
     if OPTIONS[collision.model.key][1] == "tsuji" and collision.version < ROOT_SINCE:
         other = (
-            "use --model lammps-coeff-restitution-hertz"
+            f"use {argument('model', 'lammps-coeff-restitution-hertz')}"
             if collision.version >= COEFF_RESTITUTION_SINCE
             else f"releases since {COEFF_RESTITUTION_SINCE} have coeff_restitution"
         )

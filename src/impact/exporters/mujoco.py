@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ..errors import UsageError
+from ..formatting import argument
 from .code import Code, Collision, Parameters
 from .programs import python_package_version
 
@@ -38,8 +39,8 @@ def parameters(collision: Collision) -> dict[str, float | str]:
     if c.model.key == "mujoco-solref":
         if c["timeconst"] < 2.0 * c.dt:
             raise UsageError(
-                f"--dt: got {c.dt!r}, expected at most half of timeconst = {c['timeconst']!r}: MuJoCo raises a "
-                "smaller timeconst to 2 dt (flag refsafe)"
+                f"{argument('dt')}: got {c.dt!r}, expected at most half of timeconst = {c['timeconst']!r}: MuJoCo "
+                "raises a smaller timeconst to 2 dt (flag refsafe)"
             )
         solref = f"{c['timeconst']!r} {c['dampratio']!r}"
     else:

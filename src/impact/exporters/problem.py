@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
+from ..config.draft import Overrides
 from ..config.load import Config
 from ..config.tables import SWEEP_QUANTITIES
 from ..contact.impacts import INPUTS, Impacts
@@ -15,7 +16,7 @@ from ..engine.build_impacts import build_impacts
 from ..engine.plan import Plan
 from ..engine.plugins import Plugins
 from ..errors import UsageError, did_you_mean
-from ..formatting import number, quantity
+from ..formatting import argument, number, quantity
 from ..inverse.solve import PointWithE, point_with_e
 from ..inverse.timestep import FixedStepLaw, fixed_step_law
 from ..results.calibration import position_of_law, unidentified_notes
@@ -126,8 +127,8 @@ def prepare_export(
     model: str | None,
     version: str,
     source: ConfigSource,
-    at: Mapping[str, float | str],
-    overrides: Sequence[str],
+    at: Mapping[str, object],
+    overrides: Overrides,
     friction: str | None = None,
 ) -> ExportProblem:
     """Choose the law, and reduce the source to one impact; the damping of a law without e is solved for."""
@@ -170,7 +171,7 @@ def _choose_friction(
         expected = (
             did_you_mean(friction, list(code.frictions)) if code.frictions else "no friction is written for it"
         )
-        raise UsageError(f'--friction: {code.title} has no "{friction}"; {expected}')
+        raise UsageError(f'{argument("friction")}: {code.title} has no "{friction}"; {expected}')
     keys = [law.key for law in source.draft(model).frictions]
     chosen = friction or next((key for key in keys if key in code.frictions), None)
     return chosen, () if chosen else tuple(keys)
@@ -196,6 +197,6 @@ def _fit_notes(code: Code, version: str, key: str, calibration: Calibration) -> 
     notes = [f"{calibration.name}: {named[chosen]}, law {chosen + 1} of {len(laws)} by AICc"]
     others = [name for position, name in enumerate(named) if is_in_code[position] and position != chosen]
     if others:
-        notes.append(f"--model exports another law that was fitted: {'; '.join(others)}")
+        notes.append(f"{argument('model', 'KEY')} exports another law that was fitted: {'; '.join(others)}")
     notes += unidentified_notes(calibration.dataset.isel(model=[chosen]))
     return "" if is_in_code[0] else named[0], tuple(notes)

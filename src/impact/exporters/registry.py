@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ..errors import UsageError, did_you_mean
+from ..formatting import argument
 from . import (
     adams,
     chrono,
@@ -52,5 +53,5 @@ CODES: dict[str, Code] = {
 def find_code(name: str) -> Code:
     """Find a code by its name."""
     if name not in CODES:
-        raise UsageError(f'--to: no code "{name}"; {did_you_mean(name, list(CODES))}')
+        raise UsageError(f'{argument("to")}: no code "{name}"; {did_you_mean(name, list(CODES))}')
     return CODES[name]

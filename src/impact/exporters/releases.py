@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 from ..contact.models import original_key
 from ..errors import UsageError, did_you_mean
+from ..formatting import argument
 from .code import Code
 from .programs import find_program
 
@@ -44,19 +45,20 @@ def choose_version(
 ) -> tuple[str | None, str]:
     """Choose the program that runs scripts, None if there is none, and the version that lines are written for."""
     if version is not None:
-        version = read_release(code, version, "--code-version")
+        version = read_release(code, version, argument("code_version"))
         if not verify:
             return None, version
     must_run = verify or program is not None
     if not code.program and must_run:
-        raise UsageError(f"--verify: no script for {code.title}: {code.tested}")
+        raise UsageError(f"{argument('verify')}: no script for {code.title}: {code.tested}")
     path = find_program(code.program, program) if code.program else None
     installed = None if path is None else _version_of(code, path)
     if installed is None and must_run:
         name = "" if program is None else f'"{program}": '
-        raise UsageError(f"{name}no {code.title} there; {code.install}, or --program FILE")
+        raise UsageError(f"{name}no {code.title} there; {code.install}, or {argument('program', 'FILE')}")
     if verify and version is not None and version != installed:
-        raise UsageError(f"--code-version: got {version}, but {installed} is what --verify runs")
+        origin, verified = argument("code_version"), argument("verify")
+        raise UsageError(f"{origin}: got {version}, but {installed} is what {verified} runs")
     return path, version or installed or code.newest
 
 
@@ -99,7 +101,7 @@ def first_law(code: Code, models: Sequence[str], version: str, *, is_fitted: boo
     common = [key for key in models if original_key(key) in laws]
     if not common:
         shown = ", ".join(models[:3]) + (f" and {len(models) - 3} more" if len(models) > 3 else "")
-        way = "fit one of its own" if is_fitted else "--model names one of its own"
+        way = "fit one of its own" if is_fitted else f"{argument('model')} names one of its own"
         raise UsageError(f"{code.title} has none of the laws {shown}; {way}, see impact export --list")
     for key in common:
         with contextlib.suppress(UsageError):

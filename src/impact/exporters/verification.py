@@ -16,7 +16,7 @@ import numpy as np
 from ..array_types import Array
 from ..display import Block, Displayed, Table
 from ..errors import UsageError
-from ..formatting import decimals, number, quantity
+from ..formatting import argument, decimals, number, quantity
 from .code import Code
 from .problem import ExportProblem
 from .programs import run_program
@@ -126,12 +126,14 @@ def run_script(code: Code, program: str, script: str) -> dict[str, float]:
         try:
             done = run_program(code.command(program, file), folder, TIMEOUT_S)
         except (OSError, subprocess.SubprocessError) as error:
-            raise UsageError(f"--verify: {code.title}: {error}") from None
+            raise UsageError(f"{argument('verify')}: {code.title}: {error}") from None
     printed = done.stdout.strip().splitlines() or [""]
     if done.returncode or "e_out" not in _number_in(printed[-1]):
         lines = (done.stderr.strip() or done.stdout.strip() or "no output").splitlines()
         error_lines = [line for line in lines if "error" in line.lower()] or lines[-1:]
-        raise UsageError(f"--verify: {code.title} ended with exit code {done.returncode}: {error_lines[0]}")
+        raise UsageError(
+            f"{argument('verify')}: {code.title} ended with exit code {done.returncode}: {error_lines[0]}"
+        )
     return {name: value for line in printed for name, value in _number_in(line).items()}
 
 

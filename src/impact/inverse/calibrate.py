@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
+from ..arguments import require_counts
 from ..array_types import Array
 from ..atomic import check_outputs, write_file
 from ..config.files import override_text
@@ -31,6 +32,7 @@ from ..engine.plan import Plan
 from ..engine.plugins import Plugins, read_plugins
 from ..engine.trajectories import PlanLaw, model_of
 from ..errors import UsageError
+from ..formatting import argument
 from ..results.calibration import calibration_template, fitted_config, position_of_law
 from ..results.schema import FIT_STATUSES
 from ..results.xarray_backend import save
@@ -74,7 +76,7 @@ def calibrate(
     best: str | Path | None = None,
     model: str | None = None,
     overwrite: bool = False,
-    overrides: Sequence[str] = (),
+    overrides: Sequence[str] | Mapping[str, object] = (),
     plugins: Sequence[ForceModel | str | Path] = (),
     jobs: int = 1,
 ) -> xr.Dataset:
@@ -110,21 +112,25 @@ def calibrate(
     >>> round(fit["estimate"].item(), 6), round(fit["chi2_reduced"].item(), 6)
     (0.5, 1.0)
     """
+    require_counts(jobs=jobs)
     plugin_set = read_plugins(plugins)
     read = Path(source) if isinstance(source, str) else source
     config = read_config(read, overrides, plugin_set.models, purpose="calibrate")
     check_outputs([output, best], [source, *plugins, *config.files], overwrite=overwrite)
     if model is not None:
         if best is None:
-            raise UsageError("--model: set without --best FILE, which is written for that law")
-        position_of_law(list(laws_to_fit(config)), model, "--model")
+            best_file = argument("best", "FILE")
+            raise UsageError(f"{argument('model')}: set without {best_file}, which is written for that law")
+        position_of_law(list(laws_to_fit(config)), model, argument("model"))
     for note in config.notes:
         warnings.warn(note, stacklevel=2)
     result = calibrate_config(config, plugin_set.of(config.models), jobs)
     if output is not None:
         save(result, output, overwrite=overwrite)
     if best is not None:
-        position = 0 if model is None else position_of_law(result["model"].values.tolist(), model, "--model")
+        position = (
+            0 if model is None else position_of_law(result["model"].values.tolist(), model, argument("model"))
+        )
         text = fitted_config(config, result.isel(model=position))
         write_file(Path(best), text.encode(), overwrite=overwrite)
     return result

@@ -194,9 +194,9 @@ def prepare(
     *,
     model: str | None = None,
     friction: str | None = None,
-    at: Mapping[str, float | str] | None = None,
+    at: Mapping[str, object] | None = None,
     outputs: str | Sequence[str] | None = None,
-    overrides: Sequence[str] = (),
+    overrides: Sequence[str] | Mapping[str, object] = (),
     plugins: Sequence[ForceModel | str | Path] = (),
 ) -> PreparedProblem:
     """Prepare the outputs of a law as a function of its inputs, for a fit, a sampler or an optimiser.

@@ -43,7 +43,8 @@ from ..engine.inputs import Inputs
 from ..engine.plan import Plan
 from ..engine.plugins import Plugins, read_plugins
 from ..errors import UsageError, did_you_mean
-from ..formatting import number, quantity
+from ..formatting import argument, number, quantity
+from ..results.ranking import target_value
 from ..results.single_impact import PointSource, open_source, single_point
 from ..results.sweep import sweep_in_memory
 
@@ -149,13 +150,13 @@ def _laws(model: str, friction: str) -> str:
 def solve(
     model: str,
     name: str,
-    target: Mapping[str, float],
+    target: Mapping[str, object],
     *,
     friction: str | None = None,
     source: str | Path | Mapping[str, object] | None = None,
-    at: Mapping[str, float | str] | None = None,
+    at: Mapping[str, object] | None = None,
     over: Mapping[str, object] | None = None,
-    overrides: Sequence[str] = (),
+    overrides: Sequence[str] | Mapping[str, object] = (),
     plugins: Sequence[ForceModel | str | Path] = (),
 ) -> SolveResult:
     """Find the value of an input of a law that gives a target: which coefficient gives the rebound I want?
@@ -192,7 +193,7 @@ def solve(
     gharib-hurmuzlu-2012: no value of e gives e_out = 0.6; e_out is from 0 to 0.593624
     """
     if over is not None and len(over) != 1:
-        raise UsageError(f"--over: got {len(over)} inputs, expected one")
+        raise UsageError(f"{argument('over')}: got {len(over)} inputs, expected one")
     plugin_set = read_plugins(plugins)
     law = find(model, plugin_set.models)
     point_source = open_source(source, overrides, plugin_set)
@@ -226,7 +227,9 @@ def unknown_of(model: ForceModel, name: str, friction: FrictionLaw | None = None
         unknowns["e"] = Parameter("e", "1", "restitution to ask for", default=0.5, least=0.0, most=1.0)
     if name not in unknowns:
         laws = _laws(model.key, friction.key if friction else "")
-        raise UsageError(f'--for: {laws} has no parameter "{name}"; {did_you_mean(name, list(unknowns))}')
+        raise UsageError(
+            f'{argument("name")}: {laws} has no parameter "{name}"; {did_you_mean(name, list(unknowns))}'
+        )
     return unknowns[name]
 
 
@@ -258,7 +261,7 @@ class PointWithE:
 def point_with_e(
     source: PointSource,
     law: ForceModel,
-    at: Mapping[str, float | str],
+    at: Mapping[str, object],
     replacing: Callable[[Config], Mapping[str, float] | None] = lambda config: None,
     friction: str | None = None,
 ) -> PointWithE:
@@ -266,9 +269,9 @@ def point_with_e(
     is_solved = "e" in at and "e" not in law.quantities
     if is_solved:
         if not law.damping:
-            raise UsageError(f"--at e: {law.key} has no e, and no parameter that sets it")
+            raise UsageError(f"{argument('at', key='e')}: {law.key} has no e, and no parameter that sets it")
         if not {law.damping, f"{law.key}.{law.damping}"}.isdisjoint(at):
-            raise UsageError(f"--at: got e and {law.damping}, expected one of the two")
+            raise UsageError(f"{argument('at')}: got e and {law.damping}, expected one of the two")
         at = {**at, **placeholder(law, unknown_of(law, law.damping))}
     config, defaulted_axes = single_point(source, law.key, at, friction=friction)
     replaced = replacing(config)
@@ -287,25 +290,28 @@ def solve_damping(config: Config, plugins: Plugins, e: float) -> Config:
     result = solve_input(config, plugins, unknown, {"e_out": e})
     if not result.roots:
         lower, upper = map(number, result.attainable)
-        raise UsageError(f"--at e={number(e)}: {law.key} delivers {lower} to {upper} at any {law.damping}")
+        asked = argument("at", number(e), key="e")
+        raise UsageError(f"{asked}: {law.key} delivers {lower} to {upper} at any {law.damping}")
     return replace(config, scalars={**config.scalars, config_name(law, unknown): result.roots[0].value})
 
 
-def solve_input(config: Config, plugins: Plugins, unknown: Parameter, target: Mapping[str, float]) -> SolveResult:
+def solve_input(config: Config, plugins: Plugins, unknown: Parameter, target: Mapping[str, object]) -> SolveResult:
     """Find all values of an input that give a target; with an axis, the value nearest to it everywhere."""
     names = [name for name, variable in OUTPUTS.items() if variable.dtype == "f8" and "model" in variable.dims]
     if len(target) != 1:
-        raise UsageError(f"--target: got {len(target)} targets, expected one, such as e_out=0.6")
+        example = argument("target", {"e_out": 0.6})
+        raise UsageError(f"{argument('target')}: got {len(target)} targets, expected one, such as {example}")
     ((name, value),) = target.items()
     if name not in names:
-        raise UsageError(f'--target: no output "{name}"; {did_you_mean(name, names)}')
+        raise UsageError(f'{argument("target")}: no output "{name}"; {did_you_mean(name, names)}')
     if OUTPUTS[name].of_friction and not config.frictions:
-        raise UsageError(f"--target {name}: got no friction law, expected --friction KEY")
+        raise UsageError(
+            f"{argument('target', key=name)}: got no friction law, expected {argument('friction', 'KEY')}"
+        )
     Plan(config, plugins).pair_notes("frictions")
-    if not (isinstance(value, int | float) and math.isfinite(value)):
-        raise UsageError(f"--target {name}: got {value}, expected a finite number")
+    wanted = target_value(name, value)
     problem = SolveProblem(config, plugins, unknown, name)
-    return _best_over_axis(problem, float(value)) if config.axes else _all_roots(problem, float(value))
+    return _best_over_axis(problem, wanted) if config.axes else _all_roots(problem, wanted)
 
 
 @dataclass(frozen=True)

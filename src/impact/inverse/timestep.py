@@ -14,12 +14,13 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, SupportsFloat
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import elementwise
 
+from ..arguments import require_counts
 from ..array_types import Array
 from ..config.files import read_number, read_numbers
 from ..config.input_names import InputName
@@ -52,7 +53,7 @@ from ..engine.build_impacts import build_impacts, build_oblique, rayleigh_time_a
 from ..engine.plan import Plan
 from ..engine.plugins import Plugins, read_plugins
 from ..errors import UsageError
-from ..formatting import decimals, number, quantity
+from ..formatting import argument, decimals, number, quantity
 from ..results.single_impact import open_source
 from .solve import PointWithE, config_name, point_with_e, solve_damping, unknown_of
 
@@ -279,15 +280,15 @@ def timestep(
     model: str,
     *,
     source: str | Path | Mapping[str, object] | None = None,
-    at: Mapping[str, float | str] | None = None,
-    steps_per_contact: float | Sequence[float] = (),
-    dt: float | str | Sequence[float | str] = (),
+    at: Mapping[str, object] | None = None,
+    steps_per_contact: ArrayLike = (),
+    dt: ArrayLike = (),
     phases: int = 400,
-    tol: float | str | None = None,
+    tol: SupportsFloat | str | None = None,
     parameter: str | None = None,
     scheme: str | None = None,
     friction: str | None = None,
-    overrides: Sequence[str] = (),
+    overrides: Sequence[str] | Mapping[str, object] = (),
     plugins: Sequence[ForceModel | str | Path] = (),
 ) -> TimestepResult:
     """Show what a code with a fixed time step delivers: mean, smallest and largest restitution over the phase.
@@ -302,7 +303,7 @@ def timestep(
     source, overrides, plugins : see `solve`
     at : values of inputs by config name; an e for a law that takes none is reached by its damping parameter
     steps_per_contact : contact times of the continuous law over dt; by default 10, 20, 50 and 100
-    dt : further time steps [s], or texts such as "2 us"
+    dt : one or more further time steps [s], or texts such as "2 us"
     phases : number of phases, (i + 1/2)/phases
     tol : relative tolerance for which the smallest number of steps per contact is found
     parameter : a parameter of the law, "K" or "materials.NAME.E", whose value from which on `tol` holds at the
@@ -328,13 +329,12 @@ def timestep(
     >>> round(row.e_mean, 4), round(row.e_least, 3), round(row.e_largest, 3), round(row.e_to_ask, 4)
     (0.4945, 0.48, 0.519, 0.5054)
     """
-    if phases < 1:
-        raise UsageError(f"--phases: got {phases}, expected a whole number >= 1")
-    given = read_numbers(dt, SWEEP_QUANTITIES["dt"], "--dt")
-    counts = read_numbers(steps_per_contact, SWEEP_QUANTITIES["steps_per_contact"], "--steps-per-contact")
-    tol = None if tol is None else read_number(tol, TOLERANCE, "--tol")
+    require_counts(phases=phases)
+    given = read_numbers(dt, SWEEP_QUANTITIES["dt"], argument("dt"))
+    counts = read_numbers(steps_per_contact, SWEEP_QUANTITIES["steps_per_contact"], argument("steps_per_contact"))
+    tol = None if tol is None else read_number(tol, TOLERANCE, argument("tol"))
     if parameter is not None and (tol is None or len(given) != 1):
-        raise UsageError("--for: expected one --dt and --tol as well")
+        raise UsageError(f"{argument('parameter')}: expected one {argument('dt')} and {argument('tol')} as well")
     plugin_set = read_plugins(plugins)
     point_source = open_source(source, overrides, plugin_set)
     point = point_with_e(point_source, find(model, plugin_set.models), at or {}, friction=friction)
@@ -509,7 +509,7 @@ def needed_steps(
     """Bisect for the smallest number of steps per contact with which every phase is within a tolerance."""
     target = law.e if law.has_e else e_continuous
     if not target > 0.0:
-        raise UsageError("--tol is relative to e, expected e > 0")
+        raise UsageError(f"{argument('tol')} is relative to e, expected e > 0")
     if abs(e_continuous - target) >= tol * target:
         # no step does what the continuous law does not
         return None
@@ -567,7 +567,7 @@ def needed_parameter(
     nearby = collide_at(NEARBY * value)[1]
     slope = math.log(nearby.contact_time / law.contact_time) / math.log(NEARBY)
     if abs(slope) < MIN_SLOPE:
-        raise UsageError(f"--for: {name} does not set the contact time of {model.key}")
+        raise UsageError(f"{argument('parameter')}: {name} does not set the contact time of {model.key}")
     changed = config
     for _ in range(MAX_SECANTS):
         needed = needed_steps(law, tol, collision["e_out"], MAX_SECANT_STEPS)

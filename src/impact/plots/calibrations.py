@@ -10,7 +10,7 @@ from ..array_types import Array
 from ..config.measurements import SIGMA
 from ..contact.variables import OUTPUTS
 from ..errors import UsageError, did_you_mean
-from ..formatting import decimals, safe_text
+from ..formatting import argument, decimals, safe_text
 from ..results.calibration import calibration_title, fit_status
 from ..results.kinds import is_calibration
 from .curves import CurveData, Panel, curve_of, x_axis_fields
@@ -36,9 +36,9 @@ def calibration_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     """Read measured values over the varied input or their number, the best laws, and their residuals."""
     if not is_calibration(dataset):
         raise UsageError("this result is no calibration: impact calibrate writes those")
-    for option, value in (("--sel", choice.sel), ("--x", choice.x), ("--y", choice.y)):
+    for name, value in (("sel", choice.sel), ("x", choice.x), ("y", choice.y)):
         if value:
-            raise UsageError(f"{option}: does not apply to the picture of a calibration")
+            raise UsageError(f"{argument(name)}: does not apply to the picture of a calibration")
     keys = [str(key) for key in dataset["model"].values]
     for key in choice.models or ():
         if key not in keys:

@@ -15,7 +15,7 @@ from ..config.quantities import Quantity
 from ..config.tables import LABORATORY, STANDARD_GRAVITY, SWEEP_QUANTITIES
 from ..contact.variables import HISTORY, OUTPUTS
 from ..errors import ConfigError, UsageError
-from ..formatting import heading, number, safe_text
+from ..formatting import argument, heading, number, safe_text
 from ..results.schema import plain_unit
 
 if TYPE_CHECKING:
@@ -78,9 +78,9 @@ def check_table(path: Path, form: str) -> None:
     """Check the suffix and the form of a table."""
     if path.suffix.lower() not in TABLE_SUFFIXES:
         *most, last = TABLE_SUFFIXES
-        raise UsageError(f"--data {path}: expected a name that ends in {', '.join(most)} or {last}")
+        raise UsageError(f"{argument('data', path)}: expected a name that ends in {', '.join(most)} or {last}")
     if form not in TABLE_FORMS:
-        raise UsageError(f"--data-form: got {form}, expected {' or '.join(TABLE_FORMS)}")
+        raise UsageError(f"{argument('data_form')}: got {form}, expected {' or '.join(TABLE_FORMS)}")
 
 
 def encode_table(plot_data: PlotData, suffix: str, form: str = "wide") -> bytes:
@@ -95,7 +95,7 @@ def encode_table(plot_data: PlotData, suffix: str, form: str = "wide") -> bytes:
             frame.to_parquet(buffer, index=False, engine="pyarrow")
         except ImportError:
             needs = 'needs pyarrow, which is not installed: pip install "impact-sweep[parquet]"'
-            raise UsageError(f"--data: .parquet {needs}") from None
+            raise UsageError(f"{argument('data')}: .parquet {needs}") from None
         return buffer.getvalue()
     return _csv_bytes(frame)
 

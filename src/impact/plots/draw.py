@@ -35,7 +35,7 @@ def plot(
     x: str | None = None,
     y: str | None = None,
     variable: str | None = None,
-    sel: Mapping[str, float | str] | None = None,
+    sel: Mapping[str, object] | None = None,
     models: Sequence[str] | None = None,
     log: str = "",
     points: str | Path | pd.DataFrame | xr.Dataset | None = None,

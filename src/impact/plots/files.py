@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from ..atomic import check_outputs, write_file
 from ..contact.model import ForceModel
 from ..errors import UsageError
+from ..formatting import argument
 from ..results.xarray_backend import load
 from .data import PlotData, check_table, encode_table, read_points
 from .draw import draw, get_plot_data, label_keys
@@ -40,7 +41,7 @@ def plot_to_files(
     x: str | None = None,
     y: str | None = None,
     variable: str | None = None,
-    sel: Mapping[str, float | str] | None = None,
+    sel: Mapping[str, object] | None = None,
     models: Sequence[str] | None = None,
     log: str = "",
     points: str | Path | None = None,
@@ -169,6 +170,6 @@ def _over_selected_axes(kind: str, dataset: xr.Dataset, choice: Choice, plugins:
     drawn = {dataset[name].dims for name in whole.names if name in dataset.coords}
     sel = dict(choice.sel or {})
     ignored = [name for name in sel if name in dataset.coords and dataset[name].dims in drawn]
-    remarks = tuple(f"--sel {name}={sel.pop(name)}, a point on its axis" for name in ignored)
+    remarks = tuple(f"{argument('sel', {name: sel.pop(name)})}, a point on its axis" for name in ignored)
     plot_data = get_plot_data(dataset, kind, replace(choice, sel=sel), plugins)
     return replace(plot_data, not_drawn=(*plot_data.not_drawn, *remarks))

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import UsageError, did_you_mean
+from ..formatting import argument
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -61,7 +62,7 @@ class Choice:
     x: str | None = None
     y: str | None = None
     variable: str | None = None
-    sel: Mapping[str, float | str] | None = None
+    sel: Mapping[str, object] | None = None
     models: Sequence[str] | None = None
     log: str = ""
     equations: bool = False
@@ -69,7 +70,7 @@ class Choice:
 
     def __post_init__(self) -> None:
         if self.log not in ("", *LOG_AXES):
-            raise UsageError(f"--log: got {self.log}, expected {', '.join(LOG_AXES)}")
+            raise UsageError(f"{argument('log')}: got {self.log}, expected {', '.join(LOG_AXES)}")
 
 
 @dataclass(frozen=True)
@@ -86,12 +87,12 @@ class Look:
     def __post_init__(self) -> None:
         _ = self.size
         if self.legend not in LEGENDS:
-            raise UsageError(f"--legend: got {self.legend}, expected {', '.join(LEGENDS)}")
+            raise UsageError(f"{argument('legend')}: got {self.legend}, expected {', '.join(LEGENDS)}")
 
     @property
     def size(self) -> tuple[float | None, float | None]:
         """Width and height [in]; None for the default."""
-        return length(self.width, "--width"), length(self.height, "--height")
+        return length(self.width, argument("width")), length(self.height, argument("height"))
 
 
 @dataclass(frozen=True)
@@ -119,10 +120,10 @@ class Kind:
         return tuple(name for name in inputs if name is not None)
 
 
-def length(size: str | float | None, option: str) -> float | None:
+def length(size: str | float | None, origin: str) -> float | None:
     """Convert a number of inches, a length with its unit, or the name of a journal's width to inches.
 
-    >>> round(length("84mm", "--width"), 4), length("single", "--width"), length(7.1, "--width")
+    >>> round(length("84mm", "width"), 4), length("single", "width"), length(7.1, "width")
     (3.3071, 3.5, 7.1)
     """
     if size is None or size in WIDTHS:
@@ -131,15 +132,15 @@ def length(size: str | float | None, option: str) -> float | None:
     inches = float(parts[1]) * INCHES_PER_UNIT[parts[2]] if parts else size
     if isinstance(inches, str) or not MIN_SIZE_INCHES <= inches <= MAX_SIZE_INCHES:
         expected = f"a length from 26mm to {MAX_SIZE_INCHES:g}in, such as 84mm, 8.4cm or 3.3in"
-        names = f", or {' or '.join(WIDTHS)}" if option.endswith("width") else ""
-        raise UsageError(f"{option}: got {size}, expected {expected}{names}")
+        names = f", or {' or '.join(WIDTHS)}" if origin.endswith("width") else ""
+        raise UsageError(f"{origin}: got {size}, expected {expected}{names}")
     return float(inches)
 
 
 def check_kind(name: str) -> None:
     """Raise a UsageError that suggests the nearest kind, if there is no such kind of picture."""
     if name not in KINDS:
-        raise UsageError(f'--kind: no kind "{name}"; {did_you_mean(name, list(KINDS))}')
+        raise UsageError(f'{argument("kind")}: no kind "{name}"; {did_you_mean(name, list(KINDS))}')
 
 
 def find_kind(name: str) -> Kind:

@@ -18,7 +18,7 @@ from ..contact.frictions import frictions
 from ..contact.models import catalogue
 from ..contact.variables import HISTORY, OUTPUTS
 from ..errors import UsageError
-from ..formatting import NO_BREAK, safe_text, scaled_unit, typographic, with_year
+from ..formatting import NO_BREAK, argument, safe_text, scaled_unit, typographic, with_year
 from .slices import parameter_text, scalars_of
 from .style import WITH, law_key
 
@@ -75,12 +75,12 @@ def check_labels(labels: Mapping[str, str], shown: Collection[str]) -> None:
     for key, text in labels.items():
         if key not in shown:
             known = ", ".join(sorted(shown))
-            raise UsageError(f'--label: nothing in the picture is called "{key}"; known: {known}')
+            raise UsageError(f'{argument("labels")}: nothing in the picture is called "{key}"; known: {known}')
         try:
             MathTextParser("path").parse(text)
         except ValueError as error:
             reason = str(error).strip().splitlines()[-1]
-            raise UsageError(f"--label {key}={text}: is not valid mathtext: {reason}") from None
+            raise UsageError(f"{argument('labels', {key: text})}: is not valid mathtext: {reason}") from None
 
 
 def axis_text(meaning: str, name: str, unit: str, labels: Mapping[str, str]) -> str:

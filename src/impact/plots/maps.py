@@ -21,12 +21,12 @@ from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
 from ..errors import UsageError, did_you_mean
-from ..formatting import heading, percentage, safe_text
+from ..formatting import argument, heading, percentage, safe_text
 from .data import Points
 from .kinds import Choice, Kind
 from .labels import REFERENCE, label_axis, number_axis, pretty_conditions, split_by_law, symbol, words_of
 from .layout import Picture
-from .slices import NO_SWEEP, choose_plane, conditions_of, read, take_plane, unit_of
+from .slices import choose_plane, conditions_of, not_a_sweep, read, take_plane, unit_of
 from .style import is_geometric, law_key, model_styles
 
 if TYPE_CHECKING:
@@ -242,7 +242,7 @@ def _map_data(
 ) -> MapData:
     """Read the panels of a kind of map, of at most `max_panels` models or pairs."""
     if "model" not in dataset.dims:
-        raise UsageError(NO_SWEEP)
+        raise not_a_sweep()
     if variable not in dataset.data_vars:
         hint = did_you_mean(variable, [str(name) for name in dataset.data_vars])
         raise UsageError(f'no variable "{variable}" in this result; {hint}')
@@ -264,7 +264,7 @@ def _map_data(
         raise UsageError(f"cannot draw {what}: it has no value there")
     for letter, name in (("x", x), ("y", y)):
         if letter in choice.log and data[name].values[0] <= 0.0:
-            raise UsageError(f"--log {letter}: {name} got values <= 0, expected values > 0")
+            raise UsageError(f"{argument('log', letter)}: {name} got values <= 0, expected values > 0")
     names: list[tuple[str, str | None, str]] = [(law.label, law.model, law.friction) for law in laws[:max_panels]]
     names = names or [(f"{REFERENCE} (6), (7)" if choice.equations else REFERENCE, None, "")]
     heading_text = safe_text(str(dataset.attrs.get("title", "")), 140)

@@ -14,7 +14,7 @@ from ..array_types import Array
 from ..contact.status import FIRST_FAILURE, FrictionStatus
 from ..contact.variables import OUTPUTS
 from ..errors import UsageError
-from ..formatting import number
+from ..formatting import argument, number
 from ..results.selection import select
 from .curves import Curve, CurveData, Panel, curve_of
 from .kinds import Choice, Kind
@@ -135,7 +135,8 @@ def _pairs_along(dataset: xr.Dataset, choice: Choice, *names: str) -> tuple[Line
     if not pairs:
         raise UsageError(f"no pair has a value of {' or '.join(names)} here: {not_drawn[0]}")
     if choice.frictions is None and len(pairs) > MAX_PAIRS:
-        not_drawn.append(f"{len(pairs) - MAX_PAIRS} more pairs; choose some with --model and --friction")
+        choice_of_pairs = f"{argument('models')} and {argument('frictions')}"
+        not_drawn.append(f"{len(pairs) - MAX_PAIRS} more pairs; choose some with {choice_of_pairs}")
         pairs = pairs[:MAX_PAIRS]
     return line._replace(not_drawn=(*line.not_drawn, *not_drawn)), pairs
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..contact.variables import OUTPUTS
 from ..errors import UsageError
-from ..formatting import label as number_label, safe_text
+from ..formatting import argument, label as number_label, safe_text
 from .curves import Curve, CurveData, Panel, curve_of, x_axis_fields
 from .kinds import Choice, Kind
 from .labels import REFERENCE, LawPart, split_by_law
@@ -119,9 +119,8 @@ def _split_by_restitution(line: Line) -> list[tuple[str, xr.Dataset]]:
     dim = next((dim for dim in (line.data["e"].dims if "e" in line.data.coords else ()) if dim not in taken), None)
     count = line.data.sizes[dim] if dim else 1
     if count > MAX_RESTITUTIONS:
-        raise UsageError(
-            f"got {count} values of e, expected at most {MAX_RESTITUTIONS} to draw; use --sel e=VALUE"
-        )
+        use = argument("sel", {"e": "VALUE"})
+        raise UsageError(f"got {count} values of e, expected at most {MAX_RESTITUTIONS} to draw; use {use}")
     cases = [line.data.isel({dim: index}) for index in range(count)] if dim else [line.data]
     return [
         (f"e = {number_label(case['e'].item())}" if "e" in case.coords and not case["e"].ndim else "", case)

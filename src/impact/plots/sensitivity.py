@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from ..contact.variables import OUTPUTS
 from ..errors import UsageError
-from ..formatting import heading
+from ..formatting import argument, heading
 from ..results.kinds import is_sensitivity
 from ..results.selection import law_positions, select
 from ..results.sensitivity import distribution_texts
@@ -139,9 +139,9 @@ def sensitivity_bars(dataset: xr.Dataset, choice: Choice) -> BarData:
     """Read the first-order and total indices of each uncertain input, with their intervals."""
     if not is_sensitivity(dataset):
         raise UsageError("this result is no sensitivity study: impact sensitivity -o writes those")
-    for option, value in (("--x", choice.x), ("--y", choice.y), ("--log", choice.log)):
+    for name, value in (("x", choice.x), ("y", choice.y), ("log", choice.log)):
         if value:
-            raise UsageError(f"{option}: does not apply to the picture of a sensitivity study")
+            raise UsageError(f"{argument(name)}: does not apply to the picture of a sensitivity study")
     if choice.models:
         dataset = dataset.isel(model=law_positions(choice.models, dataset))
     data = select(dataset, choice.sel or {}).load()

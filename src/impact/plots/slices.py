@@ -12,7 +12,7 @@ from ..config.input_names import InputName, is_input
 from ..config.tables import OBLIQUE_DEFAULTS
 from ..contact.units import with_numbers
 from ..errors import UsageError, did_you_mean
-from ..formatting import NO_BREAK, degrees, quantity, safe_text
+from ..formatting import NO_BREAK, argument, degrees, quantity, safe_text
 from ..results.schema import exponents_of, plain_unit
 from ..results.selection import law_positions, select
 from .kinds import Choice
@@ -25,7 +25,12 @@ if TYPE_CHECKING:
 MAX_DRAWN = 2**24
 # values that go without saying: no spin, no tangential velocity, the inertia of solid spheres
 UNSAID = {**OBLIQUE_DEFAULTS, "u1": 0.0, "u2": 0.0}
-NO_SWEEP = "this is a time history, not the result of a sweep; draw it with --kind loop, or history"
+
+
+def not_a_sweep() -> UsageError:
+    """The error of a picture of a sweep for a time history."""
+    kind = argument("kind", "loop")
+    return UsageError(f"this is a time history, not the result of a sweep; draw it with {kind}, or history")
 
 
 class Line(NamedTuple):
@@ -121,8 +126,9 @@ def take_plane(dataset: xr.Dataset, kind: str, choice: Choice, keep: Sequence[st
         try:
             along.append(x_axis(plain.isel(dict.fromkeys(taken, 0)), None))
         except UsageError:
+            kind_option = argument("kind", "restitution")
             has = f"{along[0]} alone; sweep a second" if along else "none; sweep e and another"
-            raise UsageError(f"{kind} needs two axes; this result has {has}, or use --kind restitution") from None
+            raise UsageError(f"{kind} needs two axes; this result has {has}, or use {kind_option}") from None
         dims.append(dataset[along[-1]].dims[0])
     if dims[0] == dims[1]:
         raise UsageError(f"{kind} needs two axes; {along[0]} and {along[1]} vary together")
@@ -144,7 +150,7 @@ def take_plane(dataset: xr.Dataset, kind: str, choice: Choice, keep: Sequence[st
 def _select(dataset: xr.Dataset, choice: Choice) -> xr.Dataset:
     """Select the chosen models, friction laws and values of a result."""
     if "model" not in dataset.dims:
-        raise UsageError(NO_SWEEP)
+        raise not_a_sweep()
     if choice.models:
         dataset = dataset.isel(model=law_positions(choice.models, dataset))
     if choice.frictions:
@@ -203,7 +209,9 @@ def x_axis(dataset: xr.Dataset, x: str | None) -> str:
         if x not in lines:
             if x in dataset.coords and dataset[x].ndim > 1:
                 dims = ", ".join(str(dim) for dim in dataset[x].dims)
-                raise UsageError(f"cannot draw over {x}, which varies over {dims}; select one with --sel")
+                raise UsageError(
+                    f"cannot draw over {x}, which varies over {dims}; select one with {argument('sel')}"
+                )
             raise UsageError(f'cannot draw over "{x}"; {did_you_mean(x, lines)}')
         return x
     # prefer floats: an integer axis only numbers the points; axes come before parameters of single laws
@@ -213,7 +221,8 @@ def x_axis(dataset: xr.Dataset, x: str | None) -> str:
     if lines:
         return lines[0]
     raise UsageError(
-        "this result has no numeric axis left to draw over; sweep one, such as e, or draw a point with --kind loop"
+        "this result has no numeric axis left to draw over; sweep one, such as e, or draw a point with "
+        f"{argument('kind', 'loop')}"
     )
 
 

@@ -21,6 +21,7 @@ from ..atomic import write_file
 from ..contact.frictions import frictions
 from ..contact.models import catalogue
 from ..errors import UsageError
+from ..formatting import argument
 from .kinds import WIDTHS
 
 # the colours of Okabe and Ito without yellow, which is invisible on white; the number of markers is coprime to
@@ -59,11 +60,11 @@ def _style_of(style: str | Path | None) -> Mapping[Any, Any]:
     if str(style) in styles.library:
         return styles.library[str(style)]
     if not Path(style).is_file():
-        raise UsageError(f"--style {style}: no such file, and no style of matplotlib")
+        raise UsageError(f"{argument('style', style)}: no such file, and no style of matplotlib")
     try:
         return rc_params_from_file(str(style), use_default_template=False)
     except (OSError, ValueError, KeyError) as error:
-        raise UsageError(f"--style {style}: cannot be read: {error}") from None
+        raise UsageError(f"{argument('style', style)}: cannot be read: {error}") from None
 
 
 def default_size() -> tuple[float, float | None]:

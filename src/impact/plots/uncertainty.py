@@ -11,7 +11,7 @@ import numpy as np
 from ..config.grid import SAMPLE
 from ..contact.variables import OUTPUTS
 from ..errors import UsageError
-from ..formatting import safe_text
+from ..formatting import argument, safe_text
 from ..results.selection import select
 from ..results.sensitivity import distribution_texts
 from .curves import Curve, CurveData, Panel, curve_of, x_axis_fields
@@ -37,7 +37,7 @@ def uncertainty_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
         raise UsageError(f'no variable "{name}" in this result')
     x = choice.x or _free_axis(dataset, choice)
     if x in dataset.coords and dataset[x].dims == (SAMPLE,):
-        raise UsageError(f"--x {x}: is an uncertain input, expected another axis")
+        raise UsageError(f"{argument('x', x)}: is an uncertain input, expected another axis")
     keep = (SAMPLE, "friction") if "friction" in dataset[name].dims else (SAMPLE,)
     line, x_name, not_drawn = take_line(dataset, replace(choice, x=x or SAMPLE), keep)
     line = read(line, [name])

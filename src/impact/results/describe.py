@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any
 
 import xarray as xr
@@ -19,6 +20,7 @@ from . import calibration, sensitivity
 from .attributes import read_attribute
 from .kinds import is_calibration, is_sensitivity
 from .replay_command import describe_point
+from .xarray_backend import result_of
 
 # numbers of a law in JSON
 CRITERIA = ("chi2_reduced", "p_value", "excess", "aicc", "weight", "loo")
@@ -124,7 +126,7 @@ class Studies(Displayed):
 
 
 def describe(
-    item: xr.Dataset | ForceModel | FrictionLaw,
+    item: xr.Dataset | str | Path | ForceModel | FrictionLaw,
 ) -> Fits | Studies | ModelDescription | FrictionDescription:
     """Describe a calibration, a sensitivity study or a law, as its command prints it and a notebook shows it.
 
@@ -145,8 +147,9 @@ def describe(
         return ModelDescription(item)
     if isinstance(item, FrictionLaw):
         return FrictionDescription(item)
-    if is_calibration(item):
-        return Fits(item)
-    if is_sensitivity(item):
-        return Studies(item)
+    result = result_of(item)
+    if is_calibration(result):
+        return Fits(result)
+    if is_sensitivity(result):
+        return Studies(result)
     raise UsageError("expected the result of a calibration or of a sensitivity study")

@@ -15,6 +15,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from ..arguments import require_counts
 from ..config.grid import MAX_POINTS
 from ..contact.model import ForceModel
 from ..display import Block, Displayed, Table, Wrapped
@@ -136,7 +137,7 @@ def _duration(seconds: float) -> str:
 def estimate(
     source: str | Path | Mapping[str, object],
     *,
-    overrides: Sequence[str] = (),
+    overrides: Sequence[str] | Mapping[str, object] = (),
     plugins: Sequence[ForceModel | str | Path] = (),
     jobs: int = 1,
     max_points: int = MAX_POINTS,
@@ -158,6 +159,7 @@ def estimate(
     >>> impact.estimate("configs/figure6.toml").points
     303
     """
+    require_counts(jobs=jobs)
     plan = read_plan(source, overrides, plugins, Run(max_points=max_points, on_note=on_note or warn))
     # a range in the middle, to avoid the extreme values at both ends
     chosen = plan.ranges[len(plan.ranges) // 2]

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from .._version import __version__
 from ..atomic import check_outputs
+from ..config.draft import settings_of
 from ..config.files import override_text
 from ..config.grid import MAX_POINTS, Axis
 from ..config.input_names import InputName
@@ -29,7 +30,7 @@ from ..engine.plugins import Plugins, read_plugins
 from ..engine.run import ProgressCallback, Run, ignore, never
 from ..engine.trajectories import TrajectoryMap, TrajectoryRange, keys_of, model_of
 from ..errors import ResultError, UsageError
-from ..formatting import safe_text
+from ..formatting import argument, safe_text
 from .attributes import read_attribute
 from .kinds import require_sweep
 from .layouts import FillSlab
@@ -46,7 +47,7 @@ CHECKED_STATUSES = (Status.NO_IMPACT, Status.INVALID_PARAMETER, Status.OUT_OF_RA
 
 def extend(
     result: str | Path,
-    overrides: Sequence[str],
+    overrides: Sequence[str] | Mapping[str, object],
     *,
     output: str | Path | None = None,
     overwrite: bool = False,
@@ -90,7 +91,7 @@ def extend(
 
 def extend_to_file(
     result: str | Path,
-    overrides: Sequence[str],
+    overrides: Sequence[str] | Mapping[str, object],
     *,
     output: str | Path | None = None,
     overwrite: bool = False,
@@ -126,13 +127,14 @@ def extend_to_file(
     3
     """
     source, target = Path(result), Path(result if output is None else output)
+    changes = [setting.override for setting in settings_of(overrides)]
     run = Run(
         backend or SERIAL, resume, overwrite, max_points, on_progress or ignore, should_stop=should_stop or never
     )
     check_outputs([target], plugins, overwrite=True)
     plugin_set = read_plugins(plugins)
     with run.connected() as connected:
-        outcome = _extend_into(target, source, overrides, plugin_set, connected)
+        outcome = _extend_into(target, source, changes, plugin_set, connected)
     run.check_stop(f"{target} is complete")
     return outcome
 
@@ -255,8 +257,8 @@ def _check_changes(old: Plan, new: Plan, name: str) -> None:
     ]
     if changed or moved:
         raise UsageError(
-            f"{name}: --set changes {', '.join([*changed, *moved])}, expected more values of an axis, "
-            "such as --set 'sweep.m2=[1.0, 2.0]', or more models"
+            f"{name}: {argument('overrides')} changes {', '.join([*changed, *moved])}, expected more values of an "
+            f"axis, such as {argument('overrides', ['sweep.m2=[1.0, 2.0]'])}, or more models"
         )
     if old.laws == new.laws and old.config.axes == new.config.axes:
         raise UsageError(f"{name}: already has all of these; expected more values of an axis, or more models")
@@ -281,8 +283,8 @@ def _check_none_lost(old: Plan, axes: Sequence[_AxisPositions], name: str) -> No
             row = {column: safe_text(str(values[lost[0]]), 40) for column, values in axis.columns.items()}
             values = ", ".join(f"{column}={value}" for column, value in row.items())
             raise UsageError(
-                f"{name}: --set leaves out {values}, expected all values that the result has, and more; columns "
-                "that vary together are given together"
+                f"{name}: {argument('overrides')} leaves out {values}, expected all values that the result has, "
+                "and more; columns that vary together are given together"
             )
 
 
@@ -304,8 +306,8 @@ def _axis_positions(axis: Axis, old: Inputs, name: str) -> _AxisPositions:
         changed = [number for number, row in enumerate(before) if rows[number : number + 1] != [row]]
         if changed:
             raise UsageError(
-                f"{name}: --set changes {axis.name} {changed[0]}, expected the cases that the result "
-                "has, in their order, and more after them"
+                f"{name}: {argument('overrides')} changes {axis.name} {changed[0]}, expected the cases that the "
+                "result has, in their order, and more after them"
             )
         positions = [number if number < size else -1 for number in range(axis.size)]
     else:

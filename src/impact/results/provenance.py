@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 import xarray as xr
 
-from ..config.draft import Draft, open_text, settings_of
+from ..config.draft import Draft, Overrides, open_text, settings_of
 from ..config.grid import MAX_POINTS
 from ..config.load import Config, Purpose, build
 from ..engine.plugins import Plugins
 from ..errors import ResultError, UsageError
-from ..formatting import safe_text
+from ..formatting import argument, safe_text
 from .attributes import PluginRecord, read_attribute
 from .selection import match_labels
 
 
 def stored_config(
     attributes: Mapping[str, object],
-    overrides: Sequence[str],
+    overrides: Overrides,
     plugins: Plugins,
     name: str,
     max_points: int = MAX_POINTS,
@@ -76,7 +76,7 @@ def check_plugins(attributes: Mapping[str, object], plugins: Plugins, name: str)
 
     >>> check_plugins({"plugins": '{"mine": {"file": "my.py", "sha256": "12ab"}}'}, Plugins(), "results.h5")
     Traceback (most recent call last):
-    impact.errors.UsageError: results.h5: made with mine of my.py; give it again with --plugin FILE
+    impact.errors.UsageError: results.h5: made with mine of my.py; give it again with plugins=["FILE"]
     """
     stored = _stored_plugins(attributes, name)
     current = _current_plugins(plugins)
@@ -136,4 +136,4 @@ def _how_to_supply(record: PluginRecord) -> str:
     """State how a user supplies a plug-in."""
     if record.package:
         return "the package installed"
-    return "plugins=[...]" if record.file is None else "--plugin FILE"
+    return "plugins=[...]" if record.file is None else argument("plugins", ["FILE"])

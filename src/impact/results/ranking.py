@@ -7,7 +7,7 @@ from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, Literal, overload
+from typing import Any, Literal, SupportsFloat, overload
 
 import numpy as np
 import xarray as xr
@@ -16,12 +16,13 @@ from numpy.typing import NDArray
 from ..array_types import Mask
 from ..config.files import read_number
 from ..config.input_names import InputName
+from ..config.quantities import Quantity
 from ..config.tables import TOLERANCE
 from ..contact.status import FIRST_FAILURE, FrictionStatus, Status
 from ..contact.variables import OUTPUTS
 from ..display import Block, Displayed, Table, html_of
 from ..errors import UsageError, did_you_mean
-from ..formatting import label, number, percentage, safe_text
+from ..formatting import argument, label, number, percentage, safe_text
 from .kinds import require_sweep
 from .replay_command import describe_point
 from .schema import columns_along, foreign_dims
@@ -241,10 +242,10 @@ class Ranking(Displayed, Sequence[Ranked]):
 def recommend(
     dataset: xr.Dataset | str | Path,
     *,
-    tol: float | str = DEFAULT_TOL,
-    sel: Mapping[str, float | str] | None = None,
+    tol: SupportsFloat | str = DEFAULT_TOL,
+    sel: Mapping[str, object] | None = None,
     models: str | Sequence[str] | None = None,
-    target: Mapping[str, float] | None = None,
+    target: Mapping[str, object] | None = None,
     frictions: Sequence[str] | None = None,
 ) -> Ranking:
     """Rank the models of a result by the error of their restitution, over all points of the sweep.
@@ -284,27 +285,31 @@ def recommend(
     tol = read_number(tol, TOLERANCE, "tol")
     criterion = BY_ERROR if target is None else _criterion_of(target)
     if frictions and not OUTPUTS[criterion.names[0]].of_friction:
-        raise UsageError("--friction: expected a --target that depends on friction, such as beta=0.4")
+        origin, of = argument("frictions"), argument("target")
+        raise UsageError(f"{origin}: expected a {of} that depends on friction, such as beta=0.4")
     return rank_models(rankable_parts(dataset, sel or {}, models, criterion, frictions), tol, criterion)
 
 
-def _criterion_of(target: Mapping[str, float]) -> Criterion:
+def _criterion_of(target: Mapping[str, object]) -> Criterion:
     """Check a target."""
     if len(target) != 1:
-        raise UsageError(f"--target: got {len(target)} targets, expected one, such as beta=0.4")
+        example = argument("target", {"beta": 0.4})
+        raise UsageError(f"{argument('target')}: got {len(target)} targets, expected one, such as {example}")
     ((name, value),) = target.items()
     if name not in TARGETS:
-        raise UsageError(
-            f'--target: got "{name}", expected an output of the order of 1; {did_you_mean(name, TARGETS)}'
-        )
-    if not (isinstance(value, int | float) and math.isfinite(value)):
-        raise UsageError(f"--target {name}: got {value}, expected a finite number")
-    return Criterion(name, float(value))
+        expected = f"an output of the order of 1; {did_you_mean(name, TARGETS)}"
+        raise UsageError(f'{argument("target")}: got "{name}", expected {expected}')
+    return Criterion(name, target_value(name, value))
+
+
+def target_value(name: str, value: object) -> float:
+    """Read the target of an output, a number that may have a unit."""
+    return read_number(value, Quantity(OUTPUTS[name].unit, OUTPUTS[name].meaning), argument("target", key=name))
 
 
 def rankable_parts(
     dataset: xr.Dataset,
-    sel: Mapping[str, float | str],
+    sel: Mapping[str, object],
     models: Sequence[str] | None,
     criterion: Criterion = BY_ERROR,
     frictions: Sequence[str] | None = None,

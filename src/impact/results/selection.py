@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..array_types import Mask
+from ..config.files import to_plain_data
 from ..config.quantities import number_in
 from ..errors import UsageError, did_you_mean
-from ..formatting import label, safe_text
+from ..formatting import argument, label, safe_text
 from .schema import plain_unit
 
 if TYPE_CHECKING:
@@ -45,7 +46,7 @@ def law_positions(
     return [keys.index(key) for key in dict.fromkeys(laws)]
 
 
-def select(dataset: xr.Dataset, sel: Mapping[str, float | str]) -> xr.Dataset:
+def select(dataset: xr.Dataset, sel: Mapping[str, object]) -> xr.Dataset:
     """Select at values of coordinates; an axis is dropped, unless several numbered points have the value."""
     axes = [str(dim) for dim in dataset.sizes if dim not in ("model", "friction")]
     masks: dict[Hashable, Mask] = {}
@@ -54,7 +55,10 @@ def select(dataset: xr.Dataset, sel: Mapping[str, float | str]) -> xr.Dataset:
             raise UsageError(f'no axis "{name}" in this result; {did_you_mean(name, axes)}')
         (dim,) = dataset[name].dims
         values = dataset[name].values
-        number = in_si(dataset[name], value)
+        plain, _ = to_plain_data(value)
+        if not isinstance(plain, float | int | str):
+            raise UsageError(f"{argument('sel', {name: value})}: got no single value, expected one")
+        number = in_si(dataset[name], plain)
         same = _matches_value(values, number)
         if dim in masks and same.any():
             same &= masks[dim]

@@ -29,6 +29,7 @@ from ..engine.plugins import read_plugins
 from ..engine.run import ProgressCallback, ProgressCounter, Run, ignore, never, report_kept_ranges
 from ..engine.trajectories import TrajectoryRange
 from ..errors import ResultError, StoreError, UnfinishedError, UsageError, warn
+from ..formatting import argument
 from .outcome import SweepOutcome
 from .provenance import stored_config
 from .schema import dataset_template
@@ -58,7 +59,7 @@ class Shard:
         match = re.fullmatch(r"([0-9]{1,9})/([0-9]{1,9})", text)
         shard = cls(*map(int, match.groups())) if match else cls(0, 0)
         if not 1 <= shard.number <= shard.of:
-            raise UsageError(f"--shard {text}: expected K/N with K from 1 to N, such as 3/16")
+            raise UsageError(f"{argument('shard', text)}: expected K/N with K from 1 to N, such as 3/16")
         return shard
 
     def has(self, trajectory_range: TrajectoryRange) -> bool:
@@ -110,7 +111,7 @@ def sweep_shard(
     shard: str,
     output: str | Path,
     *,
-    overrides: Sequence[str] = (),
+    overrides: Sequence[str] | Mapping[str, object] = (),
     plugins: Sequence[ForceModel | str | Path] = (),
     backend: AbstractContextManager[ExecutorSpec] | None = None,
     max_points: int = MAX_POINTS,
@@ -189,7 +190,7 @@ class _ShardRecord:
 
 
 def merge(
-    folders: Sequence[str | Path],
+    folders: str | Path | Sequence[str | Path],
     output: str | Path,
     *,
     plugins: Sequence[ForceModel | str | Path] = (),
@@ -228,7 +229,10 @@ def merge(
     output = Path(output)
     run = Run(overwrite=overwrite, on_progress=on_progress or ignore, should_stop=should_stop or never)
     plugin_set = read_plugins(plugins)
-    distinct = {Path(folder).resolve(): Path(folder) for folder in folders}.values()
+    listed = [folders] if isinstance(folders, str | Path) else folders
+    distinct = {Path(folder).resolve(): Path(folder) for folder in listed}.values()
+    if not distinct:
+        raise UsageError("folders: got none, expected the work folders of all shards")
     records = {folder: _read_record(folder) for folder in distinct}
     first, first_record = next(iter(records.items()))
     config = stored_config(first_record.attributes, [], plugin_set, str(first))

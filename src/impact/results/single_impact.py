@@ -11,21 +11,22 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import xarray as xr
 
 from .._version import __version__
 from ..config.design import distribution_paths
 from ..config.draft import (
     Draft,
+    Overrides,
     Setting,
     listed_names,
     open_config,
     open_text,
+    reject_law_key,
     settings_of,
     without_default_masses,
 )
-from ..config.files import as_table
+from ..config.files import as_table, to_plain_data
 from ..config.grid import Axis
 from ..config.input_names import SWEEP_INPUTS, InputName, input_values
 from ..config.load import Config, build, inline_files
@@ -50,7 +51,7 @@ from ..engine.build_impacts import build_impacts, build_oblique, fixed_steps_at
 from ..engine.plan import Plan
 from ..engine.plugins import Plugins, read_plugins
 from ..errors import ConfigError, UsageError, did_you_mean, warn
-from ..formatting import number, quantity, safe_text
+from ..formatting import argument, number, quantity, safe_text
 from .calibration import fitted_config, position_of_law
 from .kinds import is_calibration, require_sweep
 from .plausibility import input_notes
@@ -59,7 +60,7 @@ from .schema import SCHEMA_VERSION, attributes_of, is_case, plain_unit
 from .seal import is_result
 from .xarray_backend import open_result
 
-STARTER_E = Setting(("sweep", "e"), 0.5, "--set sweep.e=0.5")
+STARTER_E = "sweep.e=0.5"
 
 ConfigSource = str | Path | Mapping[str, object] | xr.Dataset | None
 # dimensions of laws
@@ -244,8 +245,8 @@ def run(
     *,
     model: str | None = None,
     friction: str | None = None,
-    at: Mapping[str, float | str] | None = None,
-    overrides: Sequence[str] = (),
+    at: Mapping[str, object] | None = None,
+    overrides: Sequence[str] | Mapping[str, object] = (),
     plugins: Sequence[ForceModel | str | Path] = (),
     times: int | None = None,
 ) -> Impact:
@@ -402,7 +403,7 @@ def history_dataset(
 def histories(
     dataset: xr.Dataset,
     models: Sequence[str] | None,
-    at: Mapping[str, float | str],
+    at: Mapping[str, object],
     plugins: Plugins,
     frictions: Sequence[str] | None = None,
 ) -> list[xr.Dataset]:
@@ -452,7 +453,9 @@ def histories(
     if not datasets:
         point = ", ".join(f"{name} = {value}" for name, value in {**first, **at}.items())
         reason = next(iter(ends.values()))
-        raise UsageError(f"no motion to draw at {point}: {reason}; choose a point, such as --sel e=0.5")
+        raise UsageError(
+            f"no motion to draw at {point}: {reason}; choose a point, such as {argument('sel', {'e': 0.5})}"
+        )
     return datasets
 
 
@@ -491,7 +494,7 @@ class Calibration:
         fitted = draft.models[0].key
         table = draft.table("model").get(fitted)
         is_renamed = table is not None and model != fitted
-        renamed = [Setting(("model", model), table, f"--model {model}")] if is_renamed else []
+        renamed = [Setting(("model", model), table, argument("model", model))] if is_renamed else []
         return draft.with_settings([*renamed, *self.overrides])
 
 
@@ -525,7 +528,7 @@ class PointSource:
         return self.calibration.draft(self.calibration.law(model, friction or ""), model, self.plugins)
 
 
-def open_source(source: ConfigSource, overrides: Sequence[str], plugins: Plugins) -> PointSource:
+def open_source(source: ConfigSource, overrides: Overrides, plugins: Plugins) -> PointSource:
     """Open the config of a source, with overrides; None is the starter config at e = 0.5.
 
     A part of a result fixes the values at which it was selected. A plug-in that has changed since the result was
@@ -537,13 +540,16 @@ def open_source(source: ConfigSource, overrides: Sequence[str], plugins: Plugins
     if isinstance(source, xr.Dataset):
         return _open_stored(source, overrides, plugins, "the result")
     if source is None:
-        draft = open_config(None, plugins.models).with_settings([STARTER_E, *settings_of(overrides)])
+        draft = open_config(None, plugins.models).with_settings(
+            [Setting.parse(STARTER_E), *settings_of(overrides)]
+        )
         return PointSource(draft, plugins, has_selection=("models",) in draft.origins, is_starter=True)
+    reject_law_key(source, "model", plugins.models)
     draft = open_config(Path(source) if isinstance(source, str) else source, plugins.models)
     return PointSource(draft.with_settings(settings_of(overrides)), plugins)
 
 
-def _open_stored(dataset: xr.Dataset, overrides: Sequence[str], plugins: Plugins, name: str) -> PointSource:
+def _open_stored(dataset: xr.Dataset, overrides: Overrides, plugins: Plugins, name: str) -> PointSource:
     calibration, settings = None, tuple(settings_of(overrides))
     if is_calibration(dataset):
         config = stored_config(dataset.attrs, (), plugins, name, allow_changed_plugins=True, purpose="calibrate")
@@ -561,7 +567,7 @@ def _open_stored(dataset: xr.Dataset, overrides: Sequence[str], plugins: Plugins
 def single_point(
     source: PointSource,
     model: str | None = None,
-    at: Mapping[str, float | str] | None = None,
+    at: Mapping[str, object] | None = None,
     over: Mapping[str, object] | None = None,
     *,
     friction: str | None = None,
@@ -582,17 +588,19 @@ def single_point(
     law = None if model is None else find(model, source.plugins.models)
     friction_law = None if friction is None else find_friction(friction)
     laws = (law or next(iter(draft.models), None), friction_law or next(iter(draft.frictions), None))
-    fixed = {str(_input_name(name, *laws)): value for name, value in (at or {}).items()}
+    fixed = {str(_input_name(name, *laws)): to_plain_data(value)[0] for name, value in (at or {}).items()}
     for name, value in fixed.items():
-        if isinstance(value, Mapping) or np.ndim(value):
-            raise UsageError(f"--at {name}={value}: got several values, expected one")
+        if isinstance(value, dict | list):
+            raise UsageError(f"{argument('at', {name: value})}: got several values, expected one")
     if {"e", "alpha"} <= fixed.keys():
-        raise UsageError("--at alpha: got alpha and e, expected one of the two")
-    settings = [] if law is None else [Setting(("models",), [law.key], f"--model {law.key}")]
+        raise UsageError(f"{argument('at', key='alpha')}: got alpha and e, expected one of the two")
+    settings = [] if law is None else [Setting(("models",), [law.key], argument("model", law.key))]
     if friction_law is not None:
-        settings.append(Setting(("frictions",), [friction_law.key], f"--friction {friction}"))
+        settings.append(Setting(("frictions",), [friction_law.key], argument("friction", friction)))
     over = {str(_input_name(name, *laws)): values for name, values in (over or {}).items()}
-    settings += [Setting(InputName.parse(name).path, values, f"--over {name}") for name, values in over.items()]
+    settings += [
+        Setting(InputName.parse(name).path, values, argument("over", key=name)) for name, values in over.items()
+    ]
     draft = draft.with_settings(settings)
     if source.is_starter:
         draft = without_default_masses(draft, fixed)
@@ -646,7 +654,7 @@ def _setting_at(draft: Draft, name: str, value: float | str, law: ForceModel | N
     path, value = parsed.path, parsed.word(value)
     if name == "K" and law is not None and has_other_stiffness(draft, law):
         path = ("model", law.key, "K")
-    return Setting(path, value, f"--at {name}={value}")
+    return Setting(path, value, argument("at", value, key=name))
 
 
 def _has_input(draft: Draft, name: InputName) -> bool:

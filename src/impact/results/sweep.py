@@ -16,7 +16,7 @@ from typing import Any
 import xarray as xr
 
 from ..atomic import atomic_write, check_output, check_outputs
-from ..config.draft import Setting, settings_of
+from ..config.draft import Setting, reject_law_key, settings_of
 from ..config.grid import MAX_POINTS
 from ..config.input_names import InputName
 from ..config.load import read_config
@@ -30,6 +30,7 @@ from ..engine.plugins import read_plugins
 from ..engine.run import DEFAULT_RUN, ProgressCallback, ProgressCounter, Run, ignore, never, report_kept_ranges
 from ..engine.trajectories import RANGE_TRAJECTORIES, TrajectoryRange
 from ..errors import ResultError, StoreError, UnfinishedError, UsageError, warn
+from ..formatting import argument
 from .layouts import LAYOUTS, FillSlab
 from .netcdf import MAX_LABEL_BYTES, encode_text, is_text
 from .outcome import SweepOutcome
@@ -75,7 +76,7 @@ def sweep(
     models: str | Sequence[str] | None = None,
     frictions: str | Sequence[str] | None = None,
     output: str | Path | None = None,
-    overrides: Sequence[str] = (),
+    overrides: Sequence[str] | Mapping[str, object] = (),
     plugins: Sequence[ForceModel | str | Path] = (),
     jobs: int = 1,
     threads: int = 1,
@@ -140,6 +141,7 @@ def sweep(
     settings = [*settings_of(overrides), *changes]
     if output is None and (resume or overwrite):
         raise UsageError("resume and overwrite: got no output, expected one as well")
+    reject_law_key(source, "models")
     backend = choose_executor(jobs, threads, executor)
     bar: AbstractContextManager[ProgressCallback] = nullcontext(ignore)
     if progress:
@@ -174,7 +176,7 @@ def sweep_to_file(
     source: str | Path | Mapping[str, object] | None,
     output: str | Path,
     *,
-    overrides: Sequence[str | Setting] = (),
+    overrides: Sequence[str | Setting] | Mapping[str, object] = (),
     plugins: Sequence[ForceModel | str | Path] = (),
     backend: AbstractContextManager[ExecutorSpec] | None = None,
     max_points: int = MAX_POINTS,
@@ -235,7 +237,7 @@ def sweep_to_file(
 
 def read_plan(
     source: str | Path | Mapping[str, object] | None,
-    overrides: Sequence[str | Setting] = (),
+    overrides: Sequence[str | Setting] | Mapping[str, object] = (),
     plugins: Sequence[ForceModel | str | Path] = (),
     run: Run = DEFAULT_RUN,
 ) -> Plan:
@@ -293,7 +295,8 @@ def sweep_into(
         # another process may have stored it in the meantime
         check_output(output, overwrite=may_replace)
         # without --overwrite, an existing result would be refused
-        again = "--resume --overwrite" if os.path.lexists(output) and not extension.seal else "--resume"
+        replaces = os.path.lexists(output) and not extension.seal
+        again = " ".join(argument(name, True) for name in ("resume", "overwrite")[: 1 + replaces])
         with report_kept_ranges(
             folder, counter, again, lambda error: _missing_space(error, output, plan, counter)
         ):

@@ -19,7 +19,7 @@ from ..config.grid import MAX_POINTS
 from ..config.tables import Output
 from ..contact.variables import OUTPUTS
 from ..errors import ResultError, UnfinishedError, UsageError
-from ..formatting import safe_text
+from ..formatting import argument, safe_text
 from .hdf5_structure import byte_reader, check_root
 from .kinds import kind_of, require_sweep
 from .layouts import LAYOUTS
@@ -184,17 +184,13 @@ def load(path: str | Path) -> xr.Dataset:
         return dataset.load() if table_of_result(dataset) is None else in_memory(dataset)
 
 
-def result_of(result: object) -> xr.Dataset:
-    """Open what a function takes as a result: a dataset, or the file of one; a selected law stays a dimension.
-
-    Raises
-    ------
-    UsageError : it is something else
-    """
+def result_of(result: xr.Dataset | str | Path) -> xr.Dataset:
+    """Open what a function takes as a result: a dataset, or the file of one; a selected law stays a dimension."""
     if isinstance(result, str | Path):
         return load(result)
     if not isinstance(result, xr.Dataset):
-        raise UsageError(f"result: got a {type(result).__name__}, expected a dataset, or the file of a result")
+        # the public function names its argument
+        raise TypeError(f"got a {type(result).__name__}, expected a dataset, or the file of a result")
     for dim in ("friction", "model"):
         if dim in result.coords and result[dim].ndim == 0 and kind_of(result) == "sweep":
             metadata = ("exponent", *MODEL_METADATA) if dim == "model" else ()
@@ -208,7 +204,7 @@ def expand(
     result: str | Path,
     output: str | Path,
     *,
-    sel: Mapping[str, float | str] | None = None,
+    sel: Mapping[str, object] | None = None,
     models: Sequence[str] | None = None,
     overwrite: bool = False,
     max_points: int = MAX_POINTS,
@@ -253,10 +249,9 @@ def expand(
         dataset = dataset.isel(model=law_positions(models, dataset))
     points = math.prod(dataset.sizes.values())
     if points > max_points:
-        raise UsageError(
-            f"{shown}: got {points:,} points, expected at most {max_points:,} (--max-points); select a part, such "
-            "as --sel e=0.5"
-        )
+        part = f"a part, such as {argument('sel', {'e': 0.5})}"
+        most = f"{max_points:,} ({argument('max_points')})"
+        raise UsageError(f"{shown}: got {points:,} points, expected at most {most}; select {part}")
     save(dataset, output, overwrite=overwrite, should_stop=should_stop)
     return points
 

@@ -23,6 +23,7 @@ from ..contact.variables import OUTPUTS
 from ..engine.plan import Plan
 from ..engine.run import Run
 from ..errors import ConfigError, UsageError, did_you_mean
+from ..formatting import argument
 from ..results.sensitivity import HALF, QUANTILES, sensitivity_template
 from ..results.sweep import read_plan, sweep_in_memory
 from ..results.xarray_backend import save
@@ -38,7 +39,7 @@ def sensitivity(
     of: str = "e_out",
     output: str | Path | None = None,
     overwrite: bool = False,
-    overrides: Sequence[str] = (),
+    overrides: Sequence[str] | Mapping[str, object] = (),
     plugins: Sequence[ForceModel | str | Path] = (),
     max_points: int = MAX_POINTS,
     execute: Callable[..., xr.Dataset] | None = None,
@@ -95,11 +96,11 @@ def sensitivity(
 
 def sensitivities(
     source: str | Path | Mapping[str, object],
-    of: Sequence[str],
+    of: str | Sequence[str],
     *,
     output: str | Path | None = None,
     overwrite: bool = False,
-    overrides: Sequence[str] = (),
+    overrides: Sequence[str] | Mapping[str, object] = (),
     plugins: Sequence[ForceModel | str | Path] = (),
     max_points: int = MAX_POINTS,
     execute: Callable[..., xr.Dataset] | None = None,
@@ -125,15 +126,20 @@ def sensitivities(
     [187.75797, 0.00998]
     """
     names = [name for name, variable in OUTPUTS.items() if not variable.flags]
+    of = [of] if isinstance(of, str) else of
     for name in of:
         if name not in names:
-            raise UsageError(f'--of: no output "{name}"; {did_you_mean(name, names)}')
+            raise UsageError(f'{argument("of")}: no output "{name}"; {did_you_mean(name, names)}')
     if output is not None and len(of) > 1:
-        raise UsageError(f"--output: got {len(of)} outputs (--of), expected one for a file")
+        raise UsageError(
+            f"{argument('output')}: got {len(of)} outputs ({argument('of')}), expected one for a file"
+        )
     plan = read_plan(source, overrides, plugins, Run(max_points=max_points))
     for name in of if not plan.frictions else ():
         if OUTPUTS[name].of_friction:
-            raise UsageError(f'--of {name}: got no friction law, expected frictions, such as ["coulomb-1785"]')
+            raise UsageError(
+                f'{argument("of", name)}: got no friction law, expected frictions, such as ["coulomb-1785"]'
+            )
     plan = sensitivity_plan(plan, of, max_points, str(source) if isinstance(source, str | Path) else "config")
     check_outputs([output], [source, *plugins, *plan.config.files], overwrite=overwrite)
     swept = (execute or sweep_in_memory)(plan)
@@ -171,7 +177,7 @@ def sensitivity_plan(plan: Plan, of: Sequence[str], max_points: int, name: str) 
     whole = replace(plan, config=replace(config, axes=axes, output=output))
     if whole.points > max_points:
         got = f"{whole.points:,} points, {len(names) + 2} for each sample"
-        raise UsageError(f"{name}: got {got}, expected at most {max_points:,} (--max-points)")
+        raise UsageError(f"{name}: got {got}, expected at most {max_points:,} ({argument('max_points')})")
     whole.check_count(max_points, name)
     return whole
 

@@ -1,0 +1,86 @@
+"""Wrong types of arguments: what fails in a public function because of one is a UsageError that names it."""
+
+from __future__ import annotations
+
+import builtins
+import inspect
+import numbers
+import re
+from collections.abc import Callable
+from functools import wraps
+from types import UnionType
+from typing import Any, ParamSpec, TypeVar, get_origin
+
+from .errors import ImpactError, UsageError
+from .formatting import argument
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+# a number of another library is one as well
+ABSTRACT = {"float": numbers.Real, "int": numbers.Integral, "Any": object, "None": type(None)}
+# between the alternatives of an annotation, not inside of brackets
+ALTERNATIVES = re.compile(r" \| (?![^\[]*\])")
+
+
+def name_wrong_types(function: Callable[P, T]) -> Callable[P, T]:
+    """Wrap a public function: an unexpected error becomes a UsageError if an argument is not of its type.
+
+    Types are only compared after an error, so that whatever works is taken.
+    """
+
+    @wraps(function)
+    def call(*args: P.args, **kwargs: P.kwargs) -> T:
+        try:
+            return function(*args, **kwargs)
+        except ImpactError:
+            raise
+        except Exception as error:
+            if problem := type_problem(function, args, kwargs):
+                raise UsageError(problem) from error
+            raise
+
+    call.__module__ = __package__
+    return call
+
+
+def require_counts(**counts: int) -> None:
+    """Refuse numbers of processes, threads or others that are not at least 1."""
+    for name, count in counts.items():
+        if count < 1:
+            raise UsageError(f"{argument(name)}: got {count}, expected a whole number >= 1")
+
+
+def type_problem(function: Callable[..., object], args: Any, kwargs: Any) -> str:
+    """Describe the first argument that is not of its annotated type; empty if there is none.
+
+    >>> from impact.results.ranking import recommend
+    >>> type_problem(recommend, ["r.h5"], {"target": 0.6})
+    'target: got a float, expected Mapping[str, object] | None'
+    """
+    signature = inspect.signature(function)
+    try:
+        bound = signature.bind(*args, **kwargs)
+    except TypeError:
+        # Python names an argument that is missing or unknown
+        return ""
+    for name, value in bound.arguments.items():
+        parameter = signature.parameters[name]
+        for one in value if parameter.kind is parameter.VAR_POSITIONAL else [value]:
+            alternatives = ALTERNATIVES.split(parameter.annotation)
+            if not any(_is_of(one, text, function.__globals__) for text in alternatives):
+                return f"{name}: got a {type(one).__name__}, expected {parameter.annotation}"
+    return ""
+
+
+def _is_of(value: object, text: str, names: dict[str, Any]) -> bool:
+    """Check a value against one alternative of an annotation, but not the elements of the value."""
+    name, _, attribute = text.split("[")[0].partition(".")
+    kind: Any = ABSTRACT.get(name) or names.get(name) or getattr(builtins, name, None)
+    if kind is None:
+        # a class that is imported for type checkers only is compared by its name
+        return type(value).__name__ == (attribute or name)
+    kind = getattr(kind, attribute) if attribute else kind
+    kinds = [get_origin(one) or one for one in (kind.__args__ if isinstance(kind, UnionType) else [kind])]
+    # a type such as ArrayLike is for type checkers
+    return any(not isinstance(one, type) or isinstance(value, one) for one in kinds)
