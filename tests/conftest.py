@@ -19,6 +19,7 @@ import xarray as xr
 from hypothesis import settings
 
 import impact
+from impact import formatting
 from impact.errors import ConfigError
 
 from .fork_server import CompletedCommand, ForkServer, start_fork_server
@@ -291,3 +292,9 @@ def chromium() -> str:
     if executable is None:
         pytest.skip("no Chromium here: how a page looks in a browser is not tested")
     return executable
+
+
+@pytest.fixture
+def command_line_words(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Messages in the words of the command line, as in its process: --set, not overrides."""
+    monkeypatch.setattr(formatting, "_is_command_line", True)

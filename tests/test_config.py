@@ -27,6 +27,9 @@ from impact.formatting import escape_controls, safe_text
 from .conftest import ROOT, new_law, problems_of
 from .test_schema_agrees import SCHEMA
 
+# what a user of the command line reads
+pytestmark = pytest.mark.usefixtures("command_line_words")
+
 FIGURE6 = ROOT / "configs" / "figure6.toml"
 STARTER = ROOT / "src" / "impact" / "config" / "starter.toml"
 

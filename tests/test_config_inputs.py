@@ -20,6 +20,9 @@ from impact.plots.data import read_points
 from .conftest import problems_of
 from .fork_server import ForkServer
 
+# what a user of the command line reads
+pytestmark = pytest.mark.usefixtures("command_line_words")
+
 TEXT = """\
 models = ["hertz", "kelvin-voigt"]
 [sweep]

@@ -351,7 +351,7 @@ def test_values_of_at_may_complete_a_config() -> None:
     assert impact.run(at={"steps_per_contact": 10.0}, overrides=fixed).values["steps"] == 10
     with pytest.raises(UsageError, match='no input "step_per_contact" here; did you mean "steps_per_contact"'):
         impact.run(at={"step_per_contact": 10.0}, overrides=fixed)
-    with pytest.raises(ConfigError, match=r"dt=1e-06: sweep\.dt: set together with steps_per_contact"):
+    with pytest.raises(ConfigError, match=r'at\["dt"\]: sweep\.dt: set together with steps_per_contact'):
         impact.run(at={"steps_per_contact": 10.0, "dt": 1e-6}, overrides=fixed)
 
 
