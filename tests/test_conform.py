@@ -255,7 +255,7 @@ def test_an_engine_with_a_friction_law_of_the_catalogue_is_judged_by_it() -> Non
             answer |= {"u2": c["u2"] + P / c["m2"], "omega2": c["omega2"] - c["R2"] * P / c["inertia2"]}
         return answer
 
-    named = impact.conform(adapter=lambda c: spring(c) | law, only=only, tol={"friction_bound": 0.1})
+    named = impact.conform(adapter=lambda c: spring(c) | law, only=only, tol={"friction_bound": 0.5})
     assert named.passed, str(named)
     assert "friction" in failed(impact.conform(adapter=spring, only=only))
 

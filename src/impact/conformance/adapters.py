@@ -113,7 +113,9 @@ def _command(adapter: object) -> list[str]:
     """Make the words of the command of an adapter; it runs in an empty folder, so that paths become absolute."""
     if isinstance(adapter, str) and PYTHON_FUNCTION.fullmatch(adapter):
         path, _, name = adapter.rpartition(":")
-        return python_command(sys.executable, Path(path), name)
+        # it may also be the last word of a command
+        if " " not in path or Path(path).is_file():
+            return python_command(sys.executable, Path(path), name)
     if not isinstance(adapter, str | Sequence) or not adapter:
         raise UsageError(f'--adapter: got {adapter!r}, expected FILE.py:FUNCTION or "PROGRAM ARGUMENTS"')
     try:

