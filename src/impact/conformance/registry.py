@@ -65,7 +65,8 @@ ENGINES: Mapping[str, Engine] = {
             "mujoco",
             "MuJoCo",
             "mujoco",
-            "Euler, elliptic cone, constant impedance, solref for e and the contact time, solreffriction a tenth of it",
+            "Euler, elliptic cone, constant impedance, solref for e and the contact time, a tenth of it in "
+            "solreffriction",
         ),
         Engine(
             "pybullet",
@@ -78,6 +79,12 @@ ENGINES: Mapping[str, Engine] = {
             "LAMMPS",
             "lammps",
             "granular hooke with coeff_restitution and linear_history, k_t = 2/7 k_n, xt = 0",
+        ),
+        Engine(
+            "drake",
+            "Drake",
+            "drake",
+            "point contact, TAMSI, dissipation for e at the closing speed, stiction tolerance 1e-4 of it, dt/4",
         ),
     )
 }

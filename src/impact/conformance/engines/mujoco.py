@@ -32,7 +32,7 @@ STEPS_BEFORE, CONTACTS = 1, 3.0
 
 
 def half_time(z: float) -> float:
-    """Half of the contact time over that of the undamped spring, of a linear spring and dashpot that never pull."""
+    """Half of the contact time, in units of the undamped spring, of a spring and dashpot that never pull."""
     if z == 1.0:
         return 1.0
     return math.acos(z) / math.sqrt(1.0 - z * z) if z < 1.0 else math.acosh(z) / math.sqrt(z * z - 1.0)
