@@ -86,6 +86,12 @@ ENGINES: Mapping[str, Engine] = {
             "drake",
             "point contact, TAMSI, dissipation for e at the closing speed, stiction tolerance 1e-4 of it, dt/4",
         ),
+        Engine(
+            "newton",
+            "Newton",
+            "newton",
+            "SolverSemiImplicit, kd for e, kf that ends a slip in five steps, no angular_damping, 4 dt",
+        ),
     )
 }
 
