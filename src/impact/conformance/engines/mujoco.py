@@ -73,7 +73,7 @@ def collide(c: dict[str, Any]) -> dict[str, Any]:
     data = mujoco.MjData(model)
     data.qvel[:] = speeds
     mujoco.mj_step(model, data, STEPS_BEFORE + math.ceil(CONTACTS * c["contact_time"] / c["dt"]))
-    answer = {"id": c["id"], "engine": "mujoco", "version": mujoco.__version__, "kind": "compliant"}
+    answer = {"id": c["id"], "version": mujoco.__version__, "kind": "compliant"}
     for ball in range(len(speeds) // 3):
         names = (f"{name}{ball + 1}" for name in ("v", "u", "omega"))
         answer |= dict(zip(names, map(float, data.qvel[3 * ball : 3 * ball + 3]), strict=True))

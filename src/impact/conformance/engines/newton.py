@@ -76,7 +76,7 @@ def collide(c: dict[str, Any]) -> dict[str, Any]:
         pipeline.collide(state, contacts)
         solver.step(state, following, control, contacts, step)
         state, following = following, state
-    answer = {"id": c["id"], "engine": "newton", "version": version("newton"), "kind": "compliant"}
+    answer = {"id": c["id"], "version": version("newton"), "kind": "compliant"}
     answer["precision"] = "float32"
     for number, (v, u, _, _, _, omega) in zip(numbers, state.body_qd.numpy().tolist(), strict=True):
         answer |= {f"v{number}": v, f"u{number}": u, f"omega{number}": omega}

@@ -39,7 +39,7 @@ def collide(c: dict[str, Any]) -> dict[str, Any]:
         bullet.changeDynamics(body, -1, contactProcessingThreshold=0, rollingFriction=0, spinningFriction=0)
     for _ in range(STEPS):
         bullet.stepSimulation()
-    answer = {"id": c["id"], "engine": "pybullet", "version": version("pybullet"), "kind": "impulse"}
+    answer = {"id": c["id"], "version": version("pybullet"), "kind": "impulse"}
     for number, body in zip("12", balls, strict=False):
         (v, u, _), (_, _, omega) = bullet.getBaseVelocity(body)
         answer |= {f"v{number}": v, f"u{number}": u, f"omega{number}": omega}

@@ -32,7 +32,7 @@ def collide(c: dict[str, Any]) -> dict[str, Any]:
         space.add(shape)
     for _ in range(STEPS):
         space.step(c["dt"])
-    answer = {"id": c["id"], "engine": "pymunk", "version": pymunk.version, "kind": "impulse"}
+    answer = {"id": c["id"], "version": pymunk.version, "kind": "impulse"}
     for number, body in zip("12", balls, strict=False):
         answer |= {f"v{number}": body.velocity.x, f"u{number}": body.velocity.y}
         answer[f"omega{number}"] = body.angular_velocity
