@@ -65,6 +65,12 @@ ENGINES: Mapping[str, Engine] = {
             "collision_slop = 0; e and mu are those of the pair",
         ),
         Engine(
+            "box2d",
+            "Box2D",
+            "Box2D",
+            "lengths over the radius of ball 1, 50 iterations, no continuous collision, one step",
+        ),
+        Engine(
             "mujoco",
             "MuJoCo",
             "mujoco",
