@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 # of the radius, so that the first step finds the contact in single precision
-OVERLAP = 1e-5
+OVERLAP = 1e-6
 ITERATIONS = 50
 
 
@@ -16,6 +16,8 @@ def collide(c: dict[str, Any]) -> dict[str, Any]:
     import Box2D
 
     length = c["R1"]
+    # an edge has a skin, which the ball touches
+    skin = 2.0 * Box2D.b2_linearSlop if c["m2"] is None else 0.0
     world = Box2D.b2World(gravity=(0, 0), doSleep=False)
     world.continuousPhysics = False
     balls = []
@@ -27,7 +29,7 @@ def collide(c: dict[str, Any]) -> dict[str, Any]:
         else:
             shape = Box2D.b2CircleShape(radius=R / length)
             body = world.CreateDynamicBody(
-                position=(side * R / length * (1.0 - OVERLAP), 0),
+                position=(side * R / length * (1.0 - OVERLAP) - skin, 0),
                 linearVelocity=(v / length, u / length),
                 angularVelocity=omega,
                 linearDamping=0,
