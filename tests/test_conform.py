@@ -344,6 +344,15 @@ for line in sys.stdin:
     assert statuses["momentum"]["delivered"] is None
 
 
+@pytest.mark.parametrize("value", [math.inf, -math.inf, 1e308, -1e308, 1e200, math.nan])
+@pytest.mark.parametrize("key", ["v1", "u2", "omega1"])
+def test_a_number_of_any_size_is_judged(key: str, value: float) -> None:
+    names = failed(impact.conform(adapter=lambda c: rigid(c) | {key: value}, only=["spin-both", "frame-mirrored"]))
+    assert ("finite" in names) == (not math.isfinite(value))
+    assert "angular_momentum" in names or key == "v1"
+    assert "energy" in names
+
+
 def test_no_process_is_left(tmp_path: Path) -> None:
     """Neither of the adapter nor of what it started."""
     text = "import subprocess\nchild = subprocess.Popen(['sleep', '600'])\n"

@@ -72,19 +72,20 @@ class AdapterError(UsageError):
 
 
 @contextmanager
-def open_adapter(adapter: object, timeout_s: float) -> Iterator[Ask]:
+def open_adapter(adapter: object, timeout_s: float, folder: str | None = None) -> Iterator[Ask]:
     """Start an adapter, and yield the function that asks it.
 
     Parameters
     ----------
     adapter : a function, `FILE.py:FUNCTION`, a command line, or the words of one
     timeout_s : time that it has for an answer [s]; that of a function which is passed as such is not limited
+    folder : where it runs; by default the working directory
     """
     if callable(adapter):
         yield adapter
         return
     words = _command(adapter)
-    with tempfile.TemporaryFile() as errors, tempfile.TemporaryDirectory(prefix="impact-conform-") as folder:
+    with tempfile.TemporaryFile() as errors:
         try:
             process = subprocess.Popen(
                 words,
@@ -110,7 +111,7 @@ def open_adapter(adapter: object, timeout_s: float) -> Iterator[Ask]:
 
 
 def _command(adapter: object) -> list[str]:
-    """Make the words of the command of an adapter; it runs in an empty folder, so that paths become absolute."""
+    """Make the words of the command of an adapter."""
     if isinstance(adapter, str) and PYTHON_FUNCTION.fullmatch(adapter):
         path, _, name = adapter.rpartition(":")
         # it may also be the last word of a command
@@ -125,7 +126,7 @@ def _command(adapter: object) -> list[str]:
     program = find_program(words[0], None)
     if program is None:
         raise UsageError(f'--adapter: no program "{words[0]}"; expected FILE.py:FUNCTION or "PROGRAM ARGUMENTS"')
-    return [program, *(str(Path(word).absolute()) if Path(word).is_file() else word for word in words[1:])]
+    return [program, *words[1:]]
 
 
 def python_command(python: str, path: Path, name: str) -> list[str]:
@@ -215,7 +216,7 @@ def read_answer(question: Question, answer: object) -> Answer | None:
         raise AdapterError(f"{name}: got {_shown(answer)}, expected an object of JSON")
     if answer.get("id") != question["id"]:
         raise AdapterError(f"{name}: got an answer to {_shown(answer.get('id'))}")
-    if answer.get("error"):
+    if answer.get("error") is not None:
         return None
     values = {}
     for key in (f"{quantity}{ball}" for quantity in ("v", "u", "omega") for ball in balls_of(question)):

@@ -102,7 +102,7 @@ class Rebound:
 
     def total(self, read: Read, part: Callable[[Read, str], float]) -> float:
         """Sum a part of the balls, before or after the impact."""
-        return math.fsum(part(read, ball) for ball in self.balls)
+        return sum(part(read, ball) for ball in self.balls)
 
     def change(self, part: Callable[[Read, str], float]) -> float:
         """Sum a part of the balls after the impact less that before."""
@@ -166,8 +166,9 @@ def energy(rebound: Rebound) -> Delivered:
     """Give the kinetic energy after the impact over that before."""
 
     def part(read: Read, ball: str) -> float:
-        moving = rebound.before(f"m{ball}") * (read(f"v{ball}") ** 2 + read(f"u{ball}") ** 2)
-        return moving + rebound.before(f"inertia{ball}") * read(f"omega{ball}") ** 2
+        # a power of a large number would raise
+        v, u, omega = (read(f"{name}{ball}") for name in ("v", "u", "omega"))
+        return rebound.before(f"m{ball}") * (v * v + u * u) + rebound.before(f"inertia{ball}") * (omega * omega)
 
     return Delivered(1.0, 1.0 + ratio(rebound.change(part), rebound.total(rebound.before, part)))
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from ..atomic import check_outputs
 from ..errors import UsageError, did_you_mean
@@ -91,8 +93,11 @@ def conform(
     commands: list[tuple[str, object]] = [(name, find_engine(name).command(program)) for name in names]
     commands += [(_adapter_name(word), word) for word in adapters]
     engines: list[EngineChecks] = []
-    for name, command in commands:
-        with open_adapter(command, timeout) as ask:
+    for position, (name, command) in enumerate(commands):
+        with ExitStack() as stack:
+            # engines of the package may leave files where they run
+            folder = stack.enter_context(TemporaryDirectory(prefix="impact-")) if position < len(names) else None
+            ask = stack.enter_context(open_adapter(command, timeout, folder))
             facts, answers, again = _ask_all(ask, trials, judged)
         # an engine with a law of its own is named by the adapter
         facts = replace(facts, engine=_unique(facts.engine or name, [engine.engine for engine in engines]))

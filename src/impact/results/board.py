@@ -233,7 +233,8 @@ def board_rows(engines: Sequence[Mapping[str, Any]]) -> list[tuple[str, ...]]:
     def cell(engine: Mapping[str, Any], name: str) -> str:
         statuses = [check["status"] for check in engine["checks"] if check["check"] == name]
         judged = len(statuses) - statuses.count("not_supported")
-        return f"{statuses.count('pass')}/{judged}" if judged else "–"
+        mark = " ✗" if "fail" in statuses else ""
+        return f"{statuses.count('pass')}/{judged}{mark}" if judged else "–"
 
     names = {check["check"] for check in engines[0]["checks"]}
     facts = [(key, *(engine[key] for engine in engines)) for key in ("version", "kind")]
