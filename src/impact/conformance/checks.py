@@ -96,9 +96,12 @@ class Rebound:
 
     @cached_property
     def speed(self) -> float:
-        """The speed to which differences are relative [m/s]: v0 + |g0|, without both the largest before."""
+        """The speed to which differences are relative [m/s]: v0 + |g0|, else the largest before.
+
+        Where nothing moves it is a thousandth of R1 per contact time.
+        """
         largest = max(abs(self.before(name)) for name in ("v1", "v2", "u1", "u2"))
-        return self.v0 + abs(self.g0) or largest
+        return self.v0 + abs(self.g0) or largest or 1e-3 * self.before("R1") / self.before("contact_time")
 
     def total(self, read: Read, part: Callable[[Read, str], float]) -> float:
         """Sum a part of the balls, before or after the impact."""
@@ -112,17 +115,6 @@ class Rebound:
 def balls_of(question: Question) -> str:
     """Return "12", or "1" where ball 2 is a wall."""
     return "1" if question["m2"] is None else "12"
-
-
-def ratio(value: float, scale: float) -> float:
-    """Divide; 0/0 is 0, and anything else by 0 is infinite.
-
-    >>> ratio(0.0, 0.0), ratio(1.0, 0.0), ratio(1.0, 2.0)
-    (0.0, inf, 0.5)
-    """
-    if scale == 0.0:
-        return 0.0 if value == 0.0 else value * math.inf
-    return value / scale
 
 
 def finite(rebound: Rebound) -> Delivered:
@@ -140,7 +132,8 @@ def momentum(rebound: Rebound) -> Delivered:
     def change(name: str) -> float:
         return abs(rebound.change(lambda read, ball: rebound.before(f"m{ball}") * read(f"{name}{ball}")))
 
-    return Delivered(0.0, ratio(_largest(change("v"), change("u")), rebound.total(rebound.before, size)))
+    scale = rebound.total(rebound.before, size) or rebound.m * rebound.speed
+    return Delivered(0.0, _largest(change("v"), change("u")) / scale)
 
 
 def angular_momentum(rebound: Rebound) -> Delivered:
@@ -159,7 +152,8 @@ def angular_momentum(rebound: Rebound) -> Delivered:
         spinning = rebound.before(f"inertia{ball}") * abs(read(f"omega{ball}"))
         return spinning + rebound.before(f"R{ball}") * moving
 
-    return Delivered(0.0, abs(ratio(rebound.change(part), rebound.total(rebound.before, size))))
+    scale = rebound.total(rebound.before, size) or rebound.before("R1") * rebound.m * rebound.speed
+    return Delivered(0.0, abs(rebound.change(part)) / scale)
 
 
 def energy(rebound: Rebound) -> Delivered:
@@ -170,18 +164,19 @@ def energy(rebound: Rebound) -> Delivered:
         v, u, omega = (read(f"{name}{ball}") for name in ("v", "u", "omega"))
         return rebound.before(f"m{ball}") * (v * v + u * u) + rebound.before(f"inertia{ball}") * (omega * omega)
 
-    return Delivered(1.0, 1.0 + ratio(rebound.change(part), rebound.total(rebound.before, part)))
+    scale = rebound.total(rebound.before, part) or rebound.m * rebound.speed * rebound.speed
+    return Delivered(1.0, 1.0 + rebound.change(part) / scale)
 
 
 def separates(rebound: Rebound) -> Delivered:
     """Give the speed of separation; a negative one is that of balls that go through each other."""
-    return Delivered(0.0, ratio(rebound.separation, rebound.speed))
+    return Delivered(0.0, rebound.separation / rebound.speed)
 
 
 def restitution(rebound: Rebound) -> Delivered:
     """Give e and the speed of separation over the closing speed; balls at rest relative to each other stay so."""
     if rebound.v0 == 0.0:
-        return Delivered(0.0, ratio(rebound.separation, rebound.speed))
+        return Delivered(0.0, rebound.separation / rebound.speed)
     return Delivered(rebound.before("e"), rebound.separation / rebound.v0)
 
 
@@ -198,7 +193,7 @@ def friction_bound(rebound: Rebound) -> Delivered:
     """Give |P|/(mu P_n), which is at most 1; |P| over m (v0 + |g0|) where the bound is 0."""
     impulse, bound = abs(rebound.tangential_impulse()), rebound.before("mu") * rebound.normal_impulse
     if bound <= 0.0:
-        return Delivered(0.0, ratio(impulse, rebound.m * rebound.speed))
+        return Delivered(0.0, impulse / (rebound.m * rebound.speed))
     return Delivered(1.0, impulse / bound)
 
 
@@ -213,7 +208,7 @@ def spin(rebound: Rebound) -> Delivered:
         impulse = rebound.before(f"inertia{ball}") * change / rebound.before(f"R{ball}")
         return abs(impulse + rebound.tangential_impulse(ball))
 
-    return Delivered(0.0, ratio(_largest(*map(difference, rebound.balls)), rebound.m * rebound.speed))
+    return Delivered(0.0, _largest(*map(difference, rebound.balls)) / (rebound.m * rebound.speed))
 
 
 def related(rebound: Rebound, trial: Trial, base: Rebound) -> Delivered:
@@ -227,7 +222,7 @@ def related(rebound: Rebound, trial: Trial, base: Rebound) -> Delivered:
         length = rebound.before(f"R{name[-1]}") if name.startswith("omega") else 1.0
         return length * abs(rebound.answer[name] - expected[name])
 
-    return Delivered(0.0, ratio(_largest(*map(difference, rebound.answer)), rebound.speed))
+    return Delivered(0.0, _largest(*map(difference, rebound.answer)) / rebound.speed)
 
 
 def repeat(rebound: Rebound, again: Answer) -> Delivered:

@@ -104,6 +104,14 @@ ENGINES: Mapping[str, Engine] = {
             "point contact, TAMSI, dissipation for e at the closing speed, stiction tolerance 1e-4 of it, dt/4",
         ),
         Engine(
+            "drake-sap",
+            "Drake, solver SAP",
+            "drake",
+            "point contact, SAP, relaxation_time for e, stiction tolerance 1e-4 of the closing speed, dt/4",
+            file="drake",
+            function="collide_sap",
+        ),
+        Engine(
             "newton",
             "Newton",
             "newton",

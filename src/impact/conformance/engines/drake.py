@@ -1,4 +1,4 @@
-"""Drake: spheres on planar joints, and a half space as the wall; point contact with the solver TAMSI."""
+"""Drake: spheres on planar joints, and a half space as the wall; point contact with the solvers TAMSI and SAP."""
 
 from __future__ import annotations
 
@@ -22,6 +22,29 @@ def dissipation(e: float) -> float:
 
 
 def collide(c: dict[str, Any]) -> dict[str, Any]:
+    """Run a collision by TAMSI, with the force k x (1 + d v)."""
+    speed = abs(c["v1"] - c["v2"]) or 1.0
+    stiffness = (math.pi / c["contact_time"]) ** 2 * effective_mass(c)
+    return run(c, "kTamsi", stiffness, dissipation=dissipation(c["e"]) / speed)
+
+
+def collide_sap(c: dict[str, Any]) -> dict[str, Any]:
+    """Run a collision by SAP, with the force k (x + t v)."""
+    from linear_contact import damping_ratio, half_time
+
+    z = damping_ratio(c["e"])
+    frequency = 2.0 * half_time(z) / c["contact_time"]
+    # those of both bodies add
+    return run(c, "kSap", frequency**2 * effective_mass(c), relaxation_time=z / frequency)
+
+
+def effective_mass(c: dict[str, Any]) -> float:
+    """Effective mass [kg]."""
+    m1, m2 = c["m1"], c["m2"]
+    return float(m1 if m2 is None else m1 * m2 / (m1 + m2))
+
+
+def run(c: dict[str, Any], solver: str, stiffness: float, **damping: float) -> dict[str, Any]:
     """Run a collision whose balls touch, side by side, after the first step."""
     from importlib.metadata import version
 
@@ -39,19 +62,18 @@ def collide(c: dict[str, Any]) -> dict[str, Any]:
 
     numbers = "1" if c["m2"] is None else "12"
     step, speed = PART_OF_STEP * c["dt"], abs(c["v1"] - c["v2"])
-    stiffness = (math.pi / c["contact_time"]) ** 2 / sum(1.0 / c[f"m{number}"] for number in numbers)
     material = ProximityProperties()
-    AddContactMaterial(
-        dissipation=dissipation(c["e"]) / (speed or 1.0),
-        # the springs of both bodies are in series
-        point_stiffness=2.0 * stiffness,
-        friction=CoulombFriction(c["mu"], c["mu"]),
-        properties=material,
-    )
+    friction = CoulombFriction(c["mu"], c["mu"])
+    # the springs of both bodies are in series
+    if "relaxation_time" in damping:
+        material.AddProperty("material", "relaxation_time", damping["relaxation_time"])
+        AddContactMaterial(point_stiffness=2.0 * stiffness, friction=friction, properties=material)
+    else:
+        AddContactMaterial(point_stiffness=2.0 * stiffness, friction=friction, properties=material, **damping)
     builder = DiagramBuilder()
     plant, _ = AddMultibodyPlantSceneGraph(builder, time_step=step)
     plant.set_contact_model(ContactModel.kPoint)
-    plant.set_discrete_contact_approximation(DiscreteContactApproximation.kTamsi)
+    plant.set_discrete_contact_approximation(getattr(DiscreteContactApproximation, solver))
     plant.set_stiction_tolerance(STICTION * (speed or 1.0))
     plant.mutable_gravity_field().set_gravity_vector([0, 0, 0])
     joints = []

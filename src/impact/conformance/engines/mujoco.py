@@ -31,25 +31,10 @@ FRICTION_TIME = 0.1
 STEPS_BEFORE, CONTACTS = 1, 3.0
 
 
-def half_time(z: float) -> float:
-    """Half of the contact time, in units of the undamped spring, of a spring and dashpot that never pull."""
-    if z == 1.0:
-        return 1.0
-    return math.acos(z) / math.sqrt(1.0 - z * z) if z < 1.0 else math.acosh(z) / math.sqrt(z * z - 1.0)
-
-
-def damping_ratio(e: float) -> float:
-    """The damping ratio z that delivers e: ln e = -2 z half_time(z)."""
-    low, high = 0.0, 1.0 / e
-    for _ in range(100):
-        z = (low + high) / 2.0
-        low, high = (z, high) if 2.0 * z * half_time(z) < -math.log(e) else (low, z)
-    return (low + high) / 2.0
-
-
 def collide(c: dict[str, Any]) -> dict[str, Any]:
     """Run a collision whose balls touch, side by side, after the first step."""
     import mujoco
+    from linear_contact import damping_ratio, half_time
 
     z = damping_ratio(c["e"])
     frequency = 2.0 * half_time(z) / c["contact_time"]

@@ -12,28 +12,13 @@ SLOWER = 4.0
 FRICTION_STEPS = 5.0
 
 
-def quarter_time(z: float) -> float:
-    """The time of the approach, in units of the undamped spring, of a spring with a dashpot."""
-    if z == 1.0:
-        return 1.0
-    return math.acos(z) / math.sqrt(1.0 - z * z) if z < 1.0 else math.acosh(z) / math.sqrt(z * z - 1.0)
-
-
-def damping_ratio(e: float) -> float:
-    """The damping ratio z that delivers e; damping acts on approach only: ln e = -z quarter_time(z)."""
-    low, high = 0.0, 1.0 / e**2
-    for _ in range(100):
-        z = (low + high) / 2.0
-        low, high = (z, high) if z * quarter_time(z) < -math.log(e) else (low, z)
-    return (low + high) / 2.0
-
-
 def collide(c: dict[str, Any]) -> dict[str, Any]:
     """Run a collision whose balls touch, side by side, after the first step."""
     from importlib.metadata import version
 
     import newton
     import warp as wp
+    from linear_contact import damping_ratio, half_time
 
     wp.config.quiet = True
     wp.set_device("cpu")
@@ -41,8 +26,9 @@ def collide(c: dict[str, Any]) -> dict[str, Any]:
     step, contact_time = SLOWER * c["dt"], SLOWER * c["contact_time"]
     masses = [1.0 / c[f"m{number}"] for number in numbers]
     turning = [c[f"R{number}"] ** 2 / c[f"inertia{number}"] for number in numbers]
-    z = damping_ratio(c["e"])
-    frequency = (quarter_time(z) + math.pi / 2.0) / contact_time
+    # its damping acts on approach only
+    z = damping_ratio(c["e"] ** 2)
+    frequency = (half_time(z) + math.pi / 2.0) / contact_time
     m, m_t = 1.0 / sum(masses), 1.0 / sum(masses + turning)
     contact = newton.ModelBuilder.ShapeConfig(
         density=0,
