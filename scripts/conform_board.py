@@ -73,6 +73,10 @@ REMARKS = {
         "SAP couples friction into the normal impulse: at a wall with μ = 0.3, e is 0.44 at 60° and 0.78 at 85°, "
         "where 0.5 is asked for. The solver TAMSI, `drake`, does not."
     ),
+    "kratos": (
+        "Where rigid balls stick, its tangential spring reverses the slip, β up to 0.28. That law is not in the "
+        "catalogue, so that rigid balls are what it is judged by. Particles are solid spheres."
+    ),
     "newton": (
         "A moment of inertia below 1e-10 kg m² is corrected by adding 1e-6 kg m²: balls of 1 mm hardly turn."
     ),

@@ -112,6 +112,12 @@ ENGINES: Mapping[str, Engine] = {
             function="collide_sap",
         ),
         Engine(
+            "kratos",
+            "Kratos DEM",
+            "KratosDEMApplication",
+            "DEM_D_Linear_viscous_Coulomb, Symplectic_Euler, YOUNG_MODULUS for the time, no rolling friction",
+        ),
+        Engine(
             "newton",
             "Newton",
             "newton",
