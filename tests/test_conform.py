@@ -8,6 +8,7 @@ import math
 import os
 import shutil
 import subprocess
+import sys
 import time
 from collections import Counter
 from collections.abc import Callable
@@ -400,6 +401,7 @@ BAD_COMMANDS = {
     ("--adapter", f"{EXAMPLES / 'rigid.py'}:collide", "--suite", "conformance-9"): 'no set "conformance-9"',
     ("--adapter", f"{EXAMPLES / 'rigid.py'}:collide", "-o", "page.pdf"): "expected a name that ends in .html",
     ("pymunk", "--program", "no_such_python"): 'no program "no_such_python"',
+    ("pymunk", "--timeout", "0"): "--timeout: got 0, expected a number of seconds > 0",
 }
 
 
@@ -497,10 +499,21 @@ def test_an_engine_answers_every_collision(name: str) -> None:
     assert not failed(board) & {"finite", "repeat", "separates"}
 
 
-def test_the_page_has_the_examples_and_names_every_check_and_engine() -> None:
+def test_the_page_has_the_examples_and_names_every_check() -> None:
     page = (ROOT / "docs" / "conform.md").read_text(encoding="utf-8")
     for name in ("rigid.py", "rigid.c"):
         assert (EXAMPLES / name).read_text(encoding="utf-8") in page
     assert f"the same {len(collisions())} impacts" in page
     named = {*CHECKS, *QUESTION_KEYS, *FACTS}
     assert [name for name in named if f"`{name}`" not in page] == []
+
+
+def test_the_page_of_the_board_is_that_of_the_stored_board() -> None:
+    sys.path.insert(0, str(ROOT / "scripts"))
+    import conform_board
+
+    board = impact.load(EXAMPLES / "board.h5")
+    assert (EXAMPLES / "board.md").read_text(encoding="utf-8") == conform_board.page(board), "run `make conform`"
+    assert {str(name).partition(",")[0] for name in board["engine"].values} == set(ENGINES)
+    fresh = impact.conform(adapter=rigid).dataset
+    assert fresh["check"].values.tolist() == board["check"].values.tolist()

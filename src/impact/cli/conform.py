@@ -19,7 +19,7 @@ from .parsing import Tolerance, parse_number, parse_tolerance, reject_duplicates
 def conform(
     engines: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[ENGINE]...", autocompletion=complete_engine, help="Engines, see --list."),
+        typer.Argument(metavar="ENGINE", autocompletion=complete_engine, help="Engines, see --list."),
     ] = None,
     adapter: Annotated[
         list[str] | None,

@@ -11,6 +11,7 @@ from tempfile import TemporaryDirectory
 
 from ..atomic import check_outputs
 from ..errors import UsageError, did_you_mean
+from ..formatting import number
 from ..reporting.page import report
 from ..results.board import CHECKS, Board, EngineChecks, board_dataset
 from ..results.schema import CHECK_STATUSES
@@ -83,6 +84,8 @@ def conform(
     adapters = [adapter] if isinstance(adapter, str) or callable(adapter) else list(adapter)
     if not names and not adapters:
         raise UsageError("expected the name of an engine, see impact conform --list, or --adapter")
+    if not timeout > 0.0:
+        raise UsageError(f"--timeout: got {number(timeout)}, expected a number of seconds > 0")
     requested = _check_tolerances(tol)
     path = None if output is None else Path(output)
     if path is not None and path.suffix.lower() not in PAGE_SUFFIXES + BOARD_SUFFIXES:
