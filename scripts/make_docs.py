@@ -147,6 +147,16 @@ The result of `impact sensitivity` has the dimensions `model`, the axes other th
 | variable | own dimension | meaning |
 |---|---|---|
 {sensitivity}
+
+## A board
+
+The result of `impact conform` ([conform.md](conform.md)) has the dimensions `engine` and `check`. Coordinates
+along `engine` are `engine_version` and `engine_kind`, along `check` the `collision` and the `criterion`; the
+attribute `suite` names the set of collisions.
+
+| variable | judged by compare relative to | meaning |
+|---|---|---|
+{board}
 """
 
 
@@ -175,6 +185,7 @@ def schema_page() -> str:
         "sensitivity": rows(
             "sensitivity study", lambda variable: (", ".join(variable.dims[2:]), variable.meaning)
         ),
+        "board": rows("board", lambda variable: (variable.scale, variable.meaning)),
     }
     on_request = ", ".join(f"`{name}`" for name, variable in SCHEMA["sweep"].items() if variable.on_request)
     rows_as_text = {name: "\n".join(lines) for name, lines in tables.items()}

@@ -17,7 +17,7 @@ FLOORS = {
     "numerics": ("ode", "contact"),
     "config": ("config",),
     "sweeps": ("engine", "progress_display", "results"),
-    "acts": ("inverse", "uncertainty", "comparison", "exporters", "plots", "reporting"),
+    "acts": ("inverse", "uncertainty", "comparison", "exporters", "plots", "reporting", "conformance"),
     # the package itself, "", hands out the public functions
     "interfaces": ("", "cli", "pytest_plugin", "__main__"),
 }
@@ -36,7 +36,7 @@ LIBRARIES = {
 # what a module of cli may import apart from public names, foundations and other modules of cli
 CLI_IMPORTS = {
     # tables of names
-    "completion": {"config", "contact", "engine", "exporters", "plots"},
+    "completion": {"config", "conformance", "contact", "engine", "exporters", "plots"},
     # formats of a verdict, and the picture of its differences
     "compare": {"comparison.formats", "plots"},
     # the executors, which have no public function

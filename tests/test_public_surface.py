@@ -70,6 +70,8 @@ COMMANDS = (
     ("info", "c.h5", "--json"),
     ("info", "u.h5", "--json"),
     ("compare", "r.h5", "r.h5", "--format", "json"),
+    ("conform", "--adapter", "rigid.py:collide", "-o", "b.h5", "--json"),
+    ("info", "b.h5", "--json"),
     ("models", "hertz", "--json"),
     ("materials", "glass", "--json"),
 )
@@ -132,6 +134,8 @@ def surface(run: Run, folder: Path) -> str:
     (folder / "config.toml").write_text(CONFIG, encoding="utf-8")
     (folder / "uncertain.toml").write_text(UNCERTAIN, encoding="utf-8")
     (folder / "fit.toml").write_text(FIT, encoding="utf-8")
+    rigid = Path(__file__).parent.parent / "docs" / "conform" / "rigid.py"
+    (folder / "rigid.py").write_text(rigid.read_text(encoding="utf-8"), encoding="utf-8")
     lines = ["# functions and classes", *functions(), "", "# options of commands", *options()]
     lines += ["", "# keys of a config", *config_keys(impact.schema())]
     for words in COMMANDS:
@@ -139,7 +143,7 @@ def surface(run: Run, folder: Path) -> str:
         assert done.returncode == 0, (words, done.stderr)
         keys = {re.sub(r"^variables\.[^.]+", "variables.*", path) for path in paths(json.loads(done.stdout))}
         lines += ["", f"# impact {' '.join(words)}", *sorted(keys)]
-    for name in ("r.h5", "c.h5", "u.h5"):
+    for name in ("r.h5", "c.h5", "u.h5", "b.h5"):
         dataset = impact.load(folder / name)
         lines += ["", f"# variables of {name}", *sorted(map(str, dataset.variables))]
         lines += [f"attribute {key}" for key in sorted(dataset.attrs)]

@@ -20,7 +20,7 @@ Find inputs: solve, calibrate, sensitivity, sensitivities
 >>> round(impact.solve("mujoco-solref", "dampratio", {"e_out": 0.6}).roots[0].value, 6)
 0.180858
 
-Simulation codes and their time steps: timestep, export, export_codes
+Simulation codes and their time steps: timestep, export, export_codes, conform, conform_engines
 
 >>> impact.export("mujoco", "mujoco-solref", at={"e": 0.6}, dt="2 ms").lines[0]
 '<option timestep="0.002" integrator="Euler"/>'
@@ -38,7 +38,7 @@ Laws and what they need: models, frictions, materials, cite, check_model, hyster
 Classes of laws: ForceModel, FrictionLaw, Parameter, Evidence
 
 Classes of results: Impact, PreparedProblem, Ranking, SolveResult, TimestepResult, Export, Estimate, Verdict,
-Models, Frictions, Citations, Environment
+Models, Frictions, Citations, Environment, Board, Engines
 
 Errors and warnings: ImpactError, ConfigError, ModelError, ResultError, StoreError, UsageError, ImpactWarning
 """
@@ -60,6 +60,8 @@ if TYPE_CHECKING:
     from .config.material_library import materials as materials
     from .config.starter import init as init
     from .config.tables import schema as schema
+    from .conformance.conform import conform as conform
+    from .conformance.registry import Engines as Engines, conform_engines as conform_engines
     from .contact.checks import check_model as check_model
     from .contact.evidence import Evidence as Evidence
     from .contact.friction import FrictionLaw as FrictionLaw
@@ -88,6 +90,7 @@ if TYPE_CHECKING:
     from .plots.files import plot_to_files as plot_to_files
     from .progress_display import progress_bar as progress_bar
     from .reporting.page import report as report
+    from .results.board import Board as Board
     from .results.citations import Citations as Citations, cite as cite
     from .results.describe import describe as describe
     from .results.estimate import Estimate as Estimate, estimate as estimate
@@ -102,8 +105,10 @@ if TYPE_CHECKING:
 
 # the module of each public name, which is imported on first use: `import impact` and `impact --help` need no numpy
 _MODULES = {
+    "Board": "results.board",
     "Citations": "results.citations",
     "ConfigError": "errors",
+    "Engines": "conformance.registry",
     "Environment": "exporters.environment",
     "Estimate": "results.estimate",
     "Evidence": "contact.evidence",
@@ -130,6 +135,8 @@ _MODULES = {
     "check_model": "contact.checks",
     "cite": "results.citations",
     "compare": "comparison.compare",
+    "conform": "conformance.conform",
+    "conform_engines": "conformance.registry",
     "describe": "results.describe",
     "doctor": "exporters.environment",
     "estimate": "results.estimate",

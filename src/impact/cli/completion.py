@@ -31,6 +31,13 @@ def complete_family(incomplete: str) -> list[str]:
     return _beginning_with(incomplete, FAMILIES)
 
 
+def complete_engine(incomplete: str) -> list[str]:
+    """The engines that the program has adapters for."""
+    from ..conformance.registry import ENGINES
+
+    return _beginning_with(incomplete, ENGINES)
+
+
 def complete_code(incomplete: str) -> list[str]:
     """The codes to which laws are exported."""
     from ..exporters.registry import CODES

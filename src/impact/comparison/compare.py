@@ -20,6 +20,7 @@ from ..results.replay_command import command_start
 from ..results.schema import MODEL_METADATA, SCHEMA, SCHEMA_VERSION, is_case
 from ..results.xarray_backend import load
 from .align import LAW_DIMS, MODEL_COORDINATES, Alignment, align_sweeps
+from .boards import align_boards, version_notes
 from .calibrations import align_calibrations, fit_notes
 from .tolerances import ALL_VARIABLES, Tolerances, calibration_tolerances, effective_tolerances
 from .values import compare_values, group_size, representative_regions
@@ -35,7 +36,8 @@ def compare(
 ) -> Verdict:
     """Compare a result with a baseline, each variable as docs/schema.md states, at points of equal labels.
 
-    Two calibrations are compared law by law, see docs/calibrate.md.
+    Two calibrations are compared law by law, see docs/calibrate.md, and two boards check by check, see
+    docs/conform.md.
 
     Values are equal if |new - baseline| <= tolerance x scale, where the scale is that of the baseline's point.
     NaNs are equal if both points have the same status and that status explains them, or if the law lacks the
@@ -73,12 +75,15 @@ def compare(
     files = [str(source) if isinstance(source, str | Path) else "" for source in (new, baseline)]
     names = files[0] or "NEW", files[1] or "BASELINE"
     a, b = (load(source) if isinstance(source, str | Path) else source for source in (new, baseline))
-    if is_calibration(a) and is_calibration(b):
+    repeats: tuple[str, ...] = ()
+    is_study = kind_of(a) == kind_of(b) and kind_of(b) in ("calibration", "board")
+    if is_study:
         tolerances = calibration_tolerances(tol)
-        aligned = align_calibrations(a, b, subset=subset)
+        align = align_calibrations if is_calibration(b) else align_boards
+        aligned = align(a, b, subset=subset)
         faults = [*aligned.faults]
-        notes = [*_attribute_notes(a.attrs, b.attrs, {"rtol": None, "impact_version": None}), *fit_notes(a, b)]
-        repeats: tuple[str, ...] = ()
+        notes = _attribute_notes(a.attrs, b.attrs, {"rtol": None, "impact_version": None})
+        notes += fit_notes(a, b) if is_calibration(b) else version_notes(a, b)
     else:
         for dataset, name in zip((a, b), names, strict=True):
             check_comparable(dataset, name)
@@ -113,7 +118,7 @@ def compare(
         notes=tuple(notes),
         repeats=repeats,
         worst_along={}
-        if is_calibration(b)
+        if is_study
         else _along_axes({name: ratios for name, (_, ratios) in compared.items()}, aligned.baseline.coords),
     )
 

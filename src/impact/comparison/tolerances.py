@@ -51,7 +51,7 @@ def effective_tolerances(tol: float | Tolerances | None, attributes: Mapping[str
 
 
 def calibration_tolerances(tol: float | Tolerances | None) -> dict[str, float]:
-    """Choose the tolerance of all variables of a calibration, relative to their scales."""
+    """Choose the tolerance of all variables of a calibration or a board, relative to their scales."""
     requested = _by_variable(tol)
     for name, value in requested.items():
         if name != ALL_VARIABLES:

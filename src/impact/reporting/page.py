@@ -1,6 +1,6 @@
 """The report: a result as one page of HTML, without network access or scripts; texts of a file are escaped.
 
-`page.html.j2` is the template; this module gives it plain values.
+`page.html.j2` is the template, `board.html.j2` that of a board; this module gives them plain values.
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ from ..errors import UsageError
 from ..formatting import label, number, safe_text, with_year
 from ..plots.slices import unit_of, varying_inputs
 from ..results.attributes import read_attribute
+from ..results.board import BOARD_HEADINGS, Board, board_rows, check_rows, engine_headline, failure_lines
 from ..results.calibration import (
     FIT_HEADINGS,
     calibration_title,
@@ -35,7 +36,7 @@ from ..results.calibration import (
     fit_notes,
     fit_rows,
 )
-from ..results.kinds import is_calibration, is_sensitivity
+from ..results.kinds import is_board, is_calibration, is_sensitivity
 from ..results.plausibility import input_notes, inputs_of, result_notes, with_depths
 from ..results.ranking import DEFAULT_TOL, Ranking, rank_models, rankable_parts
 from ..results.replay_command import describe_point
@@ -94,6 +95,8 @@ def report(
 
 def page(dataset: xr.Dataset, plugins: Sequence[ForceModel | str | Path] = ()) -> str:
     """Write a result as one page of HTML; for errors see `report`."""
+    if is_board(dataset):
+        return _board_page(dataset)
     if "model" not in dataset.dims:
         raise UsageError("got a time history, expected the result of a sweep")
     summary = with_depths(summarize(dataset, MAX_FAILED), dataset)
@@ -110,7 +113,7 @@ def page(dataset: xr.Dataset, plugins: Sequence[ForceModel | str | Path] = ()) -
     models = [_model_section(dataset.isel(model=index)) for index in range(dataset.sizes["model"])]
     inputs = inputs_of(dataset)
     lines = str(dataset.attrs.get("config", "")).replace("\r\n", "\n").expandtabs(4).split("\n")
-    return _template().render(
+    return _template("page.html.j2").render(
         title=_title(dataset),
         summary=f"{describe_data(dataset)}." if fits else "" if studies else _summary_sentence(dataset),
         fits=fits,
@@ -133,6 +136,28 @@ def page(dataset: xr.Dataset, plugins: Sequence[ForceModel | str | Path] = ()) -
         evidence=[*(row for model in models for row in model["evidence"]), *_friction_evidence(dataset)],
         config=Markup("\n").join(safe_text(line, MAX_LINE_LETTERS) for line in lines),
         changes=read_attribute(dataset.attrs, "config_set"),
+    )
+
+
+def _board_page(dataset: xr.Dataset) -> str:
+    """Write a board as one page of HTML."""
+    board = Board(dataset)
+    engines = board.engines
+    return _template("board.html.j2").render(
+        title=_title(dataset),
+        names=[engine["engine"] for engine in engines],
+        rows=board_rows(engines),
+        headings=list(BOARD_HEADINGS),
+        engines=[
+            {
+                "name": f"{engine['engine']} {engine['version']}",
+                "headline": f"{engine_headline(engine)}.",
+                "rows": check_rows(engine),
+                "lines": failure_lines(engine),
+            }
+            for engine in engines
+        ],
+        facts=_facts(dataset),
     )
 
 
@@ -164,8 +189,8 @@ def _studies(dataset: xr.Dataset) -> Iterator[dict[str, Any]]:
         }
 
 
-def _template() -> Template:
-    """Load the template of the page, which escapes all values."""
+def _template(name: str) -> Template:
+    """Load a template, which escapes all values."""
 
     def text(value: object) -> str:
         return value if isinstance(value, Markup) else safe_text(str(value), MAX_TEXT_LETTERS)
@@ -179,7 +204,7 @@ def _template() -> Template:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    return environment.get_template("page.html.j2")
+    return environment.get_template(name)
 
 
 def _summary_sentence(dataset: xr.Dataset) -> str:

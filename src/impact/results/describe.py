@@ -1,4 +1,4 @@
-"""What a calibration, a sensitivity study or a law says: its text, its tables and its plain data."""
+"""What a calibration, a sensitivity study, a board or a law says: its text, its tables and its plain data."""
 
 from __future__ import annotations
 
@@ -18,7 +18,8 @@ from ..engine.model_catalogue import ModelDescription
 from ..errors import UsageError
 from . import calibration, sensitivity
 from .attributes import read_attribute
-from .kinds import is_calibration, is_sensitivity
+from .board import Board
+from .kinds import is_board, is_calibration, is_sensitivity
 from .replay_command import describe_point
 from .xarray_backend import result_of
 
@@ -127,8 +128,8 @@ class Studies(Displayed):
 
 def describe(
     item: xr.Dataset | str | Path | ForceModel | FrictionLaw,
-) -> Fits | Studies | ModelDescription | FrictionDescription:
-    """Describe a calibration, a sensitivity study or a law, as its command prints it and a notebook shows it.
+) -> Fits | Studies | Board | ModelDescription | FrictionDescription:
+    """Describe a calibration, a sensitivity study, a board or a law, as its command prints it and a notebook does.
 
     Raises
     ------
@@ -152,4 +153,6 @@ def describe(
         return Fits(result)
     if is_sensitivity(result):
         return Studies(result)
-    raise UsageError("expected the result of a calibration or of a sensitivity study")
+    if is_board(result):
+        return Board(result)
+    raise UsageError("expected the result of a calibration, of a sensitivity study, or a board")

@@ -1,4 +1,4 @@
-"""What a dataset is: the result of a sweep, a calibration or a sensitivity study, or a time history."""
+"""What a dataset is: the result of a sweep, a calibration, a sensitivity study, a board, or a time history."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import xarray as xr
 
 from ..errors import UsageError
 
-Kind = Literal["sweep", "history", "calibration", "sensitivity study"]
+Kind = Literal["sweep", "history", "calibration", "sensitivity study", "board"]
 
 
 def kind_of(dataset: xr.Dataset) -> Kind:
@@ -17,6 +17,8 @@ def kind_of(dataset: xr.Dataset) -> Kind:
         return "history"
     if "parameter" in dataset.dims:
         return "calibration"
+    if "check" in dataset.dims:
+        return "board"
     return "sensitivity study" if "input" in dataset.dims else "sweep"
 
 
@@ -30,6 +32,11 @@ def is_sensitivity(dataset: xr.Dataset) -> bool:
     return kind_of(dataset) == "sensitivity study"
 
 
+def is_board(dataset: xr.Dataset) -> bool:
+    """Whether a dataset is the board of `impact conform`."""
+    return kind_of(dataset) == "board"
+
+
 def has_fixed_steps(dataset: xr.Dataset) -> bool:
     """Whether the points of a dataset are collisions at a fixed step; results of the continuous law do not say."""
     return "integrator" in dataset.attrs
@@ -38,5 +45,5 @@ def has_fixed_steps(dataset: xr.Dataset) -> bool:
 def require_sweep(dataset: xr.Dataset, command: str) -> None:
     """Raise a UsageError where a command takes the result of a sweep, and got that of another command."""
     kind = kind_of(dataset)
-    if kind in ("calibration", "sensitivity study"):
+    if kind in ("calibration", "sensitivity study", "board"):
         raise UsageError(f"{command}: this is a {kind}, expected the result of a sweep")

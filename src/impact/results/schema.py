@@ -132,12 +132,27 @@ SENSITIVITY = by_name(
     Variable("quantiles", "quantiles of the output", (*_STUDIES, "quantile"), "output"),
     Variable("failed", "points without a result; with any there is no mean and no index", dtype="i8"),
 )
+# what became of a check
+CHECK_STATUSES = {"pass": 0, "fail": 1, "not_supported": 2}
+_CHECKS = ("engine", "check")
+BOARD = by_name(
+    Variable("asked", "what the check asks for", _CHECKS, scale="reported"),
+    Variable(
+        "delivered",
+        "what the engine delivered; NaN where it does not support the collision",
+        _CHECKS,
+        scale="max(1, itself)",
+    ),
+    Variable("tolerance", "tolerance of the check", _CHECKS, scale="exact"),
+    Variable("check_status", "outcome of the check", _CHECKS, scale="exact", dtype="i1", flags=CHECK_STATUSES),
+)
 # the variables of each kind of dataset, by name
 SCHEMA: Mapping[Kind, Mapping[str, Variable]] = {
     "sweep": OUTPUTS,
     "history": HISTORY,
     "calibration": CALIBRATION,
     "sensitivity study": SENSITIVITY,
+    "board": BOARD,
 }
 # coordinates of studies besides those of models and inputs, with their dimensions; the first is the study's axis
 STUDY_COORDINATES: Mapping[Kind, Mapping[str, str]] = {
@@ -147,6 +162,10 @@ STUDY_COORDINATES: Mapping[Kind, Mapping[str, str]] = {
         "determined": "model",
     },
     "sensitivity study": {"input": "input", "quantile": "quantile"},
+    "board": {
+        **dict.fromkeys(("check", "collision", "criterion"), "check"),
+        **dict.fromkeys(("engine", "engine_version", "engine_kind"), "engine"),
+    },
 }
 CALIBRATION_TEXTS = ("parameter", "other_parameter", "output_name", "output", "determined", "specimen")
 

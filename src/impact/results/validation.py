@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 import xarray as xr
@@ -20,13 +20,21 @@ from ..contact.variables import AXES, OUTPUTS
 from ..errors import ResultError
 from ..formatting import safe_text
 from .attributes import ATTRIBUTE_TYPES, read_attribute
-from .kinds import kind_of
-from .schema import CALIBRATION_TEXTS, FIT_STATUSES, MODEL_METADATA, SCHEMA, STUDY_COORDINATES, is_case
+from .kinds import Kind, kind_of
+from .schema import (
+    CALIBRATION_TEXTS,
+    CHECK_STATUSES,
+    FIT_STATUSES,
+    MODEL_METADATA,
+    SCHEMA,
+    STUDY_COORDINATES,
+    is_case,
+)
 from .slabs import VARIES_ALONG, is_lazy, slabs
 
 TEXT_COORDINATES = frozenset(
     {"model", "friction", *MODEL_METADATA, *MATERIAL_KEYS, *CALIBRATION_TEXTS, "input"} - {"year"}
-)
+).union(STUDY_COORDINATES["board"])
 # the trajectory table of a factored file, see `impact.results.factored`
 TABLE_VARIABLES = frozenset(
     {
@@ -72,6 +80,7 @@ def is_quantity(name: str, axes: tuple[str, ...]) -> bool:
 # required attributes of a result: text, in part JSON, and numbers
 TEXT_ATTRIBUTES = ("title", "config", "config_set", "fingerprint", "impact_version", "packages", "plugins")
 NUMBER_ATTRIBUTES = ("rtol", "max_steps")
+BOARD_ATTRIBUTES = ("title", "suite", "impact_version", "packages")
 CALIBRATION_ATTRIBUTES = ("noise", "data_file", "varied", "fit_paths", "fit_bounds")
 # attributes of factored files, which a dataset does not have
 FACTORED_ATTRIBUTES = ("laws", "axes", "summary", "pairs", "frictions")
@@ -86,7 +95,7 @@ def schema_violation(dataset: xr.Dataset) -> str | None:
         _axis_violations,
         _type_violations,
         _attribute_violations,
-        _history_violations if kind_of(dataset) == "history" else _result_violations,
+        FORM_VIOLATIONS.get(kind_of(dataset), _result_violations),
         _study_violations,
     )
     return next((safe_text(fault) for check in checks for fault in check(dataset)), None)
@@ -161,6 +170,16 @@ def _result_violations(dataset: xr.Dataset) -> Iterator[str]:
             yield f"no {key}, or not as a number"
 
 
+def _board_violations(dataset: xr.Dataset) -> Iterator[str]:
+    """What every board has: unique labels, known statuses and attributes."""
+    for name in ("engine", "check"):
+        if name in dataset.dims and not dataset.indexes[name].is_unique:
+            yield f"{name}: a label occurs twice"
+    if "check_status" in dataset and not np.isin(dataset["check_status"], [*CHECK_STATUSES.values()]).all():
+        yield "check_status: got a number that is no outcome of a check"
+    yield from _missing_texts(dataset, BOARD_ATTRIBUTES)
+
+
 def _missing_texts(dataset: xr.Dataset, keys: Iterable[str]) -> Iterator[str]:
     """Attributes that are missing or not text."""
     for key in keys:
@@ -179,7 +198,8 @@ def _study_violations(dataset: xr.Dataset) -> Iterator[str]:
         return
     # what a study may lack
     absent = {"specimen"} | (set() if dataset.attrs.get("varied") else {"grid", "output_name"})
-    points = dataset["mean"].dims if "mean" in dataset else ("model",)
+    points: tuple[Hashable, ...] = () if kind == "board" else ("model",)
+    points = dataset["mean"].dims if "mean" in dataset else points
     for name, variable in SCHEMA[kind].items():
         if absent & {*variable.dims} or (variable.is_new and name not in dataset):
             continue
@@ -190,7 +210,10 @@ def _study_violations(dataset: xr.Dataset) -> Iterator[str]:
     for name, dim in STUDY_COORDINATES[kind].items():
         if name not in absent and (name not in dataset.coords or dataset[name].dims != (dim,)):
             yield f"{name}: expected a coordinate along {dim}"
-    yield from _calibration_violations(dataset) if kind == "calibration" else _sensitivity_violations(dataset)
+    if kind == "calibration":
+        yield from _calibration_violations(dataset)
+    elif kind == "sensitivity study":
+        yield from _sensitivity_violations(dataset)
 
 
 def _calibration_violations(dataset: xr.Dataset) -> Iterator[str]:
@@ -208,6 +231,13 @@ def _sensitivity_violations(dataset: xr.Dataset) -> Iterator[str]:
         yield "of: expected the name of an output"
     if not read_attribute(dataset.attrs, "design"):
         yield "no design"
+
+
+# what a dataset has that is not the result of a sweep, or of a study that has its coordinates
+FORM_VIOLATIONS: Mapping[Kind, Callable[[xr.Dataset], Iterator[str]]] = {
+    "history": _history_violations,
+    "board": _board_violations,
+}
 
 
 def _has_unknown_status(status: xr.DataArray, known: Sequence[int]) -> bool:

@@ -1,0 +1,87 @@
+"""The command `conform`: does an engine deliver what is asked of it?"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+import impact
+
+from ..display import show
+from . import exits
+from .completion import complete_engine
+from .options import JsonOption, OverwriteOption
+from .parsing import Tolerance, parse_number, parse_tolerance, reject_duplicates
+
+
+def conform(
+    engines: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="ENGINE", autocompletion=complete_engine, help="Engines, see --list."),
+    ] = None,
+    adapter: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--adapter",
+            metavar="WORDS",
+            help='An adapter of an engine, FILE.py:FUNCTION or "PROGRAM ARGUMENTS"; may be repeated.',
+        ),
+    ] = None,
+    suite: Annotated[
+        str, typer.Option("--suite", metavar="NAME", help="The set of collisions.")
+    ] = "conformance-1",
+    only: Annotated[
+        list[str] | None,
+        typer.Option("--only", metavar="ID", help="Judge only this collision; may be repeated."),
+    ] = None,
+    tol: Annotated[
+        list[Tolerance] | None,
+        typer.Option(
+            "--tol",
+            metavar="[CHECK=]VALUE",
+            parser=parse_tolerance,
+            callback=reject_duplicates,
+            help="Tolerance of all checks or of one, such as momentum=1e-6 or 5%; may be repeated.",
+        ),
+    ] = None,
+    timeout: Annotated[
+        float,
+        typer.Option("--timeout", metavar="SECONDS", parser=parse_number, help="Time for an answer \\[s]."),
+    ] = 60.0,
+    program: Annotated[
+        str | None,
+        typer.Option("--program", metavar="FILE", help="A Python that has the package of the engine."),
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="A page (.html), or a board that impact compare reads (.h5)."),
+    ] = None,
+    overwrite: OverwriteOption = False,
+    show_engines: Annotated[bool, typer.Option("--list", help="List the engines.")] = False,
+    as_json: JsonOption = False,
+) -> int:
+    """Run a fixed set of impacts in an engine, and judge its answers: momentum, energy, restitution, friction.
+
+    Exit 0 if no check failed, 1 if one did, 2 if the engine cannot be run. Several engines make one board.
+    """
+    if show_engines:
+        show(impact.conform_engines(program), as_json=as_json)
+        return exits.EXIT_OK
+    board = impact.conform(
+        engines or (),
+        adapter=adapter or (),
+        suite=suite,
+        only=only or (),
+        tol=dict(tol or ()) or None,
+        timeout=timeout,
+        program=program,
+        output=output,
+        overwrite=overwrite,
+    )
+    with exits.ignore_broken_pipe():
+        show(board, as_json=as_json)
+    if output is not None:
+        exits.print_line(f"{output}: written")
+    return exits.EXIT_OK if board.passed else exits.EXIT_NOT_EQUAL

@@ -1,0 +1,263 @@
+"""Adapters: what turns a collision of a set into an answer, a function or a program that speaks lines of JSON.
+
+A Python function of a file is run by `serve.py` in a process of its own, so that it can neither hang nor end this
+one.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import select
+import shlex
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, SupportsFloat
+
+from ..contact.frictions import frictions
+from ..contact.models import catalogue
+from ..errors import UsageError, did_you_mean
+from ..exporters.programs import KEPT_OUTPUT_BYTES, MAX_OUTPUT_BYTES, POLL_INTERVAL_S, find_program
+from ..formatting import number, safe_text
+from .checks import KIND_TOLERANCES, Answer, Kind, balls_of
+from .suite import Question
+
+DEFAULT_TIMEOUT_S = 60.0
+# what an adapter may state about its engine, as text
+FACTS = ("engine", "version", "kind", "precision", "law", "model")
+# the contact force where an adapter names a friction law only: a linear spring with a dashpot
+DEFAULT_MODEL = "anagnostopoulos-1988"
+# the longest line of an answer
+MAX_LINE_BYTES = 2**16
+SERVE = Path(__file__).with_name("serve.py")
+PYTHON_FUNCTION = re.compile(r".+\.py:[^\W\d]\w*")
+# how C and C++ print what is no number, which JSON does not have
+NOT_A_NUMBER = re.compile(r"(?<=[:\s,])[-+]?(nan|inf)[a-z0-9()]*(?=\s*[,}])", re.IGNORECASE)
+
+Ask = Callable[[Question], object]
+
+
+@dataclass(frozen=True)
+class Facts:
+    """What an adapter states about its engine in its first answer.
+
+    Parameters
+    ----------
+    engine, version : "" where it does not say
+    kind : whether it solves impulses or has a compliant contact
+    is_float32 : it computes in single precision
+    law, model, parameters : key of the friction law that it has, that of its contact force, and the parameters of
+        the friction law; "" for rigid friction
+    """
+
+    engine: str = ""
+    version: str = ""
+    kind: Kind = "impulse"
+    is_float32: bool = False
+    law: str = ""
+    model: str = ""
+    parameters: Mapping[str, float | str] = field(default_factory=dict)
+
+
+class AdapterError(UsageError):
+    """An adapter does not answer as the protocol says."""
+
+
+@contextmanager
+def open_adapter(adapter: object, timeout_s: float, folder: str | None = None) -> Iterator[Ask]:
+    """Start an adapter, and yield the function that asks it.
+
+    Parameters
+    ----------
+    adapter : a function, `FILE.py:FUNCTION`, a command line, or the words of one
+    timeout_s : time that it has for an answer [s]; that of a function which is passed as such is not limited
+    folder : where it runs; by default the working directory
+    """
+    if callable(adapter):
+        yield adapter
+        return
+    words = _command(adapter)
+    with tempfile.TemporaryFile() as errors:
+        try:
+            process = subprocess.Popen(
+                words,
+                cwd=folder,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=errors,
+                start_new_session=True,
+            )
+        except OSError as error:
+            raise AdapterError(f"--adapter: {words[0]}: {error.strerror}") from None
+        try:
+            yield _Conversation(process, errors.fileno(), timeout_s).ask
+        finally:
+            for pipe in (process.stdin, process.stdout):
+                assert pipe is not None
+                with suppress(BrokenPipeError):
+                    pipe.close()
+            with suppress(ProcessLookupError):
+                # also what a wrapper has started
+                os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+
+
+def _command(adapter: object) -> list[str]:
+    """Make the words of the command of an adapter."""
+    if isinstance(adapter, str) and PYTHON_FUNCTION.fullmatch(adapter):
+        path, _, name = adapter.rpartition(":")
+        # it may also be the last word of a command
+        if " " not in path or Path(path).is_file():
+            return python_command(sys.executable, Path(path), name)
+    if not isinstance(adapter, str | Sequence) or not adapter:
+        raise UsageError(f'--adapter: got {adapter!r}, expected FILE.py:FUNCTION or "PROGRAM ARGUMENTS"')
+    try:
+        words = shlex.split(adapter) if isinstance(adapter, str) else [str(word) for word in adapter]
+    except ValueError as error:
+        raise UsageError(f"--adapter: {adapter}: {error}") from None
+    program = find_program(words[0], None)
+    if program is None:
+        raise UsageError(f'--adapter: no program "{words[0]}"; expected FILE.py:FUNCTION or "PROGRAM ARGUMENTS"')
+    return [program, *words[1:]]
+
+
+def python_command(python: str, path: Path, name: str) -> list[str]:
+    """Make the command that runs a function of a Python file as an adapter."""
+    if not path.is_file():
+        raise UsageError(f"--adapter: {path}: {'is no file' if path.exists() else 'does not exist'}")
+    return [python, str(SERVE), f"{path.absolute()}:{name}"]
+
+
+@dataclass
+class _Conversation:
+    """A program that gets a line on stdin for each line on its stdout."""
+
+    process: subprocess.Popen[bytes]
+    errors: int
+    timeout_s: float
+    received: bytes = b""
+
+    def ask(self, question: Question) -> object:
+        """Send a question, and wait for the line with the answer."""
+        assert self.process.stdin is not None
+        name = f"collision {question['id']}"
+        try:
+            self.process.stdin.write(json.dumps(question).encode() + b"\n")
+            self.process.stdin.flush()
+        except BrokenPipeError:
+            raise self._ended(name) from None
+        line = self._read_line(name)
+        try:
+            text = line.decode()
+            try:
+                return json.loads(text)
+            except ValueError:
+                return json.loads(NOT_A_NUMBER.sub(_python_number, text))
+        except ValueError:
+            shown = safe_text(line.decode(errors="replace"), 80)
+            raise AdapterError(f'--adapter: {name}: got "{shown}", expected one line of JSON on stdout') from None
+
+    def _read_line(self, name: str) -> bytes:
+        assert self.process.stdout is not None
+        deadline, descriptor = time.monotonic() + self.timeout_s, self.process.stdout.fileno()
+        while b"\n" not in self.received:
+            if time.monotonic() > deadline:
+                raise AdapterError(f"--adapter: {name}: no answer after {number(self.timeout_s)} s (--timeout)")
+            if len(self.received) > MAX_LINE_BYTES:
+                raise AdapterError(f"--adapter: {name}: a line of more than {MAX_LINE_BYTES >> 10} KiB")
+            if os.fstat(self.errors).st_size > MAX_OUTPUT_BYTES:
+                raise AdapterError(f"--adapter: {name}: more than {MAX_OUTPUT_BYTES >> 20} MiB on stderr")
+            if select.select([descriptor], [], [], POLL_INTERVAL_S)[0]:
+                content = os.read(descriptor, MAX_LINE_BYTES)
+                if not content:
+                    raise self._ended(name)
+                self.received += content
+        line, _, self.received = self.received.partition(b"\n")
+        return line
+
+    def _ended(self, name: str) -> AdapterError:
+        """Describe how the program ended, with the last line that it printed on stderr."""
+        try:
+            code = f"exit code {self.process.wait(self.timeout_s)}"
+        except subprocess.TimeoutExpired:
+            code = "its stdout closed"
+        size = os.fstat(self.errors).st_size
+        kept = os.pread(self.errors, KEPT_OUTPUT_BYTES, max(0, size - KEPT_OUTPUT_BYTES))
+        lines = kept.decode(errors="replace").strip().splitlines()
+        last = f": {safe_text(lines[-1])}" if lines else ""
+        return AdapterError(f"--adapter: {name}: the adapter ended with {code}{last}")
+
+
+def _python_number(match: re.Match[str]) -> str:
+    if match[1].lower() == "nan":
+        return "NaN"
+    return "-Infinity" if match[0].startswith("-") else "Infinity"
+
+
+def read_answer(question: Question, answer: object) -> Answer | None:
+    """Read the velocities and spins of an answer; None where the engine does not support the collision.
+
+    A null is not a number; values of a wall are ignored.
+
+    Raises
+    ------
+    AdapterError : it is no answer to the question
+    """
+    name = f"--adapter: collision {question['id']}"
+    if not isinstance(answer, Mapping):
+        raise AdapterError(f"{name}: got {_shown(answer)}, expected an object of JSON")
+    if answer.get("id") != question["id"]:
+        raise AdapterError(f"{name}: got an answer to {_shown(answer.get('id'))}")
+    if answer.get("error") is not None:
+        return None
+    values = {}
+    for key in (f"{quantity}{ball}" for quantity in ("v", "u", "omega") for ball in balls_of(question)):
+        if key not in answer:
+            raise AdapterError(f"{name}: the answer has no {key}")
+        value = answer[key]
+        if isinstance(value, str | bool) or not isinstance(value, SupportsFloat | None):
+            raise AdapterError(f"{name}: {key}: got {_shown(value)}, expected a number")
+        values[key] = float("nan") if value is None else float(value)
+    return values
+
+
+def read_facts(answer: Any) -> Facts:
+    """Read what the first answer states about the engine."""
+    facts = {key: answer.get(key, "") for key in FACTS}
+    for key, value in facts.items():
+        if not isinstance(value, str):
+            raise AdapterError(f"--adapter: {key}: got {_shown(value)}, expected text")
+    kind: Kind = "compliant" if facts["kind"] == "compliant" else "impulse"
+    if facts["kind"] not in ("", *KIND_TOLERANCES):
+        raise AdapterError(f"--adapter: kind: got {_shown(facts['kind'])}, expected impulse or compliant")
+    if facts["precision"] not in ("", "float32", "float64"):
+        raise AdapterError(f"--adapter: precision: got {_shown(facts['precision'])}, expected float32 or float64")
+    law, parameters = facts["law"], answer.get("parameters") or {}
+    if law and law not in frictions():
+        raise AdapterError(f'--adapter: law: no friction law "{law}"; {did_you_mean(law, list(frictions()))}')
+    model = facts["model"] or DEFAULT_MODEL
+    if model not in catalogue():
+        raise AdapterError(f'--adapter: model: no law "{model}"; {did_you_mean(model, list(catalogue()))}')
+    if not isinstance(parameters, Mapping):
+        raise AdapterError(f"--adapter: parameters: got {_shown(parameters)}, expected an object of JSON")
+    return Facts(
+        engine=safe_text(facts["engine"], 60),
+        version=safe_text(facts["version"], 60),
+        kind=kind,
+        is_float32=facts["precision"] == "float32",
+        law=law,
+        model=model,
+        parameters=dict(parameters),
+    )
+
+
+def _shown(value: object) -> str:
+    return safe_text(repr(value), 60)

@@ -1,0 +1,221 @@
+"""Ask an engine the collisions of a set, and judge its answers."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from ..atomic import check_outputs
+from ..errors import UsageError, did_you_mean
+from ..formatting import number
+from ..reporting.page import report
+from ..results.board import CHECKS, Board, EngineChecks, board_dataset
+from ..results.schema import CHECK_STATUSES
+from ..results.xarray_backend import save
+from .adapters import DEFAULT_TIMEOUT_S, Ask, Facts, open_adapter, read_answer, read_facts
+from .checks import (
+    EXACT,
+    OF_AN_ANSWER,
+    Answer,
+    Delivered,
+    Rebound,
+    checks_of,
+    friction,
+    passes,
+    related,
+    repeat,
+    step,
+    tolerances,
+)
+from .friction_laws import betas_of_law
+from .registry import find_engine
+from .suite import ANSWER_KEYS, DEFAULT_SUITE, Question, Trial, read_suite
+
+PAGE_SUFFIXES, BOARD_SUFFIXES = (".html", ".htm"), (".h5", ".hdf5", ".nc")
+
+
+def conform(
+    engine: str | Sequence[str] = (),
+    *,
+    adapter: str | Callable[[Question], object] | Sequence[str | Callable[[Question], object]] = (),
+    suite: str = DEFAULT_SUITE,
+    only: str | Sequence[str] = (),
+    tol: float | Mapping[str, float] | None = None,
+    timeout: float = DEFAULT_TIMEOUT_S,
+    program: str | None = None,
+    output: str | Path | None = None,
+    overwrite: bool = False,
+) -> Board:
+    """Run a fixed set of impacts of two balls in engines, and judge each answer.
+
+    Parameters
+    ----------
+    engine : names of engines that the program has adapters for, see `impact conform --list`
+    adapter : adapters of other engines: `FILE.py:FUNCTION`, the command line of a program, or a function; see
+        docs/conform.md for the protocol
+    suite : name of the set
+    only : ids of collisions to judge; by default all. Those from which they follow are asked as well
+    tol : tolerance of all checks, or by name, "all" for the others
+    timeout : time that an adapter has for an answer [s]
+    program : the Python interpreter that has the packages of engines; by default this one
+    output : file to write as well, a page (.html) or a sealed file (.h5)
+    overwrite : replace the output if it exists
+
+    Returns
+    -------
+    Board : the checks; `board.passed` is whether none failed
+
+    Raises
+    ------
+    UsageError : an engine is not installed, or an adapter does not answer as the protocol says
+
+    >>> import impact
+    >>> def ghost(collision):
+    ...     return collision  # the balls go through each other
+    >>> board = impact.conform(adapter=ghost, only="normal-e50-middle-equal")
+    >>> [check["check"] for check in board.as_dict()["checks"] if check["status"] == "fail"]
+    ['separates', 'restitution']
+    """
+    names = [engine] if isinstance(engine, str) else list(engine)
+    adapters = [adapter] if isinstance(adapter, str) or callable(adapter) else list(adapter)
+    if not names and not adapters:
+        raise UsageError("expected the name of an engine, see impact conform --list, or --adapter")
+    if not timeout > 0.0:
+        raise UsageError(f"--timeout: got {number(timeout)}, expected a number of seconds > 0")
+    requested = _check_tolerances(tol)
+    path = None if output is None else Path(output)
+    if path is not None and path.suffix.lower() not in PAGE_SUFFIXES + BOARD_SUFFIXES:
+        raise UsageError(f"{path}: expected a name that ends in .html, for a page, or in .h5")
+    check_outputs([path], [], overwrite=overwrite)
+    trials = read_suite(suite)
+    judged = _selected(trials, [only] if isinstance(only, str) else only)
+    commands: list[tuple[str, object]] = [(name, find_engine(name).command(program)) for name in names]
+    commands += [(_adapter_name(word), word) for word in adapters]
+    engines: list[EngineChecks] = []
+    for position, (name, command) in enumerate(commands):
+        with ExitStack() as stack:
+            # engines of the package may leave files where they run
+            folder = stack.enter_context(TemporaryDirectory(prefix="impact-")) if position < len(names) else None
+            ask = stack.enter_context(open_adapter(command, timeout, folder))
+            facts, answers, again = _ask_all(ask, trials, judged)
+        # an engine with a law of its own is named by the adapter
+        facts = replace(facts, engine=_unique(facts.engine or name, [engine.engine for engine in engines]))
+        engines.append(_judge(facts, trials, judged, answers, again, requested))
+    labels = [(trial.id, name) for trial in judged for name in checks_of(trial, trials)]
+    board = Board(board_dataset(suite, labels, engines))
+    if path is not None and path.suffix.lower() in PAGE_SUFFIXES:
+        report(board.dataset, output=path, overwrite=overwrite)
+    elif path is not None:
+        save(board.dataset, path, overwrite=overwrite)
+    return board
+
+
+def _check_tolerances(tol: float | Mapping[str, float] | None) -> dict[str, float]:
+    """Return tolerances by check, "all" for the others."""
+    requested = dict(tol) if isinstance(tol, Mapping) else {} if tol is None else {"all": tol}
+    known = ["all", *(name for name in CHECKS if name not in EXACT)]
+    for name, value in requested.items():
+        if name not in known:
+            raise UsageError(f"--tol {name}: not a check with a tolerance; {did_you_mean(str(name), known)}")
+        if not 0.0 <= value < float("inf"):
+            raise UsageError(f"--tol {name}={value}: expected a number >= 0, such as --tol {name}=1e-6")
+    return {name: float(value) for name, value in requested.items()}
+
+
+def _selected(trials: Mapping[str, Trial], only: Sequence[str]) -> list[Trial]:
+    """Choose the collisions to judge."""
+    for name in only:
+        if name not in trials:
+            raise UsageError(f'--only: no collision "{name}"; {did_you_mean(name, list(trials))}')
+    return [trial for trial in trials.values() if not only or trial.id in only]
+
+
+def _adapter_name(word: object) -> str:
+    """Name an adapter by what it was called, without folders."""
+    return (
+        re.sub(r"[^\s'\"]*/", "", word)
+        if isinstance(word, str)
+        else str(getattr(word, "__name__", type(word).__name__))
+    )
+
+
+def _unique(name: str, others: Sequence[str]) -> str:
+    """Number an engine of a name that others have."""
+    count = sum(other == name or other.startswith(f"{name} #") for other in others)
+    return f"{name} #{count + 1}" if count else name
+
+
+def _ask_all(
+    ask: Ask, trials: Mapping[str, Trial], judged: Sequence[Trial]
+) -> tuple[Facts, dict[str, Answer | None], dict[str, Answer | None]]:
+    """Ask for all collisions in their order, then in reverse; an answer is None where it is not supported."""
+    needed: dict[str, Trial] = {}
+    for trial in judged:
+        chain = [trial]
+        while chain[0].of:
+            chain.insert(0, trials[chain[0].of])
+        needed |= {one.id: one for one in chain}
+    questions = [trial.question for trial in needed.values()]
+    first = ask(dict(questions[0]))
+    answers = {str(questions[0]["id"]): read_answer(questions[0], first)}
+    facts = read_facts(first)
+    answers |= {str(question["id"]): read_answer(question, ask(dict(question))) for question in questions[1:]}
+    # another collision comes before each, so that what is kept from it shows
+    again = {str(question["id"]): read_answer(question, ask(dict(question))) for question in reversed(questions)}
+    return facts, answers, again
+
+
+def _judge(
+    facts: Facts,
+    trials: Mapping[str, Trial],
+    judged: Sequence[Trial],
+    answers: Mapping[str, Answer | None],
+    again: Mapping[str, Answer | None],
+    tol: Mapping[str, float],
+) -> EngineChecks:
+    """Judge the answers of one engine; a check that needs an answer which is not supported is not supported."""
+    tolerance = tolerances(facts.kind, float32=facts.is_float32, tol=tol)
+    with_friction = [trial.question for trial in judged if "friction" in checks_of(trial, trials)]
+    betas: Mapping[str, float] = {}
+    if facts.law and with_friction:
+        betas = betas_of_law(with_friction, facts.law, facts.model, facts.parameters)
+    rebounds = {
+        name: None if answer is None else Rebound(trials[name].question, answer)
+        for name, answer in answers.items()
+    }
+
+    def deliver(trial: Trial, name: str) -> Delivered | None:
+        rebound, base = rebounds[trial.id], rebounds.get(trial.of)
+        if rebound is None:
+            return None
+        if name == "repeat":
+            other = again[trial.id]
+            return Delivered(0.0, float(len(rebound.answer))) if other is None else repeat(rebound, other)
+        if name == "friction":
+            return friction(rebound, betas.get(trial.id))
+        if name in OF_AN_ANSWER:
+            return OF_AN_ANSWER[name](rebound)
+        if base is None:
+            return None
+        if name != "step":
+            return related(rebound, trial, base)
+        coarse = rebounds[trials[trial.of].of]
+        return None if coarse is None else step(coarse, base, rebound)
+
+    rows = []
+    for trial in judged:
+        for name in checks_of(trial, trials):
+            delivered = deliver(trial, name)
+            if delivered is None:
+                # what is asked for is independent of the answer, but for friction
+                silent = Rebound(trial.question, dict.fromkeys(ANSWER_KEYS, float("nan")))
+                asked = OF_AN_ANSWER[name](silent).asked if name in OF_AN_ANSWER else float("nan")
+                rows.append((asked, float("nan"), tolerance[name], CHECK_STATUSES["not_supported"]))
+            else:
+                word = "pass" if passes(name, delivered, tolerance[name]) else "fail"
+                rows.append((*delivered, tolerance[name], CHECK_STATUSES[word]))
+    return EngineChecks(facts.engine, facts.version, facts.kind, *zip(*rows, strict=True))

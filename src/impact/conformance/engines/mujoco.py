@@ -1,0 +1,65 @@
+"""MuJoCo: spheres on two slides and a hinge, and a plane as the wall; the contact is a pair of geoms."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+WORLD = """
+<mujoco>
+  <option timestep="{dt}" gravity="0 0 0" integrator="Euler" cone="elliptic" iterations="100" tolerance="0">
+    <flag autoreset="disable"/>
+  </option>
+  <worldbody>{balls}</worldbody>
+  <contact>
+    <pair geom1="geom1" geom2="geom2" condim="3" friction="{mu} {mu} 0 0 0" solref="{timeconst} {dampratio}"
+      solreffriction="{friction_time} 1" solimp="0.9 0.9 0.001 0.5 2"/>
+  </contact>
+</mujoco>
+"""
+BALL = """
+<body pos="{x} {y} 0">
+  <joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 1 0"/><joint type="hinge" axis="0 0 1"/>
+  <inertial pos="0 0 0" mass="{m}" diaginertia="{inertia} {inertia} {inertia}"/>
+  <geom name="geom{number}" type="sphere" size="{R}"/>
+</body>
+"""
+WALL = '<geom name="geom2" type="plane" size="1 1 1" zaxis="-1 0 0"/>'
+# the slip decays in this part of the contact
+FRICTION_TIME = 0.1
+# steps before the contact, and contact times that are run
+STEPS_BEFORE, CONTACTS = 1, 3.0
+
+
+def collide(c: dict[str, Any]) -> dict[str, Any]:
+    """Run a collision whose balls touch, side by side, after the first step."""
+    import mujoco
+    from linear_contact import damping_ratio, half_time
+
+    z = damping_ratio(c["e"])
+    frequency = 2.0 * half_time(z) / c["contact_time"]
+    balls, speeds = "", []
+    for number, side in (("1", -1.0), ("2", 1.0)):
+        mass, R, inertia, v, u, omega = (c[f"{name}{number}"] for name in ("m", "R", "inertia", "v", "u", "omega"))
+        if mass is None:
+            balls += WALL
+            continue
+        before = STEPS_BEFORE * c["dt"]
+        balls += BALL.format(
+            x=repr(side * R - v * before), y=repr(-u * before), m=mass, inertia=inertia, R=R, number=number
+        )
+        speeds += [v, u, omega]
+    model = mujoco.MjModel.from_xml_string(
+        WORLD.format(
+            balls=balls, dt=c["dt"], mu=c["mu"], timeconst=1.0 / (frequency * z), dampratio=z,
+            friction_time=max(FRICTION_TIME * c["contact_time"], 2.0 * c["dt"]),
+        )
+    )  # fmt: skip
+    data = mujoco.MjData(model)
+    data.qvel[:] = speeds
+    mujoco.mj_step(model, data, STEPS_BEFORE + math.ceil(CONTACTS * c["contact_time"] / c["dt"]))
+    answer = {"id": c["id"], "version": mujoco.__version__, "kind": "compliant"}
+    for ball in range(len(speeds) // 3):
+        names = (f"{name}{ball + 1}" for name in ("v", "u", "omega"))
+        answer |= dict(zip(names, map(float, data.qvel[3 * ball : 3 * ball + 3]), strict=True))
+    return answer

