@@ -26,6 +26,8 @@ from impact.contact.model import ForceModel
 P = 4
 RTOL, ATOL = 1e-13, 1e-15
 # largest step in σ, and positions inside a step at which events are sampled
+# events of a contact, of which cases have ten at most; with more it goes back and forth between two modes
+MAX_SWITCHES = 30
 MAX_STEP, SAMPLES = 0.02, np.linspace(0.0, 1.0, 8)[1:]
 # a violation of the friction limit that is no rounding, relative to mu
 LIMIT_TOLERANCE = 1e-12
@@ -596,7 +598,7 @@ class Trajectory:
         if f.kind == "dashpot":
             self.mode = STICK if self.phase.damping(1e-6) * abs(self.y[G]) < self.phase.limit(1e-6, 1.0) else 1
             out.modes.append((0.0, self.mode))
-        for _ in range(1000):
+        for _ in range(MAX_SWITCHES):
             name = self.run()
             if abs(self.mode) == THIRD:
                 # at s = 0 itself it is 0/0
