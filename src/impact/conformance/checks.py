@@ -244,8 +244,6 @@ def _largest(*values: float) -> float:
     return math.nan if any(map(math.isnan, values)) else max(values)
 
 
-# ---- which checks a collision has, and how each is judged
-
 # checks of one answer alone
 OF_AN_ANSWER: Mapping[str, Callable[[Rebound], Delivered]] = {
     "finite": finite,
@@ -286,7 +284,7 @@ def passes(name: str, delivered: Delivered, tolerance: float) -> bool:
 def checks_of(trial: Trial, trials: Mapping[str, Trial]) -> list[str]:
     """List the checks that a collision has, in the order of a board."""
     rebound = Rebound(trial.question, dict.fromkeys(ANSWER_KEYS, 0.0))
-    without: set[str] = {*RELATIONS} - {trial.relation}
+    without = {str(name) for name in RELATIONS if name != trial.relation}
     if rebound.balls == "1":
         without.add("momentum")
     if rebound.g0 == 0.0 or rebound.v0 == 0.0:
