@@ -13,13 +13,12 @@ from functools import cached_property
 from typing import Literal, NamedTuple
 
 from ..results.board import CHECKS, excess_of
-from .suite import ANSWER_KEYS, Question, Trial, transform
+from .suite import ANSWER_KEYS, RELATIONS, Question, Trial, transform
 
 Answer = Mapping[str, float]
 # reads a velocity or spin, before or after the impact
 Read = Callable[[str], float]
 Kind = Literal["impulse", "compliant"]
-Status = Literal["pass", "fail", "not_supported"]
 
 
 class Delivered(NamedTuple):
@@ -245,8 +244,6 @@ def _largest(*values: float) -> float:
     return math.nan if any(map(math.isnan, values)) else max(values)
 
 
-# ---- which checks a collision has, and how each is judged
-
 # checks of one answer alone
 OF_AN_ANSWER: Mapping[str, Callable[[Rebound], Delivered]] = {
     "finite": finite,
@@ -287,7 +284,7 @@ def passes(name: str, delivered: Delivered, tolerance: float) -> bool:
 def checks_of(trial: Trial, trials: Mapping[str, Trial]) -> list[str]:
     """List the checks that a collision has, in the order of a board."""
     rebound = Rebound(trial.question, dict.fromkeys(ANSWER_KEYS, 0.0))
-    without = {"frame", "mirror", "exchange", "scale", "step"} - {trial.relation}
+    without = {str(name) for name in RELATIONS if name != trial.relation}
     if rebound.balls == "1":
         without.add("momentum")
     if rebound.g0 == 0.0 or rebound.v0 == 0.0:

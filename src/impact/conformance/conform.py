@@ -102,7 +102,7 @@ def conform(
             folder = stack.enter_context(TemporaryDirectory(prefix="impact-")) if position < len(names) else None
             ask = stack.enter_context(open_adapter(command, timeout, folder))
             facts, answers, again = _ask_all(ask, trials, judged)
-        # an engine with a law of its own is named by the adapter
+        # an adapter may name its engine; names are labels of the board
         facts = replace(facts, engine=_unique(facts.engine or name, [engine.engine for engine in engines]))
         engines.append(_judge(facts, trials, judged, answers, again, requested))
     labels = [(trial.id, name) for trial in judged for name in checks_of(trial, trials)]
