@@ -26,7 +26,7 @@ from ..contact.frictions import frictions
 from ..contact.models import catalogue
 from ..errors import UsageError, did_you_mean
 from ..exporters.programs import KEPT_OUTPUT_BYTES, MAX_OUTPUT_BYTES, POLL_INTERVAL_S, find_program
-from ..formatting import number, safe_text
+from ..formatting import argument, number, safe_text
 from .checks import KIND_TOLERANCES, Answer, Kind, balls_of
 from .suite import Question
 
@@ -71,6 +71,11 @@ class AdapterError(UsageError):
     """An adapter does not answer as the protocol says."""
 
 
+def adapter_error(text: str) -> AdapterError:
+    """Make the error of an adapter, which names the argument."""
+    return AdapterError(f"{argument('adapter')}: {text}")
+
+
 @contextmanager
 def open_adapter(adapter: object, timeout_s: float, folder: str | None = None) -> Iterator[Ask]:
     """Start an adapter, and yield the function that asks it.
@@ -96,7 +101,7 @@ def open_adapter(adapter: object, timeout_s: float, folder: str | None = None) -
                 start_new_session=True,
             )
         except OSError as error:
-            raise AdapterError(f"--adapter: {words[0]}: {error.strerror}") from None
+            raise adapter_error(f"{words[0]}: {error.strerror}") from None
         try:
             yield _Conversation(process, errors.fileno(), timeout_s).ask
         finally:
@@ -118,21 +123,21 @@ def _command(adapter: object) -> list[str]:
         if " " not in path or Path(path).is_file():
             return python_command(sys.executable, Path(path), name)
     if not isinstance(adapter, str | Sequence) or not adapter:
-        raise UsageError(f'--adapter: got {adapter!r}, expected FILE.py:FUNCTION or "PROGRAM ARGUMENTS"')
+        raise adapter_error(f'got {adapter!r}, expected FILE.py:FUNCTION or "PROGRAM ARGUMENTS"')
     try:
         words = shlex.split(adapter) if isinstance(adapter, str) else [str(word) for word in adapter]
     except ValueError as error:
-        raise UsageError(f"--adapter: {adapter}: {error}") from None
+        raise adapter_error(f"{adapter}: {error}") from None
     program = find_program(words[0], None)
     if program is None:
-        raise UsageError(f'--adapter: no program "{words[0]}"; expected FILE.py:FUNCTION or "PROGRAM ARGUMENTS"')
+        raise adapter_error(f'no program "{words[0]}"; expected FILE.py:FUNCTION or "PROGRAM ARGUMENTS"')
     return [program, *words[1:]]
 
 
 def python_command(python: str, path: Path, name: str) -> list[str]:
     """Make the command that runs a function of a Python file as an adapter."""
     if not path.is_file():
-        raise UsageError(f"--adapter: {path}: {'is no file' if path.exists() else 'does not exist'}")
+        raise adapter_error(f"{path}: {'is no file' if path.exists() else 'does not exist'}")
     return [python, str(SERVE), f"{path.absolute()}:{name}"]
 
 
@@ -163,18 +168,18 @@ class _Conversation:
                 return json.loads(NOT_A_NUMBER.sub(_python_number, text))
         except ValueError:
             shown = safe_text(line.decode(errors="replace"), 80)
-            raise AdapterError(f'--adapter: {name}: got "{shown}", expected one line of JSON on stdout') from None
+            raise adapter_error(f'{name}: got "{shown}", expected one line of JSON on stdout') from None
 
     def _read_line(self, name: str) -> bytes:
         assert self.process.stdout is not None
         deadline, descriptor = time.monotonic() + self.timeout_s, self.process.stdout.fileno()
         while b"\n" not in self.received:
             if time.monotonic() > deadline:
-                raise AdapterError(f"--adapter: {name}: no answer after {number(self.timeout_s)} s (--timeout)")
+                raise adapter_error(f"{name}: no answer after {number(self.timeout_s)} s ({argument('timeout')})")
             if len(self.received) > MAX_LINE_BYTES:
-                raise AdapterError(f"--adapter: {name}: a line of more than {MAX_LINE_BYTES >> 10} KiB")
+                raise adapter_error(f"{name}: a line of more than {MAX_LINE_BYTES >> 10} KiB")
             if os.fstat(self.errors).st_size > MAX_OUTPUT_BYTES:
-                raise AdapterError(f"--adapter: {name}: more than {MAX_OUTPUT_BYTES >> 20} MiB on stderr")
+                raise adapter_error(f"{name}: more than {MAX_OUTPUT_BYTES >> 20} MiB on stderr")
             if select.select([descriptor], [], [], POLL_INTERVAL_S)[0]:
                 content = os.read(descriptor, MAX_LINE_BYTES)
                 if not content:
@@ -193,7 +198,7 @@ class _Conversation:
         kept = os.pread(self.errors, KEPT_OUTPUT_BYTES, max(0, size - KEPT_OUTPUT_BYTES))
         lines = kept.decode(errors="replace").strip().splitlines()
         last = f": {safe_text(lines[-1])}" if lines else ""
-        return AdapterError(f"--adapter: {name}: the adapter ended with {code}{last}")
+        return adapter_error(f"{name}: the adapter ended with {code}{last}")
 
 
 def _python_number(match: re.Match[str]) -> str:
@@ -211,20 +216,20 @@ def read_answer(question: Question, answer: object) -> Answer | None:
     ------
     AdapterError : it is no answer to the question
     """
-    name = f"--adapter: collision {question['id']}"
+    name = f"collision {question['id']}"
     if not isinstance(answer, Mapping):
-        raise AdapterError(f"{name}: got {_shown(answer)}, expected an object of JSON")
+        raise adapter_error(f"{name}: got {_shown(answer)}, expected an object of JSON")
     if answer.get("id") != question["id"]:
-        raise AdapterError(f"{name}: got an answer to {_shown(answer.get('id'))}")
+        raise adapter_error(f"{name}: got an answer to {_shown(answer.get('id'))}")
     if answer.get("error") is not None:
         return None
     values = {}
     for key in (f"{quantity}{ball}" for quantity in ("v", "u", "omega") for ball in balls_of(question)):
         if key not in answer:
-            raise AdapterError(f"{name}: the answer has no {key}")
+            raise adapter_error(f"{name}: the answer has no {key}")
         value = answer[key]
         if isinstance(value, str | bool) or not isinstance(value, SupportsFloat | None):
-            raise AdapterError(f"{name}: {key}: got {_shown(value)}, expected a number")
+            raise adapter_error(f"{name}: {key}: got {_shown(value)}, expected a number")
         values[key] = float("nan") if value is None else float(value)
     return values
 
@@ -234,20 +239,20 @@ def read_facts(answer: Any) -> Facts:
     facts = {key: answer.get(key, "") for key in FACTS}
     for key, value in facts.items():
         if not isinstance(value, str):
-            raise AdapterError(f"--adapter: {key}: got {_shown(value)}, expected text")
+            raise adapter_error(f"{key}: got {_shown(value)}, expected text")
     kind: Kind = "compliant" if facts["kind"] == "compliant" else "impulse"
     if facts["kind"] not in ("", *KIND_TOLERANCES):
-        raise AdapterError(f"--adapter: kind: got {_shown(facts['kind'])}, expected impulse or compliant")
+        raise adapter_error(f"kind: got {_shown(facts['kind'])}, expected impulse or compliant")
     if facts["precision"] not in ("", "float32", "float64"):
-        raise AdapterError(f"--adapter: precision: got {_shown(facts['precision'])}, expected float32 or float64")
+        raise adapter_error(f"precision: got {_shown(facts['precision'])}, expected float32 or float64")
     law, parameters = facts["law"], answer.get("parameters") or {}
     if law and law not in frictions():
-        raise AdapterError(f'--adapter: law: no friction law "{law}"; {did_you_mean(law, list(frictions()))}')
+        raise adapter_error(f'law: no friction law "{law}"; {did_you_mean(law, list(frictions()))}')
     model = facts["model"] or DEFAULT_MODEL
     if model not in catalogue():
-        raise AdapterError(f'--adapter: model: no law "{model}"; {did_you_mean(model, list(catalogue()))}')
+        raise adapter_error(f'model: no law "{model}"; {did_you_mean(model, list(catalogue()))}')
     if not isinstance(parameters, Mapping):
-        raise AdapterError(f"--adapter: parameters: got {_shown(parameters)}, expected an object of JSON")
+        raise adapter_error(f"parameters: got {_shown(parameters)}, expected an object of JSON")
     return Facts(
         engine=safe_text(facts["engine"], 60),
         version=safe_text(facts["version"], 60),

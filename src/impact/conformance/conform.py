@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 
 from ..atomic import check_outputs
 from ..errors import UsageError, did_you_mean
-from ..formatting import number
+from ..formatting import argument, number
 from ..reporting.page import report
 from ..results.board import CHECKS, Board, EngineChecks, board_dataset
 from ..results.schema import CHECK_STATUSES
@@ -83,9 +83,9 @@ def conform(
     names = [engine] if isinstance(engine, str) else list(engine)
     adapters = [adapter] if isinstance(adapter, str) or callable(adapter) else list(adapter)
     if not names and not adapters:
-        raise UsageError("expected the name of an engine, see impact conform --list, or --adapter")
+        raise UsageError(f"expected the name of an engine, see impact conform --list, or {argument('adapter')}")
     if not timeout > 0.0:
-        raise UsageError(f"--timeout: got {number(timeout)}, expected a number of seconds > 0")
+        raise UsageError(f"{argument('timeout')}: got {number(timeout)}, expected a number of seconds > 0")
     requested = _check_tolerances(tol)
     path = None if output is None else Path(output)
     if path is not None and path.suffix.lower() not in PAGE_SUFFIXES + BOARD_SUFFIXES:
@@ -120,9 +120,13 @@ def _check_tolerances(tol: float | Mapping[str, float] | None) -> dict[str, floa
     known = ["all", *(name for name in CHECKS if name not in EXACT)]
     for name, value in requested.items():
         if name not in known:
-            raise UsageError(f"--tol {name}: not a check with a tolerance; {did_you_mean(str(name), known)}")
+            raise UsageError(
+                f"{argument('tol', key=str(name))}: not a check with a tolerance; {did_you_mean(str(name), known)}"
+            )
         if not 0.0 <= value < float("inf"):
-            raise UsageError(f"--tol {name}={value}: expected a number >= 0, such as --tol {name}=1e-6")
+            raise UsageError(
+                f"{argument('tol', key=str(name))}: got {value}, expected a number >= 0, such as 1e-6"
+            )
     return {name: float(value) for name, value in requested.items()}
 
 
@@ -130,7 +134,7 @@ def _selected(trials: Mapping[str, Trial], only: Sequence[str]) -> list[Trial]:
     """Choose the collisions to judge."""
     for name in only:
         if name not in trials:
-            raise UsageError(f'--only: no collision "{name}"; {did_you_mean(name, list(trials))}')
+            raise UsageError(f'{argument("only")}: no collision "{name}"; {did_you_mean(name, list(trials))}')
     return [trial for trial in trials.values() if not only or trial.id in only]
 
 

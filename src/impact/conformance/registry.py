@@ -10,6 +10,7 @@ from typing import Any
 from ..display import Block, Displayed, Table
 from ..errors import UsageError, did_you_mean
 from ..exporters.programs import find_program, python_package_version
+from ..formatting import argument
 from .adapters import python_command
 
 FOLDER = Path(__file__).with_name("engines")
@@ -47,10 +48,10 @@ class Engine:
         """Make the command of the adapter, in the requested interpreter or in this one."""
         python = find_program("python", program)
         if python is None:
-            raise UsageError(f'--program: no program "{program}"')
+            raise UsageError(f'{argument("program")}: no program "{program}"')
         if self.version_of(python) is None:
             raise UsageError(
-                f"{self.name}: {self.title} is not installed in {python}; {self.install}, or --program"
+                f"{self.name}: {self.title} is not installed in {python}; {self.install}, or {argument('program')}"
             )
         return python_command(python, FOLDER / f"{self.file or self.name}.py", self.function)
 
@@ -130,7 +131,9 @@ ENGINES: Mapping[str, Engine] = {
 def find_engine(name: str) -> Engine:
     """Find an engine by its name."""
     if name not in ENGINES:
-        raise UsageError(f'no adapter of an engine "{name}"; {did_you_mean(name, list(ENGINES))}; or --adapter')
+        raise UsageError(
+            f'no adapter of an engine "{name}"; {did_you_mean(name, list(ENGINES))}; or {argument("adapter")}'
+        )
     return ENGINES[name]
 
 

@@ -14,6 +14,7 @@ from typing import Any, Literal
 
 from ..config.files import parse_document
 from ..errors import UsageError, did_you_mean
+from ..formatting import argument
 
 Question = Mapping[str, float | str | None]
 Relation = Literal["", "frame", "mirror", "exchange", "scale", "step"]
@@ -65,7 +66,7 @@ def read_suite(name: str = DEFAULT_SUITE) -> Mapping[str, Trial]:
     ('spin-both', -20.0)
     """
     if name not in suites():
-        raise UsageError(f'--suite: no set "{name}"; {did_you_mean(name, suites())}')
+        raise UsageError(f'{argument("suite")}: no set "{name}"; {did_you_mean(name, suites())}')
     file = f"{name}.toml"
     document = parse_document(files(__package__).joinpath(file).read_text(encoding="utf-8"), file)
     defaults = document.pop("defaults")
