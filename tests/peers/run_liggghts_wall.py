@@ -1,0 +1,63 @@
+"""A sphere and a plane in LIGGGHTS, fix wall/gran; each collision is a process. The plane is z = 0."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+from pathlib import Path
+
+from runner import serve
+
+# one process needs no network, for which MPI would look each time
+ENVIRONMENT = os.environ | {"OMPI_MCA_pml": "ob1", "OMPI_MCA_btl": "self"}
+SCRIPT = """
+atom_style granular
+atom_modify map array
+boundary f f f
+newton off
+communicate single vel yes
+units si
+region box block -1 1 -1 1 -1 1 units box
+create_box 2 box
+neighbor 0.01 bin
+neigh_modify delay 0
+fix 1 all property/global youngsModulus peratomtype {E} {E}
+fix 2 all property/global poissonsRatio peratomtype {nu} {nu}
+fix 3 all property/global coefficientRestitution peratomtypepair 2 {e} {e} {e} {e}
+fix 4 all property/global coefficientFriction peratomtypepair 2 {mu} {mu} {mu} {mu}
+fix 5 all property/global characteristicVelocity scalar {vc}
+pair_style gran model {model} tangential {tangential} {options}
+pair_coeff * *
+timestep {step}
+create_atoms 1 single 0 0 {z}
+set atom 1 diameter {d} mass {m} vx {u} vy 0 vz {vz}
+set atom 1 omegay {spin}
+fix 6 all nve/sphere
+fix 7 all wall/gran model {model} tangential {tangential} primitive type 2 zplane 0.0 {options}
+dump 1 all custom {count} velocities id vx vz omegay
+dump_modify 1 format "%d %.17g %.17g %.17g"
+run {count}
+"""
+
+
+def collide(
+    model: str, tangential: str, options: str, E: float, nu: float, e: float, vc: float, mu: float,
+    m1: float, R1: float, v1: float, u1: float, omega1: float, gap: float, step: float, count: int,
+) -> tuple[float, float, float]:  # fmt: skip
+    # the normal points down to the plane, the tangent along x, so that spins are about -y
+    script = SCRIPT.format(
+        model=model, tangential=tangential, options=options, E=E, nu=nu, e=e, vc=vc, mu=mu, z=R1 + gap, d=2 * R1,
+        m=m1, u=u1, vz=-v1, spin=-omega1, step=step, count=count,
+    )  # fmt: skip
+    process = subprocess.run(
+        ["liggghts", "-log", "none"], input=script, capture_output=True, text=True, check=False, env=ENVIRONMENT
+    )
+    if process.returncode or "ERROR" in process.stdout:
+        raise RuntimeError(process.stdout + process.stderr)
+    _, u, vz, spin = map(float, Path("velocities").read_text(encoding="utf-8").splitlines()[-1].split())
+    return -vz, u, -spin
+
+
+words = subprocess.run(["liggghts", "-help"], capture_output=True, text=True, check=False).stdout
+serve(re.search(r"LIGGGHTS-PUBLIC ([\d.]+)", words)[1], collide)  # type: ignore[index]
