@@ -16,7 +16,7 @@ import pytest
 
 import impact
 
-from .test_peers import LAMMPS, LIGGGHTS, Code, Values, run_code
+from .test_peers import LAMMPS, LIGGGHTS, YADE, Code, Values, betan, run_code
 
 pytestmark = pytest.mark.peers
 
@@ -27,10 +27,12 @@ ANGLES, MUS, SPINS, STEPS, PHASES = (
     (12, 31),
     (0.125, 0.625),
 )
-BALL: Values = {"v1": 1.0, "m1": 1.0, "R1": 0.05}
+BALL: Values = {"v1": 1.0, "m1": 0.01, "R1": 0.05}
 MATERIAL = {"E": 1e9, "nu": 0.3, "rho": 1000.0}
 # between a code whose lever arm is the radius and the map, relative to the speed before the impact
 TOLERANCE = 1e-10
+# the part of the impacts that may differ by more where a code alternates, and by how much
+RARE, LARGEST = 0.03, 0.05
 
 
 @dataclass(frozen=True)
@@ -49,6 +51,8 @@ class Pairing:
     parameters: Callable[[Values, float], Values]
     # whether the lever arm of friction is less than the radius, by a part of the indentation
     shortens_arms: bool = False
+    # whether the code alternates between slip and stick: a shorter arm may change one of those steps
+    alternates: bool = False
 
     @property
     def name(self) -> str:
@@ -58,6 +62,7 @@ class Pairing:
 
 HOOKE: Values = {"e": 0.7, "K": 1e6, "n": 1.0}
 HERTZ: Values = {"e": 0.7, "material": "soft"}
+VISCOELASTIC: Values = {"K": 1e6, "n": 1.0, "yade-viscoelastic.C": 30.0}
 LAMMPS_WALL = replace(LAMMPS, runner="run_lammps_wall.py")
 
 
@@ -87,6 +92,21 @@ def liggghts(model: str, tangential: str, options: str) -> Callable[[Values, flo
         **properties,
         "mu": mu,
     }
+
+
+YADE_WALL = replace(YADE, runner="run_yade_wall.py")
+
+
+def yade_viscoelastic(values: Values, mu: float) -> Values:
+    """ViscElMat of one ball; two of them act in series."""
+    normal = {"kn": 2 * VISCOELASTIC["K"], "cn": 2 * VISCOELASTIC["yade-viscoelastic.C"]}
+    tangential = {"ks": 2 * values["k_t"], "cs": 2 * values["c_t"]}
+    return {"law": "viscoelastic", "options": normal | tangential, "mu": mu}
+
+
+def yade_mindlin(values: Values, mu: float) -> Values:
+    """Ip2_FrictMat_FrictMat_MindlinPhys, with a damping of the tangential force of its own."""
+    return {"law": "mindlin", "options": MATERIAL | {"betan": betan(HERTZ), **values}, "mu": mu}
 
 
 MINDLIN = {
@@ -132,6 +152,7 @@ PAIRINGS = (
             values,
             liggghts(model, tangential, " ".join(f"{name} {word}" for name, word in values.items())),
             shortens_arms=True,
+            alternates=values == {"tangential_damping": "on"},
         )
         for model in ("hooke", "hertz")
         for tangential, values in (
@@ -140,16 +161,35 @@ PAIRINGS = (
             ("no_history", {}),
         )
     ),
+    *(
+        Pairing(
+            "yade-viscoelastic",
+            "yade-viscoelastic",
+            YADE_WALL,
+            VISCOELASTIC,
+            {"k_t": ratio * VISCOELASTIC["K"], "c_t": c_t},
+            yade_viscoelastic,
+            shortens_arms=True,
+        )
+        for ratio, c_t in ((2 / 7, 0.0), (0.8, 5.0))
+    ),
+    *(
+        Pairing("yade-mindlin", "yade-betan", YADE_WALL, HERTZ, {"betas": betas}, yade_mindlin, shortens_arms=True)
+        for betas in (0.0, 0.1)
+    ),
 )
 
 
 def config_of(pairing: Pairing, sweep: Values, solver: Values) -> Values:
     """The config of a pairing."""
     wall = {"m2": math.inf, "R2": math.inf}
+    own = {name.split(".")[1]: value for name, value in pairing.sweep.items() if "." in name}
+    inputs = {name: value for name, value in pairing.sweep.items() if "." not in name}
     return {
         "models": pairing.model,
         "frictions": pairing.friction,
-        "sweep": {**BALL, **wall, **pairing.sweep, "mu": [*MUS], **sweep},
+        "model": {pairing.model: own},
+        "sweep": {**BALL, **wall, **inputs, "mu": [*MUS], **sweep},
         "materials": {"soft": MATERIAL},
         "friction": {pairing.friction: pairing.values},
         "solver": solver,
@@ -209,8 +249,13 @@ def test_a_code_delivers_velocities_and_spins_of_the_map_of_its_scheme(
     version, answers = run_code(pairing.code, pairing.name, runs_of(pairing, contact_time), tmp_path)
     theirs = np.array(answers).reshape(ours.shape) * (1.0, 1.0, BALL["R1"])
     speed = BALL["v1"] / np.cos(np.radians(ANGLES)).reshape(1, -1, 1, 1, 1, 1)
-    difference = float((np.abs(theirs - ours) / speed).max())
+    differences = (np.abs(theirs - ours) / speed).max(axis=-1)
+    rare = differences > tolerance
+    difference = float(differences.max())
     variant = ", ".join(f"{name} {value}" for name, value in pairing.values.items())
     key = f"{pairing.model} with {pairing.friction}"
     record_property("peer", (pairing.code.name, version, key, variant, ours[..., 0].size, difference, tolerance))
+    if pairing.alternates:
+        assert np.count_nonzero(rare) <= RARE * rare.size
+        tolerance = LARGEST
     assert difference <= tolerance
