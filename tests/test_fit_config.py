@@ -139,6 +139,11 @@ def test_a_wrong_table_is_refused_with_its_line(folder: Path, cli: Run, csv: str
         ),
         ('file = "drops.csv"', 'noise = "scale"', "data: got neither file nor columns"),
         ('file = "drops.csv"', 'file = "drops.csv"\nloss = "square"', "data.loss"),
+        (
+            "[model.kuwabara-kono-1987]",
+            'steps_per_contact = 12\n[solver]\nintegrator = "kick-drift"\n[model.kuwabara-kono-1987]',
+            'solver.integrator: got "kick-drift", expected "exact": measurements have no time step',
+        ),
         ('file = "drops.csv"', 'file = "drops.csv"\nloss = "huber"\nnoise = "scale"', "data.loss"),
     ],
 )

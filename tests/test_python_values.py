@@ -74,9 +74,9 @@ def test_a_range_and_lengths_with_units_are_axes() -> None:
 
 @pytest.mark.parametrize("source", [(), [1], pd.DataFrame({"e": [0.1]}), b"x", 5], ids=lambda v: type(v).__name__)
 def test_another_type_is_named(source: object) -> None:
-    with pytest.raises(impact.UsageError, match=f"^source: got a {type(source).__name__}, expected a mapping"):
+    with pytest.raises(impact.UsageError, match=f"^source: got an? {type(source).__name__}, expected a mapping"):
         impact.sweep(source)  # type: ignore[arg-type]
-    with pytest.raises(impact.UsageError, match=f"^dataset: got a {type(source).__name__}, expected xr.Dataset"):
+    with pytest.raises(impact.UsageError, match=f"^dataset: got an? {type(source).__name__}, expected xr.Dataset"):
         impact.plot(source)  # type: ignore[arg-type]
 
 
@@ -88,11 +88,11 @@ def test_another_type_is_named(source: object) -> None:
         (lambda: impact.solve("hertz", "K", 0.5), "target: got a float, expected Mapping[str, object]"),
         (
             lambda: impact.cite("hertz", 5),
-            "laws: got a int, expected str | Path | xr.Dataset | ForceModel | FrictionLaw",
+            "laws: got an int, expected str | Path | xr.Dataset | ForceModel | FrictionLaw",
         ),
         (lambda: impact.check_model("hertz"), "model: got a str, expected ForceModel"),
-        (lambda: impact.info(5), "result: got a int, expected xr.Dataset | str | Path"),
-        (lambda: impact.load(5), "path: got a int, expected str | Path"),
+        (lambda: impact.info(5), "result: got an int, expected xr.Dataset | str | Path"),
+        (lambda: impact.load(5), "path: got an int, expected str | Path"),
         (lambda: impact.estimate(BASE, jobs=0), "jobs: got 0, expected a whole number >= 1"),
         (lambda: impact.merge([], "r.h5"), "folders: got none, expected the work folders of all shards"),
         (lambda: impact.run("hertz"), 'No such file or directory; did you mean model="hertz"?'),

@@ -12,7 +12,7 @@ from types import UnionType
 from typing import Any, ParamSpec, TypeVar, get_origin
 
 from .errors import ImpactError, UsageError
-from .formatting import argument
+from .formatting import argument, type_of
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -66,10 +66,10 @@ def type_problem(function: Callable[..., object], args: Any, kwargs: Any) -> str
         return ""
     for name, value in bound.arguments.items():
         parameter = signature.parameters[name]
-        for one in value if parameter.kind is parameter.VAR_POSITIONAL else [value]:
+        for item in value if parameter.kind is parameter.VAR_POSITIONAL else [value]:
             alternatives = ALTERNATIVES.split(parameter.annotation)
-            if not any(_is_of(one, text, function.__globals__) for text in alternatives):
-                return f"{name}: got a {type(one).__name__}, expected {parameter.annotation}"
+            if not any(_is_of(item, text, function.__globals__) for text in alternatives):
+                return f"{name}: got {type_of(item)}, expected {parameter.annotation}"
     return ""
 
 
@@ -81,6 +81,7 @@ def _is_of(value: object, text: str, names: dict[str, Any]) -> bool:
         # a class that is imported for type checkers only is compared by its name
         return type(value).__name__ == (attribute or name)
     kind = getattr(kind, attribute) if attribute else kind
-    kinds = [get_origin(one) or one for one in (kind.__args__ if isinstance(kind, UnionType) else [kind])]
+    members = kind.__args__ if isinstance(kind, UnionType) else [kind]
+    classes = [get_origin(member) or member for member in members]
     # a type such as ArrayLike is for type checkers
-    return any(not isinstance(one, type) or isinstance(value, one) for one in kinds)
+    return any(not isinstance(member, type) or isinstance(value, member) for member in classes)

@@ -84,6 +84,16 @@ def number(value: object, digits: int = 6) -> str:
     return "–" if value != value else f"{value:.{digits}g}"
 
 
+def type_of(value: object) -> str:
+    """Name the type of a value, with its article.
+
+    >>> type_of([]), type_of(5)
+    ('a list', 'an int')
+    """
+    name = type(value).__name__
+    return f"an {name}" if name[0].lower() in "aeiou" else f"a {name}"
+
+
 def decimals(value: float, places: int = 4) -> str:
     """Format a number with `places` decimals, for columns whose numbers are compared; NaN is a dash.
 

@@ -19,7 +19,7 @@ from ..contact.friction import FrictionLaw
 from ..contact.model import ForceModel
 from ..contact.models import catalogue
 from ..errors import ConfigError, MissingFileError, UsageError
-from ..formatting import argument, safe_text
+from ..formatting import argument, safe_text, type_of
 from .files import (
     as_table,
     override_text,
@@ -254,9 +254,7 @@ def open_config(source: Path | Mapping[str, object] | None, plugins: Sequence[Fo
         return open_text(STARTER_CONFIG.read_text(encoding="utf-8"), "starter", plugins)
     if not isinstance(source, Mapping):
         if not isinstance(source, str | Path):
-            raise UsageError(
-                f"source: got a {type(source).__name__}, expected a mapping, or the name of a TOML file"
-            )
+            raise UsageError(f"source: got {type_of(source)}, expected a mapping, or the name of a TOML file")
         path = Path(source)
         return replace(open_text(read_text(path), str(path), plugins), folder=path.parent)
     data, problems = to_plain_data(source)

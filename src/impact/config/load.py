@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 from pydantic import ValidationError
 
-from ..contact.fixed_step import EXACT
+from ..contact.fixed_step import EXACT, SCHEMES
 from ..contact.friction import FrictionLaw
 from ..contact.frictions import frictions
 from ..contact.materials import Material
@@ -340,6 +340,9 @@ def _calibration_problems(
         yield uncertain, "got an uncertain input, which impact sweep and impact sensitivity take"
     if as_table(data.get("sweep")).get("zip"):
         yield ("sweep", "zip"), f"got axes that vary together, {single} for each name"
+    integrator = as_table(data.get("solver")).get("integrator", EXACT)
+    if isinstance(integrator, str) and integrator in SCHEMES:
+        yield ("solver", "integrator"), f'got "{integrator}", expected "{EXACT}": measurements have no time step'
 
 
 def _settings_problems(document: tables.Document, axes: Sequence[Axis], draft: Draft) -> Iterator[ConfigProblem]:

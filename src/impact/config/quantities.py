@@ -35,7 +35,7 @@ from pydantic_core.core_schema import CoreSchema, with_info_plain_validator_func
 from ..contact.model import ForceModel
 from ..contact.units import dimension, names_in
 from ..errors import did_you_mean
-from ..formatting import safe_text
+from ..formatting import safe_text, type_of
 
 # keys and indices from the top of a config to a value
 KeyPath: TypeAlias = tuple[str | int, ...]
@@ -115,7 +115,7 @@ def as_text(value: object) -> str:
             return "nothing"
     # dates and times of TOML
     isoformat = getattr(value, "isoformat", None)
-    return safe_text(str(isoformat()) if callable(isoformat) else f"a {type(value).__name__}", 60)
+    return safe_text(str(isoformat()) if callable(isoformat) else type_of(value), 60)
 
 
 def mismatch_error(value: object, expected: str) -> PydanticCustomError:

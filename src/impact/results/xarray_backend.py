@@ -19,7 +19,7 @@ from ..config.grid import MAX_POINTS
 from ..config.tables import Output
 from ..contact.variables import OUTPUTS
 from ..errors import ResultError, UnfinishedError, UsageError
-from ..formatting import argument, safe_text
+from ..formatting import argument, safe_text, type_of
 from .hdf5_structure import byte_reader, check_root
 from .kinds import kind_of, require_sweep
 from .layouts import LAYOUTS
@@ -190,7 +190,7 @@ def result_of(result: xr.Dataset | str | Path) -> xr.Dataset:
         return load(result)
     if not isinstance(result, xr.Dataset):
         # the public function names its argument
-        raise TypeError(f"got a {type(result).__name__}, expected a dataset, or the file of a result")
+        raise TypeError(f"got {type_of(result)}, expected a dataset, or the file of a result")
     for dim in ("friction", "model"):
         if dim in result.coords and result[dim].ndim == 0 and kind_of(result) == "sweep":
             metadata = ("exponent", *MODEL_METADATA) if dim == "model" else ()
