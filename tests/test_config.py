@@ -677,7 +677,7 @@ def test_a_mapping_is_kept_as_json_and_read_again() -> None:
     assert data["sweep"]["m1"] == 1.0
     assert problems_of(read_config, data | {"title": None, "models": object()}, ["sweep.m1=-3"]) == [
         "config: title: got nothing, expected text",
-        'config: models: got a object, expected a model, or a list of models; "all" are all',
+        'config: models: got an object, expected a model, or a list of models; "all" are all',
         f"--set sweep.m1=-3: sweep.m1: got -3, {MASS}",
     ]
 

