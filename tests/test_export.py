@@ -234,6 +234,28 @@ def test_a_wall_of_another_material_is_a_stiffness_in_lammps() -> None:
     assert two.lines[0].endswith("xplane NULL 0.0")
 
 
+@pytest.mark.parametrize(
+    ("other", "at", "version", "spring"),
+    [
+        ("soft", {}, "20210929", "hertz/material"),
+        # releases whose hertz/material has another stiffness at a wall and for two materials
+        ("hard", {}, "20220623", "hertz"),
+        ("soft", WALL, "20220623", "hertz"),
+        ("hard", {}, "20240829", "hertz/material"),
+        ("soft", WALL, "20240829", "hertz/material"),
+    ],
+)
+def test_old_releases_of_lammps_take_moduli_of_two_balls_of_one_material(
+    other: str, at: dict[str, float], version: str, spring: str
+) -> None:
+    export = impact.export(
+        "lammps", "lammps-tsuji-without-root", source=source("soft", other, **at), code_version=version
+    )
+    (first, *_) = (line for line in export.lines if " damping " in line)
+    assert spring in first.split()
+    assert any("in old releases" in remark for remark in export.header) == (spring == "hertz")
+
+
 def test_an_e_of_zero_is_the_critical_damping_of_yade() -> None:
     export = impact.export("yade", "yade-betan", source=source("soft", "soft", e=0.0))
     assert export.parameters["betan"] == 1.0
@@ -665,6 +687,16 @@ def test_lammps_takes_the_numbers_of_a_friction_law(
     assert not any("no friction" in remark for remark in export.header)
     assert export.as_dict()["beta_at_dt"]["mean"] == pytest.approx(export.beta_continuous, abs=0.2)
     assert "omega 0 0 0.0" in str(export.script)
+
+
+def test_the_tangential_stiffness_of_two_materials_is_a_number_in_lammps() -> None:
+    config = source("soft", "hard", mu=0.3, angle="40 deg")
+    export = impact.export(
+        "lammps", default_law("lammps"), source=config, friction="lammps-mindlin", code_version="22Jul2025"
+    )
+    # 1/G* = (2 - nu1)/G1 + (2 - nu2)/G2 with G = E/(2 (1 + nu))
+    shear = 1.0 / (2.0 * (2.0 - 0.3) * 1.3 / 1e9 + 2.0 * (2.0 - 0.2) * 1.2 / 5e9)
+    assert export.parameters["k_t"] == pytest.approx(8.0 * shear, rel=1e-14)
 
 
 def test_friction_that_a_code_does_not_have_is_refused_or_left_out_with_a_warning() -> None:

@@ -43,7 +43,7 @@ LAWS_OF_SCHEME = {
     DRAKE_TAMSI: "F = K δ (1 + χ δ̇/v₀), n = 1, in both phases, such as drake-point-contact",
     DRAKE_SAP: "F = K δ + C δ̇ to F = 0, in both phases, such as kelvin-voigt-no-tension",
 }
-# the kinds of friction laws that a scheme takes, in both of which codes were run, and what it expects in words
+# the kinds of friction laws with which codes of a scheme were run, and in words which it takes
 FRICTION_OF_SCHEME: Mapping[str, tuple[tuple[str, ...], str]] = {
     KICK_DRIFT: (("spring", "dashpot"), "one with a spring or a dashpot, such as cundall-strack-1979"),
     DRAKE_TAMSI: (("coulomb",), "coulomb-1785"),

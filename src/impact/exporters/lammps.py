@@ -6,6 +6,9 @@ import math
 import re
 from datetime import datetime
 
+import numpy as np
+
+from ..contact.materials import effective_shear_modulus
 from ..errors import UsageError
 from ..formatting import argument, number
 from .code import Code, Collision, Parameters
@@ -42,13 +45,17 @@ STRENGTH = {
 ROOT_SINCE = "20260729"
 # the first releases with coeff_restitution and with limit_damping, by month
 COEFF_RESTITUTION_SINCE, LIMIT_SINCE = "20240601", "20210408"
+# the first release that was seen in which hertz/material is right at a wall and for two materials. Those of 29
+# September 2021 and 23 June 2022 were seen to have 1.3 times the stiffness at a wall for nu = 0.3, and to mix two
+# materials to a force by which two balls separate twenty times as fast as they met
+MATERIAL_SINCE = "20240829"
 # the forms of a date, and how `datetime` calls them
 DATES = (
     (r"^(\d{4})(\d\d)(\d\d)$", "%Y %m %d"),
     (r"(\d{1,2}) ?([A-Z][a-z]{2})[a-z]* ?(\d{4})", "%d %b %Y"),
     (r"^(\d{4})[.-](\d{1,2})[.-](\d{1,2})", "%Y %m %d"),
 )
-# tangential models, by key of the catalogue; the first releases with `linear_history`, and with those of Mindlin
+# tangential model of pair style granular, by key of the catalogue
 FRICTIONS = {
     "lammps-linear-history": "linear_history",
     "lammps-linear-nohistory": "linear_nohistory",
@@ -155,7 +162,11 @@ def parameters(collision: Collision) -> dict[str, float | str]:
 
 
 def friction_parameters(collision: Collision) -> dict[str, float | str]:
-    """Write the numbers of the tangential model; that of Mindlin has a stiffness per contact radius, or NULL."""
+    """Write the numbers of the tangential model.
+
+    That of Mindlin has a stiffness per contact radius; NULL is 8 G* of the material of
+    hertz/material, and another stiffness where LAMMPS mixes two of them.
+    """
     if not collision.friction:
         return {}
     last: dict[str, float | str] = {"x_gammat": collision["xt"], "mu": collision["mu"]}
@@ -164,15 +175,21 @@ def friction_parameters(collision: Collision) -> dict[str, float | str]:
     k_t, is_linear = collision["k_t"], collision.friction == "lammps-linear-history"
     if math.isnan(k_t) and not math.isnan(collision["kt_over_kn"]):
         k_t = collision["kt_over_kn"] * collision["n"] * collision["K"]
-    if math.isnan(k_t):
+    if math.isnan(k_t) and takes_moduli(collision) and collision.has_one_material:
         return {"k_t": "NULL", **last}
+    if math.isnan(k_t):
+        moduli = (np.array(collision[name]) for name in ("E1", "nu1", "E2", "nu2"))
+        return {"k_t": 8.0 * float(effective_shear_modulus(*moduli)), **last}
     return {"k_t": k_t if is_linear else k_t / math.sqrt(collision.effective_radius), **last}
 
 
 def takes_moduli(collision: Collision) -> bool:
     """Return whether hertz/material has the stiffness; a wall is of the material of the ball there."""
-    is_hertz = OPTIONS[collision.model.key][0] == "hertz"
-    return is_hertz and collision.has_materials and (collision.has_one_material or not collision.has_wall)
+    if OPTIONS[collision.model.key][0] != "hertz" or not collision.has_materials:
+        return False
+    if collision.version < MATERIAL_SINCE:
+        return collision.has_one_material and not collision.has_wall
+    return collision.has_one_material or not collision.has_wall
 
 
 def lines(collision: Collision, parameters: Parameters) -> list[str]:
@@ -206,7 +223,9 @@ def lines(collision: Collision, parameters: Parameters) -> list[str]:
 def notes(collision: Collision) -> list[str]:
     spring, damping, limit = OPTIONS[collision.model.key]
     remarks = ["in SI (units si, atom_style sphere); R* and m are the effective radius and mass, 1/(1/R1 + 1/R2)"]
-    if collision.has_wall:
+    if collision.version < MATERIAL_SINCE and spring == "hertz" and not takes_moduli(collision):
+        remarks.append("hertz/material has another stiffness at a wall and for two materials in old releases")
+    elif collision.has_wall:
         remarks.append(
             "hertz/material takes one material, of the ball and the wall; hertz with k_n takes two into account"
         )
