@@ -173,6 +173,8 @@ def write_program(path: Path, script: str) -> Path:
 @pytest.fixture(scope="session")
 def forked() -> Iterator[ForkServer]:
     """Run the program hundreds of times: processes of a server that has imported what they need."""
+    if not hasattr(os, "fork"):
+        pytest.skip("this system has no fork")
     with start_fork_server() as run:
         yield run
 
@@ -214,15 +216,16 @@ def no_installed_codes(
 
 
 @pytest.fixture(scope="session")
-def cli(forked: ForkServer) -> Run:
+def cli(request: pytest.FixtureRequest) -> Run:
     """Run the program in a process of its own, begun anew where the interpreter reads its environment."""
+    forked = request.getfixturevalue("forked") if hasattr(os, "fork") else None
 
     def run(
         *words: str | Path, cwd: Path = ROOT, **environment: str
     ) -> CompletedCommand | subprocess.CompletedProcess[str]:
         # the server may have been started with another path
         environment = {"PATH": os.environ["PATH"], **environment}
-        if environment.keys() <= {"COLUMNS", "NO_COLOR", "PATH"}:
+        if forked is not None and environment.keys() <= {"COLUMNS", "NO_COLOR", "PATH"}:
             return forked(*words, cwd=cwd, limit=120, **environment)
         return subprocess.run(
             [sys.executable, "-m", "impact", *map(str, words)],

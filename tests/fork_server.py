@@ -9,19 +9,16 @@ from __future__ import annotations
 
 import atexit
 import ctypes
-import fcntl
 import gc
 import io
 import json
 import os
-import pty
 import shutil
 import signal
 import struct
 import subprocess
 import sys
 import tempfile
-import termios
 import threading
 import time
 import traceback
@@ -136,6 +133,11 @@ def printed_on_terminal(
     **environment: str,
 ) -> tuple[CompletedCommand, str]:
     """Run a command line with one stream on a terminal; return its result and what the terminal shows."""
+    # which Windows lacks
+    import fcntl
+    import pty
+    import termios
+
     driver, terminal = pty.openpty()
     fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack("HHHH", 50, width, 0, 0))
     # environment variables would override the width of the terminal

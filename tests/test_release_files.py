@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import importlib.util
 import re
+import subprocess
+import sys
 import tomllib
 
+import pytest
 import yaml
 
 import impact
@@ -39,11 +42,35 @@ def test_the_recipe_has_the_version_the_dependencies_and_the_program_of_the_pack
     assert (values["about"]["summary"], values["about"]["license"]) == (PROJECT["description"], PROJECT["license"])
 
 
-def test_the_citation_has_the_fields_that_its_format_requires() -> None:
-    citation = yaml.safe_load(read("CITATION.cff"))
-    assert citation["cff-version"] == "1.2.0"
-    assert {"message", "title", "authors", "version", "license"} <= citation.keys()
-    assert citation["license"] == PROJECT["license"]
+@pytest.mark.parametrize(
+    ("name", "schema"),
+    [
+        (".github/workflows/ci.yml", "github-workflows"),
+        ("action.yml", "github-actions"),
+        ("CITATION.cff", "citation-file-format"),
+    ],
+)
+def test_a_file_that_others_read_has_their_format(name: str, schema: str) -> None:
+    words = ["-m", "check_jsonschema", "--builtin-schema", f"vendor.{schema}", ROOT / name]
+    done = subprocess.run([sys.executable, *words], capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_the_citation_names_the_license_of_the_package() -> None:
+    assert yaml.safe_load(read("CITATION.cff"))["license"] == PROJECT["license"]
+
+
+def test_the_workflow_has_the_stages_of_the_local_run_and_all_interpreters() -> None:
+    jobs = yaml.safe_load(read(".github/workflows/ci.yml"))["jobs"]
+    stages = set(re.findall(r"^stage (make .*)$", read(".ci/run"), re.MULTILINE))
+    commands = {*jobs["stage"]["strategy"]["matrix"]["command"], jobs["check"]["steps"][-1]["run"]}
+    # without make, which Windows lacks
+    (test,) = re.findall(r"^test:.*\n\t\$\(BIN\)/(.*)$", read("Makefile"), re.MULTILINE)
+    assert jobs["test"]["steps"][-1]["run"] == test
+    assert commands == stages - {"make test"} | {"make release-check"}
+    matrix = jobs["test"]["strategy"]["matrix"]
+    assert {job["os"].partition("-")[0] for job in matrix["include"]} == {"windows", "macos"}
+    assert f">={matrix['python'][0]}" == PROJECT["requires-python"]
 
 
 def test_the_release_check_finds_another_version() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import fcntl
 import functools
 import json
 import os
@@ -314,6 +313,7 @@ def test_an_error_after_the_rename_says_that_the_file_is_written(
 
 
 def test_a_write_removes_what_killed_writes_of_the_same_output_left(tmp_path: Path) -> None:
+    fcntl = pytest.importorskip("fcntl")
     stale = [f"out.csv.{token}.part" for token in ("0123abcd", "00000000")]
     other = ["out.csv.part", "out.csv.12345.part", "out.csv.0123ABCD.part", "other.csv.0123abcd.part"]
     for name in [*stale, *other, "out.csv.11111111.part"]:

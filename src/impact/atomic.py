@@ -97,24 +97,17 @@ class Sink(io.RawIOBase):
         if not stat.S_ISREG(replaced.st_mode):
             return
         descriptor = self._file.fileno()
-        # a file system without owners or permissions must not prevent the output
+        # a file system without owners or permissions must not prevent the output, nor Windows
         for uid, gid in ((-1, replaced.st_gid), (replaced.st_uid, -1)):
-            with contextlib.suppress(OSError):
+            with contextlib.suppress(OSError, AttributeError):
                 os.fchown(descriptor, uid, gid)
-        with contextlib.suppress(OSError):
+        with contextlib.suppress(OSError, AttributeError):
             os.fchmod(descriptor, stat.S_IMODE(replaced.st_mode))
 
     def lock(self) -> None:
-        """Mark the file as in use until `unlock` or the end of the process, where files can be locked."""
+        """Mark the file as in use until `finish` or the end of the process, where files can be locked."""
         with contextlib.suppress(OSError, AttributeError):
             fcntl.flock(self._file.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
-
-    def unlock(self) -> None:
-        """Let readers lock the file; a recent time of change protects it until it has its final name."""
-        with contextlib.suppress(OSError, AttributeError):
-            operation = fcntl.LOCK_UN
-            os.utime(self._file.fileno())
-            fcntl.flock(self._file.fileno(), operation)
 
     def sync(self) -> None:
         """Flush everything to the disk.
@@ -125,6 +118,12 @@ class Sink(io.RawIOBase):
         """
         self.check()
         os.fsync(self._file.fileno())
+
+    def finish(self) -> None:
+        """Close the file, as Windows needs to rename it; a recent time of change protects it until then."""
+        with contextlib.suppress(OSError, TypeError):
+            os.utime(self._file.fileno())
+        self.close()
 
     def check(self) -> None:
         """Raise the first error, if any."""
@@ -167,7 +166,7 @@ def atomic_write(path: Path, *, overwrite: bool, part: Path | None = None) -> It
             sink.lock()
             yield sink
             sink.sync()
-            sink.unlock()
+            sink.finish()
             _publish(part, path, overwrite=overwrite)
         finally:
             sink.close()
@@ -259,6 +258,9 @@ def sync_folder(folder: Path) -> None:
     -----
     UserWarning : the file system cannot sync folders, or the user may not open it; the names exist nevertheless
     """
+    if os.name == "nt":
+        # which opens no folders
+        return
     try:
         descriptor = os.open(folder, os.O_RDONLY)
         try:

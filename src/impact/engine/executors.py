@@ -93,8 +93,8 @@ def _process_pool(jobs: int) -> Iterator[Executor]:
     except BaseException as error:
         # shutdown would wait for a force law that never returns
         if not isinstance(error, Exception | GeneratorExit):
-            for process in list(getattr(pool, "_processes", None) or {}):
-                os.kill(process, signal.SIGKILL)
+            for process in list((getattr(pool, "_processes", None) or {}).values()):
+                process.kill()
         raise
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
