@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +27,18 @@ def baselines() -> list[xr.Dataset]:
 def test_each_config_has_a_baseline_and_each_baseline_a_config() -> None:
     configs = [*DATA.glob("*.toml"), *(ROOT / "configs").glob("*.toml")]
     assert sorted(path.stem for path in configs) == [path.stem for path in BASELINES]
+
+
+def config_of(path: Path) -> Path:
+    (config,) = (*DATA.glob(f"{path.stem}.toml"), *(ROOT / "configs").glob(f"{path.stem}.toml"))
+    return config
+
+
+@pytest.mark.parametrize("path", BASELINES, ids=lambda path: path.stem)
+def test_a_config_says_what_its_baseline_was_swept_from(path: Path) -> None:
+    """So that a rerun of the baseline, which reads the config that it stores, is a sweep of the file."""
+    stored = tomllib.loads(impact.load(path).attrs["config"])
+    assert tomllib.loads(config_of(path).read_text(encoding="utf-8")) == stored
 
 
 # all models, and all friction laws, take longer than all others; `make regress` repeats these baselines too
