@@ -88,10 +88,9 @@ site: $(SITE)/site  ## build the documentation site in build/site, and check its
 	$(SITE)/bin/sphinx-build -q -W --keep-going -b html docs build/site
 	@echo "the site is build/site/index.html"
 
-bench: $(VENV)/dev  ## measure the cores against a solve_ivp loop, parallel sweeps, and the start of commands
-	$(BIN)/python scripts/bench_core.py
-	$(BIN)/python scripts/bench_parallel.py
-	$(BIN)/python scripts/bench_start.py
+bench: $(VENV)/dev  ## measure ratios of speeds, and compare them with the last run on this machine: results/bench.md
+	$(BIN)/python scripts/ratios.py --history $(RESULTS)/bench.json --table $(RESULTS)/bench.md \
+		scripts/bench_core.py scripts/bench_parallel.py scripts/bench_start.py scripts/bench_inverse.py
 
 clean:  ## remove the virtual environment and the results
 	rm -rf $(VENV) $(PEERS) $(PEERS)-lammps $(SITE) $(RESULTS) build/site docs/reference

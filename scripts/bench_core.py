@@ -52,6 +52,7 @@ from impact.contact.tangential import (
 from impact.contact.variables import CENTRAL_OUTPUTS
 from impact.engine.executors import choose_executor
 from impact.engine.trajectories import RANGE_TRAJECTORIES, even_size
+from ratios import record
 
 # models of the paper whose restitution depends on e only: equations (10), (19)-(23), (28), (29), (33) and (43)
 PAPER_MODELS = (
@@ -351,6 +352,8 @@ def add_oblique_rates(table: Table, pair: ObliquePair, count: int, loop: int, ro
     normal_rate, tangential_rate, loop_rate = (median(column) for column in zip(*rates, strict=True))
     to_normal, to_loop = ([rate[1] / rate[other] for rate in rates] for other in (0, 2))
     name = f"{pair.model} with {pair.friction}"
+    record(f"slips per normal trajectory: {name}", to_normal)
+    record(f"slips per loop of solve_ivp: {name}", to_loop)
     table.add_row(name, "solve_ivp DOP853, loop", f"{loop_rtol:g}", f"{loop_error:.2g}", f"{loop_rate:,.0f}")
     table.add_row("", "impact, numpy, normal", f"{rtol:g}", "", f"{normal_rate:,.0f}")
     table.add_row(
@@ -456,6 +459,7 @@ def central_rates(args: argparse.Namespace) -> None:
             raise SystemExit(f"{core}: got an error of {error:.2g}, expected at most {MAX_ERROR:g}")
         core_rates = rates[core, threads]
         ratios = [rate / loop_rate for rate, loop_rate in zip(core_rates, loop_rates, strict=True)]
+        record(f"impacts per loop of solve_ivp: {core}, {threads} threads", ratios)
         table.add_row(
             f"impact, {core}",
             str(threads),

@@ -21,6 +21,7 @@ import numpy as np
 
 import impact
 from bench_core import solve_ivp_restitution
+from ratios import record
 
 # laws that take an e, and two with a parameter of their own
 LAWS = [
@@ -112,11 +113,14 @@ def measure_calls(calls: int = 200, size: int = 1_000_000) -> None:
     }
     values = np.linspace(0.3, 0.9, calls).tolist()
     expected = problem(e=values)["e_out"]
+    each = {}
     for name, way in ways.items():
         start = time.perf_counter()
         difference = np.abs(np.array([way(e) for e in values]) - expected).max()
-        each = 1e3 * (time.perf_counter() - start) / calls
-        print(f"{name:32}{each:8.2f} ms an impact, e_out within {difference:.1e} of the array's")
+        each[name] = 1e3 * (time.perf_counter() - start) / calls
+        print(f"{name:32}{each[name]:8.2f} ms an impact, e_out within {difference:.1e} of the array's")
+    for name in list(ways)[1:]:
+        record(f"time of {name} per prepared problem", [each[name] / each["prepared problem"]])
     many = np.linspace(0.01, 1.0, size)
     sweep = {"v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 1e9, "e": many}
     config = {"models": law.key, "sweep": sweep, "output": {"variables": ["e_out"]}}

@@ -23,6 +23,7 @@ from impact.contact.numba.dispatch import is_installed
 from impact.engine.executors import choose_executor
 from impact.engine.run import Run
 from impact.results.sweep import read_plan, sweep_in_memory
+from ratios import record
 
 
 def sweep_rate(impacts: int, rtol: float, core: str, jobs: int, threads: int) -> float:
@@ -60,6 +61,8 @@ def main() -> None:
         for impacts in args.impacts:
             settings = ((1, 1), (args.jobs, 1), (1, args.jobs))
             single, *rates = (sweep_rate(impacts, args.rtol, core, *setting) for setting in settings)
+            for setting, rate in zip((jobs, threads), rates, strict=True):
+                record(f"{impacts:,} impacts, {core}, {setting} per process", [rate / single])
             table.add_row(
                 f"{impacts:,}", f"{single:,.0f}", *(f"{rate:,.0f} ({rate / single:.2f})" for rate in rates)
             )

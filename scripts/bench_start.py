@@ -24,6 +24,7 @@ from rich.console import Console
 from rich.table import Table
 
 from impact.contact.numba.dispatch import is_installed
+from ratios import record
 
 TYPER_PROGRAM = """
 import typer
@@ -81,6 +82,7 @@ def main() -> None:
             for arguments in (command, reference):
                 run_time(arguments)
             times = [(run_time(command), run_time(reference)) for _ in range(repeats)]
+            record(f"seconds of impact {name} per {reference_name}", [mine / other for mine, other in times])
             ours, theirs = (statistics.median(seconds) for seconds in zip(*times, strict=True))
             table.add_row(f"impact {name}", f"{ours:.3f}", reference_name, f"{theirs:.3f}", f"{ours / theirs:.2f}")
 
