@@ -367,7 +367,7 @@ class Judge:
 
     def covering_tests(self, mutant: Mutant) -> list[str]:
         """The tests that execute a mutant, the doctests of its module first, the tests of commands last."""
-        costs = {test: (False, 0.0) for test in self.items if test.startswith(f"{mutant.path}::")}
+        costs = {test: [False, 0.0] for test in self.items if test.startswith(f"{mutant.path}::")}
         for found in self.records:
             rows = found["lines"].get(mutant.path, {})
             for line in map(str, mutant.lines) if mutant.lines else rows:
