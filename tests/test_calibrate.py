@@ -280,6 +280,7 @@ def test_laws_are_compared_by_name_whatever_their_rank(drops: xr.Dataset) -> Non
     assert impact.compare(drops.isel(model=[1, 0]), drops).equal
     nothing = impact.compare(drops.isel(model=[0]), drops.isel(model=[1]), subset=True)
     assert nothing.headline == "not equal: nothing in common"
+    assert "the two have no law in common" in {fault.text for fault in nothing.faults}
     only_one = impact.compare(drops.isel(model=[0]), drops)
     assert only_one.headline == "not equal: labels (model)"
     assert impact.compare(drops.isel(model=[0]), drops, subset=True).equal

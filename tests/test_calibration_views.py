@@ -43,6 +43,21 @@ def test_the_picture_has_measured_values_curves_bands_and_residuals(drops: xr.Da
     np.testing.assert_allclose(drawn.get_ydata(), expected)
 
 
+def test_the_axes_are_logarithmic_as_asked_or_as_the_input_is_spaced(drops: xr.Dataset) -> None:
+    def scales(fit: xr.Dataset, **options: str) -> list[tuple[str, str]]:
+        return [(axes.get_xscale(), axes.get_yscale()) for axes in impact.plot(fit, **options).axes]
+
+    linear, log = "linear", "log"
+    assert scales(drops) == [(linear, linear), (linear, linear)]
+    assert scales(drops, log="x") == [(log, linear), (log, linear)]
+    # residuals have both signs
+    assert scales(drops, log="y") == [(linear, log), (linear, linear)]
+    grid = drops["grid"]
+    geometric = drops.assign_coords(grid=grid.copy(data=np.geomspace(grid[0], grid[-1], grid.size)))
+    assert scales(geometric) == [(log, linear), (log, linear)]
+    assert scales(geometric, log="y") == [(linear, log), (linear, linear)]
+
+
 def test_without_a_varied_input_the_values_are_over_their_number() -> None:
     fit = impact.calibrate(FOLDER / "hdpe.toml", overrides=['models=["anagnostopoulos-1988"]', *QUICK])
     values, residuals = impact.plot(fit).axes

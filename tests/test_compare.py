@@ -16,6 +16,7 @@ import impact
 from impact.comparison.verdict import Verdict
 from impact.contact.variables import CENTRAL_OUTPUTS, OUTPUTS, default_variables
 from impact.errors import ResultError, UsageError
+from impact.results.selection import match_labels
 
 from .fork_server import ForkServer
 
@@ -101,6 +102,17 @@ def test_the_order_of_labels_does_not_matter(wide: xr.Dataset, axis: str) -> Non
         verdict = impact.compare(new, baseline)
         assert verdict.equal, verdict
         assert verdict.headline.endswith("none differs")
+
+
+def test_equal_labels_have_their_positions_in_both_results_in_the_order_of_the_baseline() -> None:
+    # a rotation: its positions are not those of its inverse
+    new, baseline = np.array(["c", "a", "b", "x"]), np.array(["b", "y", "c", "a"])
+    of_new, of_baseline = match_labels([new], [baseline])
+    assert (of_new.tolist(), of_baseline.tolist()) == ([2, 0, 1], [0, 2, 3])
+    # a number is no text
+    for pair in (([1.0, 2.0], ["soft", "hard"]), (["soft", "hard"], [1.0, 2.0])):
+        none = match_labels(*([np.array(labels)] for labels in pair))
+        assert [positions.tolist() for positions in none] == [[], []]
 
 
 def test_the_order_of_dimensions_does_not_matter(wide: xr.Dataset) -> None:

@@ -270,6 +270,28 @@ def test_opensees_gets_the_effective_mass_and_the_damping_of_its_documentation()
     assert hertzdamp.parameters["xiNorm"] == pytest.approx(1.6, rel=1e-15)
 
 
+def test_the_impact_material_of_opensees_has_the_peak_force_and_the_loss_of_hertz() -> None:
+    """At the indentation d it has Hertz' force, and its loop has the energy that Hertz' spring loses to e."""
+    K, e, d = 1e8, 0.6, 1e-4
+    at = {"opensees-impact-material.d": d}
+    numbers = impact.export("opensees", "opensees-impact-material", source=source(K=K, e=e), at=at).parameters
+    first, second, end = (float(numbers[name]) for name in ("K1", "K2", "delta_y"))
+    # compression is negative there
+    assert end == pytest.approx(-0.1 * d, rel=1e-15)
+    assert first * -end + second * (d + end) == pytest.approx(K * d**1.5, rel=1e-14)
+    loop = (first - second) * -end * (d + end)
+    assert loop == pytest.approx(0.4 * K * d**2.5 * (1.0 - e**2), rel=1e-13)
+
+
+def test_newton_says_how_well_its_single_precision_resolves_the_indentation() -> None:
+    law, at = default_law("newton"), {"newton-semi-implicit.kd": 0.0, "v1": 2.0}
+    config = source(K=1e6, n=1.0, m1=0.5)
+    export = impact.export("newton", law, source=config, at=at)
+    peak = impact.run(config, model=law, at=at).values["peak_indentation"]
+    share = 2.0**-23 * BALLS["R1"] / peak
+    assert any(f"is resolved to {share:.2g} of its peak" in line for line in export.header)
+
+
 def test_simbody_gets_the_modulus_of_plane_strain_of_each_sphere() -> None:
     export = impact.export(
         "simbody", default_law("simbody"), source=source("soft", "soft"), at={"simbody-hunt-crossley.c": 0.3}

@@ -190,12 +190,38 @@ def test_chrono_hertz_delivers_the_value_known_for_zero_force() -> None:
 
 
 def test_chrono_takes_both_materials_or_a_modulus_that_gives_the_stiffness() -> None:
-    two = impact.export("chrono", default_law("chrono"), source=config("soft", "hard", e=0.5)).parameters
+    export = impact.export("chrono", default_law("chrono"), source=config("soft", "hard", e=0.5))
+    two = export.parameters
+    assert any(line.startswith("two materials: E* = ") for line in export.header)
     assert (two["YoungModulus"], two["PoissonRatio2"]) == (1e9, 0.2)
     assert two["EffectiveCurvatureRadius"] == pytest.approx(0.03, rel=1e-15)
     # E* = 3 K/(4 √R) and E = 2 (1 − ν²) E*
     one = impact.export("chrono", default_law("chrono"), source=config(e=0.5, K=1e9)).parameters
     assert one["YoungModulus"] == pytest.approx(2.0 * 0.91 * 0.75e9 / math.sqrt(0.03), rel=1e-14)
+
+
+def test_chrono_says_what_its_settings_enter_for_the_laws_that_have_them_only() -> None:
+    hooke, plain = {"chrono-smc-hooke", "liggghts-hooke"}, "chrono-smc-plaincoulomb"
+    about = {
+        "the stiffness follows from the characteristic impact velocity": {(key, True) for key in hooke},
+        "the damping is divided by characteristic_vel": {("chrono-smc-flores", True)},
+        "the stiffness does not depend on the radii": {(plain, True), (plain, False)},
+    }
+    named: dict[str, set[tuple[str, bool]]] = {text: set() for text in about}
+    for key, materials, inputs, at in CHRONO:
+        header = impact.export("chrono", key, source=config(*materials, **inputs), at=at).header
+        for text in about:
+            if any(line.startswith(text) for line in header):
+                named[text].add((key, bool(materials)))
+    assert named == about
+
+
+def test_the_header_lists_the_defaults_of_table_1_that_enter() -> None:
+    header = impact.export("chrono", "chrono-smc-hertz", at={"e": 0.5, "K": 1e9, "m1": 3.0}).header
+    assert "defaults of Table 1 of the paper: v1 = 1 m/s, m2 = 1 kg" in header
+    given = {"e": 0.5, "K": 1e9, "m1": 3.0, "m2": 1.0, "v1": 1.0}
+    header = impact.export("chrono", "chrono-smc-hertz", at=given).header
+    assert not any("Table 1" in line for line in header)
 
 
 def test_the_classes_of_chrono_have_the_names_of_the_release() -> None:

@@ -6,6 +6,7 @@ import itertools
 import numpy as np
 import pytest
 
+import impact
 from impact.contact.impacts import Impacts
 from impact.contact.model import ForceModel, Parameter
 from impact.contact.models import find
@@ -44,6 +45,24 @@ def over_speed(key: str) -> tuple[Impacts, Outputs]:
     contact = struck(model, impacts)
     assert np.all(contact["status"] == Status.OK)
     return impacts, contact
+
+
+@pytest.mark.parametrize("mass", [0.5, 20.0])
+def test_johnson_yields_from_the_speed_whose_energy_is_that_of_the_first_yield(mass: float) -> None:
+    E, nu, strength, radius = 2e11, 0.3, 1e9, 0.01
+    modulus, reduced = E / (1.0 - nu**2) / 2.0, radius / 2.0
+    indentation = (1.6 * np.pi * strength / (2.0 * modulus)) ** 2 * reduced
+    energy = 0.4 * 4.0 / 3.0 * modulus * np.sqrt(reduced) * indentation**2.5
+    speed = np.sqrt(2.0 * energy / (mass / 2.0))
+    balls = {"v2": 0.0, "m1": mass, "m2": mass, "R1": radius, "R2": radius, "material": "hard"}
+    config = {
+        "models": "johnson-1985",
+        "sweep": balls | {"v1": [0.999 * speed, 1.001 * speed]},
+        "materials": {"hard": {"E": E, "nu": nu, "rho": 7800.0, "yield_strength": strength}},
+    }
+    below, above = impact.sweep(config)["e_out"].values.ravel()
+    assert below == pytest.approx(1.0, abs=1e-8)
+    assert above < 0.9
 
 
 @pytest.mark.parametrize("n", [1.0, 1.5, 2.0])

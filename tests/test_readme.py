@@ -81,6 +81,29 @@ def test_relative_links_lead_to_existing_files() -> None:
             assert (page.parent / target).exists(), f"{page.name}: {target}"
 
 
+def test_the_readme_counts_the_codes_the_laws_and_the_speed_of_the_program() -> None:
+    import impact
+    from impact.exporters.registry import CODES
+
+    text = " ".join(README.split())
+    assert len(CODES) == 17
+    assert "the laws of seventeen codes" in text
+    (count,) = re.findall(r"a catalogue of more than (\d+) entries", text)
+    assert int(count) < len(impact.models()) <= int(count) + 10
+    # measured, on these pages
+    (stated,) = re.findall(
+        r"more than ([\d,]+) times as many .*? core, and more than ([\d,]+) times compiled", text
+    )
+    page = (ROOT / "docs" / "performance.md").read_text(encoding="utf-8")
+    for core, least in zip(("numpy", "numba"), stated, strict=True):
+        (ratio,) = re.findall(rf'^\| `core = "{core}"` \| 1 \|.* ([\d,]+) \|$', page, re.MULTILINE)
+        assert 1.0 < int(ratio.replace(",", "")) / int(least.replace(",", "")) < 2.0
+    assert "3 x 10^12 points of three models take seconds and a file of 0.7 MB" in text
+    page = (ROOT / "docs" / "storage.md").read_text(encoding="utf-8")
+    assert "large.h5: 3,001,500,000,000 points" in page
+    assert "writes a file of 0.7 MB" in page
+
+
 def test_the_citation_file_has_the_version_of_the_package() -> None:
     import impact
 

@@ -254,6 +254,8 @@ def test_the_headline_names_the_best_models_or_the_nearest(cli: Run, fair_and_ex
     best = impact.recommend(impact.load(path)).best
     assert {ranked.model for ranked in best} == set(EXACT)
     assert headline() == f"{best[0].model} and 2 more give e within 0.01 at all 20 points"
+    two = [word for key in EXACT[:2] for word in ("--model", key)]
+    assert re.fullmatch(r"\S+ and 1 more give e within 0\.01 at all 20 points", headline(*two))
     assert headline("--model", "bilinear") == "bilinear gives e within 0.01 at all 20 points"
     fair = [word for key in FAIR for word in ("--model", key)]
     assert headline(*fair, "--tol", "0.05") == (

@@ -179,6 +179,17 @@ def test_a_target_is_one_output(target: dict[str, float]) -> None:
         impact.solve("mujoco-solref", "dampratio", target)
 
 
+@pytest.mark.parametrize("name", ["steps", "status", "v1_reference"])
+def test_a_count_a_status_or_a_value_without_a_law_is_no_target(name: str) -> None:
+    with pytest.raises(UsageError, match=f'no output "{name}"; known: '):
+        impact.solve("mujoco-solref", "dampratio", {name: 5.0})
+
+
+def test_an_output_of_friction_is_a_target_with_a_friction_law_only() -> None:
+    with pytest.raises(UsageError, match="got no friction law, expected friction"):
+        impact.solve("hertz", "K", {"beta": 0.4})
+
+
 def test_the_command_ends_well_without_a_root(cli: Run) -> None:
     done = cli("solve", "--model", "gharib-hurmuzlu-2012", "--for", "e", "--target", "e_out=0.6")
     assert (done.returncode, done.stderr) == (0, "")

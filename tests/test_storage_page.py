@@ -76,6 +76,8 @@ def test_the_examples_print_what_the_page_shows(cli: Run, tmp_path: Path, monkey
             for line in text.splitlines():
                 assert OF_A_MACHINE.sub("*", line.rstrip()) in shown, (line, printed)
     assert ran == 10
+    (size,) = re.findall(r"writes a file of ([\d.]+) MB", PAGE)
+    assert f"{Path('large.h5').stat().st_size / 1e6:.1f}" == size
     # the last block prints the config of a file of version 1
     assert printed == "models = 'hertz'\n[\"sweep.e=0.5\"]\n"
 
