@@ -107,8 +107,8 @@ def friction_problem(key: str, kind: str, scheme: str, only: str = "") -> str:
     'scheme "drake-tamsi" does not take the friction law drake-regularized, expected coulomb-1785'
     """
     if scheme == EXACT:
-        message = f'the friction law {key} is that of a scheme, without a continuous answer, expected "{only}"'
-        return message if only else ""
+        message = f"the friction law {key} is that of a scheme, without a continuous answer"
+        return f'{message}, expected solver.integrator = "{only}"' if only else ""
     kinds, expected = FRICTION_OF_SCHEME[scheme]
     return "" if kind in kinds else f'scheme "{scheme}" does not take the friction law {key}, expected {expected}'
 
