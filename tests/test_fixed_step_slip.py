@@ -104,19 +104,21 @@ def cone(
     b_t: float,
     d: float,
     ratio: float,
+    shortening: float = 0.0,
 ) -> tuple[float, float, float]:
-    """A solid sphere of unit mass on a plane, as MuJoCo moves it, with the radius for a lever arm."""
+    """A solid sphere of unit mass on a plane, as MuJoCo moves it; its lever arm is R, or R - shortening x."""
     x, u, R = phase * h, 1.0, WALL["R1"]
     while x > 0.0:
-        g = u1 + R * omega1
+        arm = R - shortening * x
+        g = u1 + arm * omega1
         a_n, a_t = (k * x + b * u) / d, b_t * abs(g) / d
-        A_n, A_t = 1.0 / d, 3.5 + (1.0 - d) / (d * ratio)
+        A_n, A_t = 1.0 / d, 1.0 + arm**2 / (0.4 * R**2) + (1.0 - d) / (d * ratio)
         f_n, f_t = a_n / A_n, a_t / A_t
         if f_t > mu * f_n:
             f_n = max(0.0, (a_n + mu * a_t) / (A_n + mu * mu * A_t))
             f_t = mu * f_n
         push = math.copysign(f_t, g) * h
-        u, u1, omega1 = u - h * f_n, u1 - push, omega1 - push / (0.4 * R)
+        u, u1, omega1 = u - h * f_n, u1 - push, omega1 - push * arm / (0.4 * R**2)
         x += h * u
     return u, u1, omega1
 
@@ -171,9 +173,9 @@ def test_a_pattern_does_not_select_a_friction_law_of_a_scheme() -> None:
 
 
 def test_timestep_has_the_restitution_of_the_cone() -> None:
-    inputs = {"k": 1e4, "b": 30.0, "v1": 1.0, "mu": 0.1, "angle": "80 deg", "impratio": 4.0}
+    inputs = {"k": 1e4, "b": 60.0, "v1": 1.0, "mu": 0.5, "angle": "80 deg", "impratio": 4.0}
     result = impact.timestep(SOLREF, at=inputs, friction=CONE, steps_per_contact=[12], phases=2)
-    of_sweep = {"k": 1e4, "b": 30.0, "mu": 0.1, "angle": "80 deg", "steps_per_contact": 12, "phase": [0.25, 0.75]}
+    of_sweep = {"k": 1e4, "b": 60.0, "mu": 0.5, "angle": "80 deg", "steps_per_contact": 12, "phase": [0.25, 0.75]}
     swept = sweep(SOLREF, CONE, {"impratio": 4.0}, of_sweep | {"m2": 1.0, "R2": 0.05}, "mujoco-cone")
     assert result.scheme == "mujoco-cone"
     (row,) = result.rows

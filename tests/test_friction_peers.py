@@ -16,6 +16,7 @@ import pytest
 
 import impact
 
+from .test_fixed_step_slip import cone
 from .test_peers import LAMMPS, LIGGGHTS, YADE, Code, Values, betan, run_code
 
 pytestmark = pytest.mark.peers
@@ -131,10 +132,10 @@ MUJOCO_WALL = Code("MuJoCo", "run_mujoco_wall.py")
 STIFF = BALL["v1"] / (1e-6 * BALL["R1"])
 
 
-def mujoco(values: Values, mu: float) -> Values:
+def mujoco(values: Values, mu: float, solref: str = f"{-(STIFF**2)!r} {-0.2 * STIFF!r}") -> Values:
     """The attributes of a pair of geoms; 0 0 for a friction of the stiffness and damping of the contact."""
     return {
-        "solref": f"{-(STIFF**2)!r} {-0.2 * STIFF!r}",
+        "solref": solref,
         "solreffriction": f"-1 {-values['b_t']!r}" if "b_t" in values else "0 0",
         "impratio": values.get("impratio", 1.0),
         "d": values.get("impedance", 0.9),
@@ -248,6 +249,21 @@ PAIRINGS = (
 )
 
 
+STANDARD = {"timeconst": 10.0 / STIFF, "dampratio": 0.1}
+PAIRINGS += (
+    Pairing(
+        "mujoco-elliptic",
+        "mujoco-solref",
+        MUJOCO_WALL,
+        {f"mujoco-solref.{name}": value for name, value in STANDARD.items()},
+        {},
+        lambda values, mu: mujoco(values, mu, " ".join(map(repr, STANDARD.values()))),
+        scheme="mujoco-cone",
+        shortens_arms=True,
+    ),
+)
+
+
 def config_of(pairing: Pairing, sweep: Values, solver: Values) -> Values:
     """The config of a pairing."""
     wall = {"m2": math.inf, "R2": math.inf}
@@ -329,3 +345,22 @@ def test_a_code_delivers_velocities_and_spins_of_the_map_of_its_scheme(
         assert np.count_nonzero(rare) <= RARE * rare.size
         tolerance = LARGEST
     assert difference <= tolerance
+
+
+def test_the_lever_arm_of_mujoco_is_the_radius_without_half_of_the_indentation(tmp_path: Path) -> None:
+    k, b, h = 4e5, 300.0, 4e-4
+    runs = [
+        BALL | mujoco({"b_t": 500.0, "impratio": 3.0}, mu, f"{-k!r} {-b!r}")
+        | {"u1": u1, "omega1": spin, "gap": (3 - phase) * h * BALL["v1"], "step": h, "count": 40}
+        for mu in MUS for u1 in (0.2, 1.0, -5.0) for spin in SPINS for phase in PHASES
+    ]  # fmt: skip
+    _, answers = run_code(MUJOCO_WALL, "mujoco", runs, tmp_path)
+    for shortening, tolerance in ((0.5, 1e-12), (0.0, 4.0 * BALL["v1"] / math.sqrt(k) / BALL["R1"])):
+        ours = [
+            cone(run["u1"], run["omega1"], run["mu"], h, 3 - run["gap"] / h, k, b, 500.0, 0.9, 3.0, shortening)
+            for run in runs
+        ]
+        differences = np.abs(np.array(ours) - answers).max()
+        assert differences <= tolerance
+    # the indentation is a thirtieth of the radius, which is seen
+    assert differences > 1e-3
