@@ -75,7 +75,7 @@ GRAVITY = Quantity("m/s^2", "acceleration that turns heights and flight times in
 DESIGN_METHODS = ("sobol", "lhs", "halton", "random")
 MAX_SAMPLES = 2**22
 MODELS_EXPECTED = 'a model, or a list of models; "all" are all'
-FRICTIONS_EXPECTED = 'a friction law, or a list of friction laws; "all" are all'
+FRICTIONS_EXPECTED = 'a friction law, or a list of friction laws; "all" are all but those of one scheme'
 L = TypeVar("L", ForceModel, FrictionLaw)
 
 
