@@ -20,7 +20,14 @@ OF_MODEL = ("gamma", "eta", "k", "b")
 WALL = {"v1": 1.0, "m1": 1.0, "R1": 0.05, "m2": math.inf, "R2": math.inf, "angle": "45 deg", "mu": 0.5}
 
 
-def sweep(model: str, friction: str, values: dict[str, Any], inputs: dict[str, Any], scheme: str) -> Any:
+def sweep(
+    model: str,
+    friction: str,
+    values: dict[str, Any],
+    inputs: dict[str, Any],
+    scheme: str,
+    solver: dict[str, Any] | None = None,
+) -> Any:
     of_model = {name: inputs[name] for name in OF_MODEL if name in inputs}
     inputs = {name: value for name, value in inputs.items() if name not in of_model}
     wall = {name: value for name, value in WALL.items() if name != "angle" or "u1" not in inputs}
@@ -32,7 +39,9 @@ def sweep(model: str, friction: str, values: dict[str, Any], inputs: dict[str, A
         "materials": MATERIALS,
         "friction": {friction: values},
     }
-    return impact.sweep(config if scheme == "exact" else config | {"solver": {"integrator": scheme}})
+    return impact.sweep(
+        config if scheme == "exact" else config | {"solver": {"integrator": scheme} | (solver or {})}
+    )
 
 
 STEP = {"steps_per_contact": 12, "phase": 0.625}
@@ -138,6 +147,8 @@ def test_the_cone_is_that_of_a_plain_loop() -> None:
         for mu, u1, omega1, h, phase, ratio in itertools.product(*axes.values())
     ]
     np.testing.assert_allclose(np.stack(ours, axis=-1).reshape(-1, 3), theirs, rtol=1e-12, atol=1e-11)
+    separate = sweep(SOLREF, CONE, values, inputs, "mujoco-cone", {"collapse": False})
+    assert (separate.v1_post.transpose(*result.v1_post.dims).values == result.v1_post.values).all()
     # the restitution depends on friction, but not that without it
     assert float(result.e_out.max()) > 1.2 * float(result.e_out.min())
     assert float(result.e_out.sel(mu=0.0).std("u1").max()) == 0.0

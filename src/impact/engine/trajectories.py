@@ -114,7 +114,7 @@ def keys_of(law: PlanLaw) -> tuple[str, ...]:
 def law_axes(inputs: Inputs, law: PlanLaw, collapse: bool) -> tuple[int, ...]:
     """Find the axes on which a law and its fixed step depend; all of its axes without `collapse`."""
     if not collapse:
-        return inputs.axes_of_law(*keys_of(law if isinstance(law, Pair) else coupled_pair(inputs, law) or law))
+        return inputs.axes_of_law(*keys_of(law))
     values, status = _values_at(inputs, law, _probe_index(inputs, law))
     return tuple(sorted(axes_of_arrays([status, *values.values()])))
 
