@@ -44,7 +44,8 @@ rigid bodies would just slide throughout, g₀ = γ μ (1 + e) v₀ m/m_t, and r
 1/γ − 1 above. The ball is solid, on a wall, with e = {e:g} and μ = {mu:g}. The contact force is `{hertz}` with
 laws whose stiffness is that of Mindlin, and `{linear}` with the others; the stiffness is {kappa:.4f} of that of
 the contact, as with ν = {nu:g}. Other parameters have their defaults; the slip of the largest friction of
-regularized laws is {slip:g} v₀.
+regularized laws is {slip:g} v₀. A law without numbers is that of
+[a scheme with a fixed step](timestep.md#friction), without a continuous answer.
 
 ## Evidence
 
@@ -70,6 +71,7 @@ KINDS = {
     "dashpot": "A dashpot whose force is limited by μ N. The slip falls, but does not reverse.",
     "regularized": "Coulomb's friction with a coefficient that depends on the slip and vanishes with it. Nothing "
     "sticks: the contact creeps.",
+    "cone": "A dashpot whose force is limited by μ N; what exceeds the limit pushes the balls apart.",
 }
 # the impacts of the columns: solid balls against a wall
 E_IMPACT, MU, NU, CREEP = 0.9, 0.3, 0.3, 0.01
@@ -159,7 +161,9 @@ def betas(
 
 
 def delivered(law: FrictionLaw) -> list[float]:
-    """Compute beta of the columns of a law."""
+    """Compute beta of the columns of a law; NaN for one without a continuous answer."""
+    if law.scheme:
+        return [math.nan] * len(GAMMAS)
     names = {parameter.name for parameter in law.parameters}
     is_hertz = law.stiffness in ("mindlin", "liggghts")
     parameters = {"kt_over_kn": KAPPA} if "kt_over_kn" in names else {}
@@ -192,7 +196,7 @@ def kind_section(kind: str, laws: Sequence[FrictionLaw]) -> str:
             f"`{law.key}`",
             formula(law.equation),
             ", ".join(map(default_text, law.parameters)),
-            *(number(beta, 3) for beta in delivered(law)),
+            *("–" if math.isnan(beta) else number(beta, 3) for beta in delivered(law)),
         ]
         for law in laws
     ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import Any
 
@@ -9,27 +10,51 @@ import numpy as np
 import pytest
 
 import impact
+from impact.config.tables import expand_frictions
 from impact.errors import ConfigError, UsageError
 
 MATERIALS = {"soft": {"E": 1e9, "nu": 0.3, "rho": 1000.0}}
 HOOKE = {"e": 0.7, "K": 1e6, "n": 1.0}
+# parameters of the contact forces
+OF_MODEL = ("gamma", "eta", "k", "b")
 WALL = {"v1": 1.0, "m1": 1.0, "R1": 0.05, "m2": math.inf, "R2": math.inf, "angle": "45 deg", "mu": 0.5}
 
 
-def sweep(model: str, friction: str, values: dict[str, Any], inputs: dict[str, Any], scheme: str) -> Any:
+def sweep(
+    model: str,
+    friction: str,
+    values: dict[str, Any],
+    inputs: dict[str, Any],
+    scheme: str,
+    solver: dict[str, Any] | None = None,
+) -> Any:
+    of_model = {name: inputs[name] for name in OF_MODEL if name in inputs}
+    inputs = {name: value for name, value in inputs.items() if name not in of_model}
+    wall = {name: value for name, value in WALL.items() if name != "angle" or "u1" not in inputs}
     config = {
         "models": model,
+        "model": {model: of_model},
         "frictions": friction,
-        "sweep": {**WALL, **inputs},
+        "sweep": {**wall, **inputs},
         "materials": MATERIALS,
         "friction": {friction: values},
     }
-    return impact.sweep(config if scheme == "exact" else config | {"solver": {"integrator": scheme}})
+    return impact.sweep(
+        config if scheme == "exact" else config | {"solver": {"integrator": scheme} | (solver or {})}
+    )
 
 
 STEP = {"steps_per_contact": 12, "phase": 0.625}
 LINEAR, HERTZ = "lammps-coeff-restitution-hooke", "lammps-coeff-restitution-hertz"
-# u1 [m/s] and omega1 [rad/s] after the impact by LAMMPS of 22 July 2025, fix wall/gran granular
+CLASSIC_HOOKE, CLASSIC_HERTZ = "lammps-mass-velocity-hooke", "lammps-viscoelastic-hertz"
+INPUTS = {
+    LINEAR: HOOKE,
+    HERTZ: {"e": 0.7, "material": "soft"},
+    CLASSIC_HOOKE: {"K": 1e6, "n": 1.0, "gamma": 200.0},
+    CLASSIC_HERTZ: {"K": 1e9 * math.sqrt(0.05), "eta": 1e4},
+}
+# u1 [m/s] and omega1 [rad/s] after the impact by LAMMPS of 22 July 2025, fix wall/gran granular, and for the
+# classic law hooke/history and hertz/history
 BY_LAMMPS = [
     ("lammps-linear-history", LINEAR, {"k_t": 2e5, "xt": 0.0}, (0.5287211865822689, -23.563940670886524)),
     ("lammps-linear-history", LINEAR, {"k_t": 8e5, "xt": 1.0}, (0.7023689870302408, -14.88155064848795)),
@@ -39,7 +64,22 @@ BY_LAMMPS = [
     ("lammps-mindlin-force", HERTZ, {"xt": 0.0}, (0.6523448008847127, -17.382759955764342)),
     ("lammps-mindlin-rescale", HERTZ, {"xt": 0.6}, (0.701104507704072, -14.944774614796373)),
     ("lammps-mindlin-rescale-force", HERTZ, {"xt": 0.0}, (0.6534224235967255, -17.328878820163702)),
+    ("lammps-classic-2025", CLASSIC_HOOKE, {"k_t": 2e9, "xt": 0.1}, (0.7175790955746306, -14.121045221268464)),
+    ("lammps-classic-2025", CLASSIC_HOOKE, {"k_t": 2e7, "xt": 0.5}, (0.626538088605045, -18.673095569747733)),
+    ("lammps-classic-2025", CLASSIC_HERTZ, {"k_t": 8e8}, (0.5860993731371921, -20.695031343140396)),
 ]
+SOLREF, CONE = "mujoco-solref-direct", "mujoco-elliptic"
+# so stiff that the indentation is a ten-millionth of the radius, which is then the lever arm
+STIFF = 1.0 / (1e-7 * 0.05)
+# u1, mu, the parameters of the cone, and v1, u1 and omega1 after the impact by MuJoCo 4.0.0
+BY_MUJOCO = [
+    (1.0, 0.5, {}, (-0.7485100766704116, 0.8650182177976603, -6.749088916013032)),
+    (-3.0, 0.1, {}, (-0.7509110022969537, -2.8249088997703042, 8.754554731520887)),
+    (1.0, 0.5, {"b_t": 0.5 * STIFF, "impratio": 3.0, "impedance": 0.6},
+     (-0.7394711221128126, 0.7375540964602079, -13.12229482644479)),
+    (-3.0, 0.1, {"b_t": 0.5 * STIFF, "impratio": 3.0, "impedance": 0.6},
+     (-0.7611465953487432, -2.823885340465126, 8.80573272224132)),
+]  # fmt: skip
 
 
 @pytest.mark.filterwarnings("ignore::impact.ImpactWarning")
@@ -47,10 +87,113 @@ BY_LAMMPS = [
 def test_lammps_delivered_these_velocities(
     friction: str, model: str, values: dict[str, float], expected: tuple[float, float]
 ) -> None:
-    inputs = HOOKE if model == LINEAR else {"e": 0.7, "material": "soft"}
-    result = sweep(model, friction, values, inputs | STEP, "kick-drift")
+    result = sweep(model, friction, values, INPUTS[model] | STEP, "kick-drift")
     delivered = [float(result[name].squeeze()) for name in ("u1_post", "omega1_post")]
     assert delivered == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize(("u1", "mu", "values", "expected"), BY_MUJOCO)
+def test_mujoco_delivered_these_velocities(
+    u1: float, mu: float, values: dict[str, float], expected: tuple[float, float, float]
+) -> None:
+    inputs = {"k": STIFF**2, "b": 0.2 * STIFF, "mu": mu, "u1": u1}
+    result = sweep(SOLREF, CONE, values, inputs | STEP, "mujoco-cone")
+    delivered = [float(result[name].squeeze()) for name in ("v1_post", "u1_post", "omega1_post")]
+    assert delivered == pytest.approx(expected, rel=1e-6)
+
+
+def cone(
+    u1: float,
+    omega1: float,
+    mu: float,
+    h: float,
+    phase: float,
+    k: float,
+    b: float,
+    b_t: float,
+    d: float,
+    ratio: float,
+    shortening: float = 0.0,
+) -> tuple[float, float, float]:
+    """A solid sphere of unit mass on a plane, as MuJoCo moves it; its lever arm is R, or R - shortening x."""
+    x, u, R = phase * h, 1.0, WALL["R1"]
+    while x > 0.0:
+        arm = R - shortening * x
+        g = u1 + arm * omega1
+        a_n, a_t = (k * x + b * u) / d, b_t * abs(g) / d
+        A_n, A_t = 1.0 / d, 1.0 + arm**2 / (0.4 * R**2) + (1.0 - d) / (d * ratio)
+        f_n, f_t = a_n / A_n, a_t / A_t
+        if f_t > mu * f_n:
+            f_n = max(0.0, (a_n + mu * a_t) / (A_n + mu * mu * A_t))
+            f_t = mu * f_n
+        push = math.copysign(f_t, g) * h
+        u, u1, omega1 = u - h * f_n, u1 - push, omega1 - push * arm / (0.4 * R**2)
+        x += h * u
+    return u, u1, omega1
+
+
+def test_the_cone_is_that_of_a_plain_loop() -> None:
+    axes = {
+        "mu": [0.0, 0.1, 0.5], "u1": [-3.0, 0.2, 1.0], "omega1": [-10.0, 0.0, 25.0], "dt": [1e-3, 2e-3],
+        "phase": [0.125, 0.7], "friction.mujoco-elliptic.impratio": [0.2, 1.0, 5.0],
+    }  # fmt: skip
+    k, b, b_t, d = 1e4, 30.0, 80.0, 0.6
+    inputs = {name: value for name, value in axes.items() if "." not in name} | {"k": k, "b": b}
+    values = {"b_t": b_t, "impedance": d, "impratio": axes["friction.mujoco-elliptic.impratio"]}
+    result = sweep(SOLREF, CONE, values, inputs, "mujoco-cone")
+    ours = [result[name].squeeze().transpose(*axes).values for name in ("v1_post", "u1_post", "omega1_post")]
+    theirs = [
+        cone(u1, omega1, mu, h, phase, k, b, b_t, d, ratio)
+        for mu, u1, omega1, h, phase, ratio in itertools.product(*axes.values())
+    ]
+    np.testing.assert_allclose(np.stack(ours, axis=-1).reshape(-1, 3), theirs, rtol=1e-12, atol=1e-11)
+    separate = sweep(SOLREF, CONE, values, inputs, "mujoco-cone", {"collapse": False})
+    assert (separate.v1_post.transpose(*result.v1_post.dims).values == result.v1_post.values).all()
+    # the restitution depends on friction, but not that without it
+    assert float(result.e_out.max()) > 1.2 * float(result.e_out.min())
+    assert float(result.e_out.sel(mu=0.0).std("u1").max()) == 0.0
+
+
+def test_the_cone_without_friction_is_the_scheme_kick_drift() -> None:
+    inputs = {"k": 1e4, "b": 30.0, "steps_per_contact": [12.0, 31.0], "phase": [0.2, 0.8]}
+    result = sweep(SOLREF, CONE, {}, inputs | {"mu": 0.0}, "mujoco-cone")
+    for scheme in ("kick-drift", "mujoco-cone"):
+        config = {"models": SOLREF, "model": {SOLREF: {"k": 1e4, "b": 30.0}}, "solver": {"integrator": scheme}}
+        central = {name: value for name, value in (WALL | inputs).items() if name not in ("angle", "mu", "k", "b")}
+        assert (impact.sweep(config | {"sweep": central}).e_out.values == result.e_out.values).all()
+
+
+@pytest.mark.parametrize(("friction", "scheme"), [("lammps-classic-2025", "kick-drift"), (CONE, "mujoco-cone")])
+def test_a_friction_law_of_a_scheme_has_no_continuous_answer(friction: str, scheme: str) -> None:
+    message = (
+        f"the friction law {friction} is that of a scheme, without a continuous answer, expected solver.integ"
+    )
+    with pytest.raises(ConfigError, match=f'{message}rator = "{scheme}"'):
+        sweep(SOLREF, friction, {"k_t": 1e9} if "lammps" in friction else {}, {"k": 1e4, "b": 30.0}, "exact")
+
+
+def test_a_pattern_does_not_select_a_friction_law_of_a_scheme() -> None:
+    for selection, one in (("lammps-*", "lammps-mindlin"), ("all", "coulomb-1785")):
+        keys = [law.key for law in expand_frictions(selection)[0]]
+        assert one in keys
+        assert not {"lammps-classic-2025", CONE} & {*keys}
+    assert [law.key for law in expand_frictions(["lammps-classic-2025", "mujoco-*"])[0]] == [
+        "lammps-classic-2025",
+        CONE,
+    ]
+
+
+def test_timestep_has_the_restitution_of_the_cone() -> None:
+    inputs = {"k": 1e4, "b": 60.0, "v1": 1.0, "mu": 0.5, "angle": "80 deg", "impratio": 4.0}
+    result = impact.timestep(SOLREF, at=inputs, friction=CONE, steps_per_contact=[12], phases=2)
+    of_sweep = {"k": 1e4, "b": 60.0, "mu": 0.5, "angle": "80 deg", "steps_per_contact": 12, "phase": [0.25, 0.75]}
+    swept = sweep(SOLREF, CONE, {"impratio": 4.0}, of_sweep | {"m2": 1.0, "R2": 0.05}, "mujoco-cone")
+    assert result.scheme == "mujoco-cone"
+    (row,) = result.rows
+    assert row.e_mean == pytest.approx(float(swept.e_out.mean()), rel=1e-12)
+    assert row.beta_mean == pytest.approx(float(swept.beta.mean()), rel=1e-12)
+    assert math.isnan(result.beta_continuous)
+    assert row.e_mean > 1.1 * result.e_continuous
 
 
 @pytest.mark.parametrize(
@@ -111,15 +254,17 @@ def test_tamsi_slides_by_the_impulse_of_its_own_restitution() -> None:
     [
         ("kick-drift", "coulomb-1785", "one with a spring or a dashpot, such as cundall-strack-1979"),
         ("kick-drift", "drake-regularized", "one with a spring or a dashpot"),
+        ("kick-drift", CONE, "one with a spring or a dashpot"),
+        ("mujoco-cone", "lammps-classic-2025", CONE),
         ("drake-sap", "coulomb-1785", "none: friction changes the restitution that it delivers"),
     ],
 )
 def test_a_scheme_refuses_friction_of_which_no_code_was_run(scheme: str, friction: str, expected: str) -> None:
-    model = LINEAR if scheme == "kick-drift" else "kelvin-voigt-no-tension"
+    models = {"kick-drift": LINEAR, "drake-sap": "kelvin-voigt-no-tension", "mujoco-cone": "mujoco-solref"}
     with pytest.raises(
         ConfigError, match=f'scheme "{scheme}" does not take the friction law {friction}, expected {expected}'
     ):
-        sweep(model, friction, {}, HOOKE | STEP, scheme)
+        sweep(models[scheme], friction, {}, HOOKE | STEP, scheme)
 
 
 def test_timestep_has_the_tangential_restitution_of_a_sweep_over_the_phases() -> None:

@@ -49,13 +49,15 @@ KEYS = {
     "spring": [
         "cundall-strack-1979", "yade-cundall-strack", "yade-mindlin", "liggghts-history", "yade-viscoelastic",
         "lammps-linear-history", "lammps-mindlin", "lammps-mindlin-force", "lammps-mindlin-rescale",
-        "lammps-mindlin-rescale-force",
+        "lammps-mindlin-rescale-force", "lammps-classic-2025",
     ],
     "dashpot": ["liggghts-no-history", "lammps-linear-nohistory"],
     "regularized": ["simbody-hunt-crossley", "drake-regularized"],
+    "cone": ["mujoco-elliptic"],
 }  # fmt: skip
 MEMORY = {
     "lammps-mindlin": (1, 1),
+    "lammps-classic-2025": (1, 1),
     "lammps-mindlin-force": (0, 0),
     "lammps-mindlin-rescale": (1, 2),
     "lammps-mindlin-rescale-force": (0, 1),

@@ -16,6 +16,7 @@ import pytest
 
 import impact
 
+from .test_fixed_step_slip import cone
 from .test_peers import LAMMPS, LIGGGHTS, YADE, Code, Values, betan, run_code
 
 pytestmark = pytest.mark.peers
@@ -29,6 +30,7 @@ ANGLES, MUS, SPINS, STEPS, PHASES = (
 )
 BALL: Values = {"v1": 1.0, "m1": 0.01, "R1": 0.05}
 MATERIAL = {"E": 1e9, "nu": 0.3, "rho": 1000.0}
+MATERIALS = {"materials": {"soft": MATERIAL}}
 # between a code whose lever arm is the radius and the map, relative to the speed before the impact
 TOLERANCE = 1e-10
 # the part of the impacts that may differ by more where a code alternates, and by how much
@@ -49,6 +51,7 @@ class Pairing:
     sweep: Values
     values: Values
     parameters: Callable[[Values, float], Values]
+    scheme: str = "kick-drift"
     # whether the lever arm of friction is less than the radius, by a part of the indentation
     shortens_arms: bool = False
     # whether the code alternates between slip and stick: a shorter arm may change one of those steps
@@ -68,14 +71,29 @@ LAMMPS_WALL = replace(LAMMPS, runner="run_lammps_wall.py")
 
 def lammps_hooke(line: str) -> Callable[[Values, float], Values]:
     """The line of fix wall/gran for a linear spring."""
-    normal = f"hooke {HOOKE['K']} {HOOKE['e']} damping coeff_restitution tangential"
+    normal = f"granular hooke {HOOKE['K']} {HOOKE['e']} damping coeff_restitution tangential"
     return lambda values, mu: {"pair": f"{normal} {line.format(**values)} {mu}"}
 
 
 def lammps_hertz(name: str) -> Callable[[Values, float], Values]:
     """The line of fix wall/gran for materials."""
-    normal = f"hertz/material {MATERIAL['E']} {HERTZ['e']} {MATERIAL['nu']} damping coeff_restitution tangential"
-    return lambda values, mu: {"pair": f"{normal} {name} NULL {values['xt']} {mu}"}
+    normal = f"granular hertz/material {MATERIAL['E']} {HERTZ['e']} {MATERIAL['nu']} damping coeff_restitution"
+    return lambda values, mu: {"pair": f"{normal} tangential {name} NULL {values['xt']} {mu}"}
+
+
+# of a law in which the strength of the damping is that of fix wall/gran hooke/history, and hertz/history
+CLASSIC = {
+    "hooke": ("lammps-mass-velocity-hooke", "gamma", {"K": 1e6, "n": 1.0}, 1e6, 2e3),
+    "hertz": ("lammps-viscoelastic-hertz", "eta", {"K": 1e9 * math.sqrt(BALL["R1"])}, 1e9, 1e6),
+}
+
+
+def lammps_classic(spring: str) -> Callable[[Values, float], Values]:
+    """The line of fix wall/gran of old, with a switch for the tangential damping at its end."""
+    *_, k_n, gamma = CLASSIC[spring]
+    return lambda values, mu: {
+        "pair": f"{spring}/history {k_n!r} {values['k_t']!r} {gamma!r} {values['xt'] * gamma!r} {mu} 1"
+    }
 
 
 LIGGGHTS_WALL = replace(LIGGGHTS, runner="run_liggghts_wall.py")
@@ -107,6 +125,22 @@ def yade_viscoelastic(values: Values, mu: float) -> Values:
 def yade_mindlin(values: Values, mu: float) -> Values:
     """Ip2_FrictMat_FrictMat_MindlinPhys, with a damping of the tangential force of its own."""
     return {"law": "mindlin", "options": MATERIAL | {"betan": betan(HERTZ), **values}, "mu": mu}
+
+
+MUJOCO_WALL = Code("MuJoCo", "run_mujoco_wall.py")
+# so stiff that the indentation is a millionth of the radius, which is then the lever arm
+STIFF = BALL["v1"] / (1e-6 * BALL["R1"])
+
+
+def mujoco(values: Values, mu: float, solref: str = f"{-(STIFF**2)!r} {-0.2 * STIFF!r}") -> Values:
+    """The attributes of a pair of geoms; 0 0 for a friction of the stiffness and damping of the contact."""
+    return {
+        "solref": solref,
+        "solreffriction": f"-1 {-values['b_t']!r}" if "b_t" in values else "0 0",
+        "impratio": values.get("impratio", 1.0),
+        "d": values.get("impedance", 0.9),
+        "mu": mu,
+    }
 
 
 MINDLIN = {
@@ -145,6 +179,41 @@ PAIRINGS = (
     ),
     *(
         Pairing(
+            "lammps-classic-2025",
+            CLASSIC[spring][0],
+            LAMMPS_WALL,
+            CLASSIC[spring][2] | {f"{CLASSIC[spring][0]}.{CLASSIC[spring][1]}": CLASSIC[spring][4]},
+            {"k_t": ratio * CLASSIC[spring][3], "xt": xt},
+            lammps_classic(spring),
+        )
+        for spring, ratio, xt in (
+            ("hooke", 2 / 7, 0.5),
+            ("hooke", 50.0, 0.1),
+            ("hooke", 2000.0, 0.0),
+            ("hertz", 2 / 7, 0.5),
+            ("hertz", 1.0, 0.0),
+        )
+    ),
+    *(
+        Pairing(
+            "mujoco-elliptic",
+            "mujoco-solref-direct",
+            MUJOCO_WALL,
+            {"mujoco-solref-direct.k": STIFF**2, "mujoco-solref-direct.b": 0.2 * STIFF},
+            values,
+            mujoco,
+            scheme="mujoco-cone",
+            shortens_arms=True,
+        )
+        for values in (
+            {},
+            {"impratio": 5.0},
+            {"b_t": 0.02 * STIFF, "impratio": 0.2},
+            {"b_t": STIFF, "impedance": 0.5},
+        )
+    ),
+    *(
+        Pairing(
             f"liggghts-{'history' if tangential == 'history' else 'no-history'}",
             f"liggghts-{model}",
             LIGGGHTS_WALL,
@@ -180,6 +249,21 @@ PAIRINGS = (
 )
 
 
+STANDARD = {"timeconst": 10.0 / STIFF, "dampratio": 0.1}
+PAIRINGS += (
+    Pairing(
+        "mujoco-elliptic",
+        "mujoco-solref",
+        MUJOCO_WALL,
+        {f"mujoco-solref.{name}": value for name, value in STANDARD.items()},
+        {},
+        lambda values, mu: mujoco(values, mu, " ".join(map(repr, STANDARD.values()))),
+        scheme="mujoco-cone",
+        shortens_arms=True,
+    ),
+)
+
+
 def config_of(pairing: Pairing, sweep: Values, solver: Values) -> Values:
     """The config of a pairing."""
     wall = {"m2": math.inf, "R2": math.inf}
@@ -190,7 +274,7 @@ def config_of(pairing: Pairing, sweep: Values, solver: Values) -> Values:
         "frictions": pairing.friction,
         "model": {pairing.model: own},
         "sweep": {**BALL, **wall, **inputs, "mu": [*MUS], **sweep},
-        "materials": {"soft": MATERIAL},
+        **MATERIALS,
         "friction": {pairing.friction: pairing.values},
         "solver": solver,
     }
@@ -198,14 +282,16 @@ def config_of(pairing: Pairing, sweep: Values, solver: Values) -> Values:
 
 def predicted(pairing: Pairing) -> tuple[float, float, np.ndarray]:
     """The contact time [s], the indentation [m], and v1, u1 and R1 omega1 after the impacts of all axes."""
-    continuous = impact.sweep(config_of(pairing, {"mu": 0.1, "angle": "45 deg"}, {}))
+    config = config_of(pairing, {}, {})
+    sweep = {name: value for name, value in config["sweep"].items() if name != "mu"}
+    continuous = impact.sweep({"models": pairing.model, "model": config["model"], "sweep": sweep} | MATERIALS)
     axes = {
         "angle": [f"{angle} deg" for angle in ANGLES],
         "omega1": [*SPINS],
         "steps_per_contact": [*STEPS],
         "phase": [*PHASES],
     }
-    result = impact.sweep(config_of(pairing, axes, {"integrator": "kick-drift"}))
+    result = impact.sweep(config_of(pairing, axes, {"integrator": pairing.scheme}))
     dims = ("mu", *axes)
     assert (result.friction_status == 1).all()
     after = [result.v1_post, result.u1_post, BALL["R1"] * result.omega1_post]
@@ -259,3 +345,22 @@ def test_a_code_delivers_velocities_and_spins_of_the_map_of_its_scheme(
         assert np.count_nonzero(rare) <= RARE * rare.size
         tolerance = LARGEST
     assert difference <= tolerance
+
+
+def test_the_lever_arm_of_mujoco_is_the_radius_without_half_of_the_indentation(tmp_path: Path) -> None:
+    k, b, h = 4e5, 300.0, 4e-4
+    runs = [
+        BALL | mujoco({"b_t": 500.0, "impratio": 3.0}, mu, f"{-k!r} {-b!r}")
+        | {"u1": u1, "omega1": spin, "gap": (3 - phase) * h * BALL["v1"], "step": h, "count": 40}
+        for mu in MUS for u1 in (0.2, 1.0, -5.0) for spin in SPINS for phase in PHASES
+    ]  # fmt: skip
+    _, answers = run_code(MUJOCO_WALL, "mujoco", runs, tmp_path)
+    for shortening, tolerance in ((0.5, 1e-12), (0.0, 4.0 * BALL["v1"] / math.sqrt(k) / BALL["R1"])):
+        ours = [
+            cone(run["u1"], run["omega1"], run["mu"], h, 3 - run["gap"] / h, k, b, 500.0, 0.9, 3.0, shortening)
+            for run in runs
+        ]
+        differences = np.abs(np.array(ours) - answers).max()
+        assert differences <= tolerance
+    # the indentation is a thirtieth of the radius, which is seen
+    assert differences > 1e-3

@@ -1,4 +1,4 @@
-"""A sphere and a plane in LAMMPS, fix wall/gran granular: the plane is z = 0, the sphere above it."""
+"""A sphere and a plane in LAMMPS, fix wall/gran: the plane is z = 0, the sphere above it."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ pair_style granular
 pair_coeff * * hooke 1.0 0.0 damping velocity tangential linear_nohistory 0.0 0.0
 timestep {step}
 fix 1 all nve/sphere
-fix 2 all wall/gran granular {pair} zplane 0.0 NULL
+fix 2 all wall/gran {pair} zplane 0.0 NULL
 thermo 1000000000
 run {count}
 """

@@ -121,6 +121,7 @@ class Draft:
     problems: tuple[ConfigProblem, ...] = ()
     lines: tuple[str, ...] = ()  # complete messages about settings and files
     notes: tuple[str, ...] = ()  # on what is left out
+    has_own_scheme: bool = False  # the command chooses the scheme of friction, not the config
 
     def table(self, name: str) -> dict[str, Any]:
         """Return a table of the config, or an empty one."""

@@ -76,7 +76,10 @@ class InputName:
 
     def applies_to(self, model: str, friction: str = "") -> bool:
         """Check whether a model, or its pair, may depend on it: it is not a parameter of another law."""
-        return self.model in ("", model) and self.friction in ("", friction)
+        law = frictions().get(self.friction)
+        # friction in a cone changes the normal motion, which is that of the model
+        is_of_all = law is not None and law.kind == "cone"
+        return self.model in ("", model) and (is_of_all or self.friction in ("", friction))
 
     def quantity(self, models: Mapping[str, ForceModel]) -> Quantity | None:
         """Find its quantity, or None for the name of a material; KeyError for an unknown input."""

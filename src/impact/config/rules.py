@@ -18,7 +18,7 @@ from ..contact.model import ForceModel, with_base_quantities
 from .draft import Draft, listed_names
 from .files import as_table
 from .input_names import InputName
-from .quantities import ConfigProblem, Quantity
+from .quantities import ConfigProblem, KeyPath, Quantity
 from .tables import (
     FIXED_STEP_INPUTS,
     MATERIAL_QUANTITIES,
@@ -268,8 +268,13 @@ def _oblique_problems(draft: Draft) -> Iterable[ConfigProblem]:
                 yield ("sweep", other), f"set together with {name}, expected one of the two"
     integrator = draft.table("solver").get("integrator", EXACT)
     if isinstance(integrator, str) and integrator in SCHEMES:
-        problems = (friction_problem(law.key, law.kind, integrator) for law in draft.frictions)
-        yield from ((("solver", "integrator"), problem) for problem in problems if problem)
+        path: KeyPath = ("solver", "integrator")
+    elif integrator == EXACT and not draft.has_own_scheme:
+        path = ("frictions",)
+    else:
+        return
+    problems = (friction_problem(law.key, law.kind, integrator, law.scheme) for law in draft.frictions)
+    yield from ((path, problem) for problem in problems if problem)
 
 
 def _spin_problems(draft: Draft) -> Iterable[ConfigProblem]:

@@ -75,7 +75,7 @@ GRAVITY = Quantity("m/s^2", "acceleration that turns heights and flight times in
 DESIGN_METHODS = ("sobol", "lhs", "halton", "random")
 MAX_SAMPLES = 2**22
 MODELS_EXPECTED = 'a model, or a list of models; "all" are all'
-FRICTIONS_EXPECTED = 'a friction law, or a list of friction laws; "all" are all'
+FRICTIONS_EXPECTED = 'a friction law, or a list of friction laws; "all" are all but those of one scheme'
 L = TypeVar("L", ForceModel, FrictionLaw)
 
 
@@ -617,7 +617,7 @@ def _laws_matching(word: object, laws: Mapping[str, L], what: str) -> dict[str, 
     if not isinstance(word, str):
         raise mismatch_error(word, f"the name of a {what}")
     # a law with two names is not run twice
-    distinct = {key: law for key, law in laws.items() if not law.same_as}
+    distinct = {key: law for key, law in laws.items() if not law.same_as and not getattr(law, "scheme", "")}
     if word == "all":
         return {key: law for key, law in distinct.items() if isinstance(law, FrictionLaw) or key in built_in()}
     if word.startswith("family:") and what == "model":
@@ -628,7 +628,9 @@ def _laws_matching(word: object, laws: Mapping[str, L], what: str) -> dict[str, 
             raise mismatch_error(word, f"a family of models; {did_you_mean(family, families)}")
         return members
     if any(letter in word for letter in "*?["):
-        matching = {key: law for key, law in laws.items() if fnmatchcase(key, word[:MAX_UNIT_LENGTH])}
+        of_pattern = {key: law for key, law in laws.items() if fnmatchcase(key, word[:MAX_UNIT_LENGTH])}
+        # a law of one scheme has to be named where a pattern finds others
+        matching = {key: law for key, law in of_pattern.items() if key in distinct or law.same_as} or of_pattern
         if not matching:
             raise mismatch_error(word, f"a pattern that some {what} matches")
         return matching

@@ -29,7 +29,7 @@ from .velocity_coordinates import force_form
 # the integration of the continuous law with error control; all other integrators are schemes with a fixed step
 EXACT = "exact"
 # the update of one step, by the name of the scheme
-KICK_DRIFT, DRAKE_TAMSI, DRAKE_SAP = "kick-drift", "drake-tamsi", "drake-sap"
+KICK_DRIFT, DRAKE_TAMSI, DRAKE_SAP, MUJOCO_CONE = "kick-drift", "drake-tamsi", "drake-sap", "mujoco-cone"
 SCHEMES = {
     KICK_DRIFT: "u <- u - h F(x, u)/m, then x <- x + h u; the force is evaluated at the position and velocity "
     "before the step",
@@ -37,17 +37,22 @@ SCHEMES = {
     "x <- x + h u'; the force is that at the end of the step",
     DRAKE_SAP: "u <- u', the root of u' = u - (h/m) max(0, K (x + h u') + C u'), then x <- x + h u'; the force is "
     "that at the end of the step",
+    MUJOCO_CONE: "u <- u - h f_n/m, then x <- x + h u; the force before the step is that of a friction cone, "
+    "f_n = F while friction is in it, else max(0, F + μ f)/(1 + μ² D), where f is the friction that would stop "
+    "the slip as asked, and D that of a unit of it; without friction it is kick-drift",
 }
 # the laws of the schemes that take only some
 LAWS_OF_SCHEME = {
     DRAKE_TAMSI: "F = K δ (1 + χ δ̇/v₀), n = 1, in both phases, such as drake-point-contact",
     DRAKE_SAP: "F = K δ + C δ̇ to F = 0, in both phases, such as kelvin-voigt-no-tension",
+    MUJOCO_CONE: "of MuJoCo, such as mujoco-solref",
 }
 # the kinds of friction laws with which codes of a scheme were run, and in words which it takes
 FRICTION_OF_SCHEME: Mapping[str, tuple[tuple[str, ...], str]] = {
     KICK_DRIFT: (("spring", "dashpot"), "one with a spring or a dashpot, such as cundall-strack-1979"),
     DRAKE_TAMSI: (("coulomb",), "coulomb-1785"),
     DRAKE_SAP: ((), "none: friction changes the restitution that it delivers"),
+    MUJOCO_CONE: (("cone",), "mujoco-elliptic"),
 }
 # a contact that takes more steps, in units of its steps at the continuous contact time, never ends
 MAX_CONTACTS = 50
@@ -80,6 +85,8 @@ def has_scheme(model: ForceModel, n: float, scheme: str) -> bool:
     # the form that a law declares by its velocity coordinate is that of `force` alone
     if n != 1.0 or model.unloading is not None:
         return False
+    if scheme == MUJOCO_CONE:
+        return model.key.startswith("mujoco-solref")
     if scheme == DRAKE_TAMSI:
         return model.velocity_coordinate == "log"
     is_force = model.velocity_coordinate == "force" and model.release == "force"
@@ -91,12 +98,17 @@ def law_problem(model: ForceModel, scheme: str) -> str:
     return f'scheme "{scheme}" does not take {model.key}, expected a law {LAWS_OF_SCHEME[scheme]}'
 
 
-def friction_problem(key: str, kind: str, scheme: str) -> str:
+def friction_problem(key: str, kind: str, scheme: str, only: str = "") -> str:
     """Write the message to a user who asks for a scheme that does not take a friction law; "" if it does.
+
+    `only` is the one scheme that a law is of, which has no continuous answer then.
 
     >>> friction_problem("drake-regularized", "regularized", "drake-tamsi")
     'scheme "drake-tamsi" does not take the friction law drake-regularized, expected coulomb-1785'
     """
+    if scheme == EXACT:
+        message = f"the friction law {key} is that of a scheme, without a continuous answer"
+        return f'{message}, expected solver.integrator = "{only}"' if only else ""
     kinds, expected = FRICTION_OF_SCHEME[scheme]
     return "" if kind in kinds else f'scheme "{scheme}" does not take the friction law {key}, expected {expected}'
 
@@ -211,12 +223,18 @@ class _Contacts:
             }
             force = np.where(self.unloads, self._formula(unloading, self.params, extra), force)
         is_clamped = law.model.release == "force" or self.scheme != KICK_DRIFT
-        return np.maximum(force, 0.0) if is_clamped else force
+        # the sum of this force and of that of a cone is clamped
+        return np.maximum(force, 0.0) if is_clamped and not self.is_coupled else force
+
+    @property
+    def is_coupled(self) -> bool:
+        """Whether friction changes the normal force."""
+        return self.scheme == MUJOCO_CONE and self.slip is not None
 
     def force_at(self, x: Array) -> Array:
         """Compute the force at other positions, zero where the law has no finite one."""
         other = copy(self)
-        other.x = x
+        other.x, other.slip = x, None
         force = other.force()
         return np.where(np.isfinite(force), force, 0.0)
 
@@ -244,10 +262,12 @@ class _Contacts:
     def advance(self) -> None:
         """Advance all collisions by a step."""
         force = self.force()
+        if self.is_coupled and self.slip is not None:
+            force = self.slip.normal_force(force)
         velocity = self.next_velocity(force)
         if self.slip is not None:
             # the schemes of Drake take the force at the end of the step
-            acting = force if self.scheme == KICK_DRIFT else (self.u - velocity) / self.step
+            acting = (self.u - velocity) / self.step if self.scheme in (DRAKE_TAMSI, DRAKE_SAP) else force
             self.slip.advance(self.x, acting, self.step)
         self.u = velocity
         displacement = self.step * self.u

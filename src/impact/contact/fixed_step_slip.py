@@ -3,20 +3,29 @@
 In the contact's own units, see `impact.contact.tangential`, a step changes the memory of the spring, z <- z + h G,
 or z <- z + h k X G for a law that remembers the force, where X = x^kp, at the indentation before the step. On
 unloading the rescaled laws first change z by a power of X. Then the force follows with its limit N = abs(F) or
-max(F, 0), and G <- G - h phi. The normal motion does not depend on it.
+max(F, 0), and G <- G - h phi. The normal motion does not depend on it, but for that of a cone.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..array_types import Array
+from ..array_types import Array, Mask
 from .powers import power
 from .slip_motion import TangentialForm
+
+# names of the values of a tangential problem, which no value of a law has: the size of the slip at first contact,
+# stiffness and damping of the tangential spring per power of x, 1 where only a pressing force limits friction, the
+# factor from G to the slip y of a coefficient of friction that depends on it, and what only schemes know
+PREFIX = "friction."
+SLIP, TANGENTIAL_STIFFNESS, TANGENTIAL_DAMPING, LIMIT_POSITIVE, SLIP_SCALE, RADIUS, COUPLING = (
+    f"{PREFIX}{name}" for name in ("G0", "k", "c", "positive", "slip_scale", "radius", "coupling")
+)
 
 
 @dataclass
@@ -29,6 +38,9 @@ class FixedStepSlip:
     slip : G, positive at first contact
     stiffness, damping : k' and c' per power of x
     is_positive : whether only a pressing force limits friction
+    radius : radius of the contact over X [m], by which the classic styles of LAMMPS multiply the displacement that
+        a slip leaves; 0 for others
+    coupling : of a cone: how much the friction in it, over that which would be asked for, adds to the normal force
     memory : z, a displacement or a force
     last_power : X at the step before, NaN before the first
     impulse : the integral of the limiting normal force
@@ -42,6 +54,8 @@ class FixedStepSlip:
     stiffness: Array
     damping: Array
     is_positive: Array
+    radius: Array
+    coupling: Array
     memory: Array
     last_power: Array
     impulse: Array
@@ -51,24 +65,28 @@ class FixedStepSlip:
     changes: NDArray[np.int32]
 
     @classmethod
-    def of(
-        cls, form: TangentialForm, slip: Array, stiffness: Array, damping: Array, is_positive: Array
-    ) -> FixedStepSlip:
-        """Begin contacts with these slips."""
-        zero = np.zeros(slip.size)
+    def of(cls, form: TangentialForm, values: Mapping[str, Array], count: int) -> FixedStepSlip:
+        """Begin contacts with the values of tangential problems; those without slip or friction have no slip."""
+
+        def column(name: str, default: float = 0.0) -> Array:
+            return np.array(np.broadcast_to(values.get(name, default), count), float)
+
+        slip = np.abs(column(SLIP, 1.0))
         return cls(
             form=form,
-            slip=slip.copy(),
-            stiffness=stiffness.copy(),
-            damping=damping.copy(),
-            is_positive=is_positive.copy(),
-            memory=zero.copy(),
-            last_power=np.full(slip.size, np.nan),
-            impulse=zero.copy(),
-            sticks=np.zeros(slip.size, bool),
-            slips=np.zeros(slip.size, bool),
-            slipped=np.zeros(slip.size, bool),
-            changes=np.zeros(slip.size, np.int32),
+            slip=np.where(np.isfinite(slip), slip, 0.0),
+            stiffness=column(TANGENTIAL_STIFFNESS),
+            damping=column(TANGENTIAL_DAMPING),
+            is_positive=column(LIMIT_POSITIVE),
+            radius=column(RADIUS),
+            coupling=column(COUPLING),
+            memory=np.zeros(count),
+            last_power=np.full(count, np.nan),
+            impulse=np.zeros(count),
+            sticks=np.zeros(count, bool),
+            slips=np.zeros(count, bool),
+            slipped=np.zeros(count, bool),
+            changes=np.zeros(count, np.int32),
         )
 
     def take(self, rows: NDArray[Any]) -> FixedStepSlip:
@@ -81,6 +99,15 @@ class FixedStepSlip:
         for field in fields(self)[1:]:
             getattr(self, field.name)[rows] = getattr(part, field.name)
 
+    def normal_force(self, force: Array) -> Array:
+        """Compute the normal force of a cone from that of the law alone, which may be negative.
+
+        Friction within the cone leaves it as it is. At the cone it solves both equations of motion together.
+        """
+        asked = self.damping * np.abs(self.slip)
+        coupled = np.maximum(force + self.coupling * asked, 0.0) / (1.0 + self.coupling)
+        return np.where(asked <= force, force, coupled)
+
     def advance(self, x: Array, force: Array, step: Array) -> None:
         """Advance by a step, with the indentation and the normal force before it."""
         form = self.form
@@ -90,12 +117,13 @@ class FixedStepSlip:
             return
         drag = self.damping * power(x, form.damping_power) * self.slip
         spring = self._spring(x, step) if form.kind == "spring" else np.zeros_like(drag)
-        trial = spring + drag if form.kind == "dashpot" or form.cap == "total" else spring
+        trial = spring + drag if form.kind != "spring" or form.cap == "total" else spring
         slips = np.abs(trial) > limit
         at_limit = np.copysign(limit, trial)
         phi = np.where(slips, at_limit, spring + drag)
         if form.kind == "spring":
-            self._remember(x, np.where(slips, at_limit - (drag if form.cap == "total" else 0.0), spring))
+            left = np.where(slips, at_limit - (drag if form.cap == "total" else 0.0), spring)
+            self._remember(x, left, slips)
         self.slip = self.slip - step * phi
         self.changes = self.changes + ((self.sticks | self.slips) & (slips != self.slipped)).astype(np.int32)
         self.sticks, self.slips, self.slipped = self.sticks | ~slips, self.slips | slips, slips
@@ -119,10 +147,13 @@ class FixedStepSlip:
             return self.memory + step * stiffness * self.slip
         return stiffness * (self.memory + step * self.slip)
 
-    def _remember(self, x: Array, spring: Array) -> None:
+    def _remember(self, x: Array, spring: Array, slips: Mask) -> None:
         """Keep the force of the spring, or the displacement that belongs to it."""
         if self.remembers_force:
             self.memory = spring
             return
         stiffness = self.stiffness * power(x, self.form.stiffness_power)
-        self.memory = np.where(stiffness > 0.0, spring / stiffness, 0.0)
+        memory = np.where(stiffness > 0.0, spring / stiffness, 0.0)
+        # where it slips, LAMMPS of 22 July 2025 divides the force by k, not by k a
+        scale = np.where(slips & (self.radius > 0.0), self.radius * power(x, self.form.stiffness_power), 1.0)
+        self.memory = memory * scale

@@ -20,6 +20,16 @@ from ..errors import ModelError
 from .closed_forms.dashpot import gap_damping
 from .dimensionless import LawValues, required_quantities, with_coefficients, with_units
 from .evidence import Evidence
+from .fixed_step_slip import (
+    COUPLING,
+    LIMIT_POSITIVE,
+    PREFIX,
+    RADIUS,
+    SLIP,
+    SLIP_SCALE,
+    TANGENTIAL_DAMPING,
+    TANGENTIAL_STIFFNESS,
+)
 from .force_expressions import spring
 from .formula_calls import Formula, argument_names, call_by_name
 from .impacts import Impacts
@@ -28,23 +38,16 @@ from .model import NOT_VERIFIED, ForceModel, Parameter
 from .powers import distinct_values
 from .rigid import ObliqueImpacts
 from .status import FrictionStatus
-from .tangential import (
-    LIMIT_POSITIVE,
-    PREFIX,
-    SLIP,
-    SLIP_SCALE,
-    TANGENTIAL_DAMPING,
-    TANGENTIAL_STIFFNESS,
-    FrictionKind,
-    TangentialForm,
-)
+from .tangential import FrictionKind, TangentialForm
 
 Mask = NDArray[np.bool_]
 # how the stiffness of the tangential spring is chosen, where the user sets no kt_over_kn: a constant k_t;
 # Mindlin's 8 G* a, or k_t sqrt(x); as LIGGGHTS does, 8 G* a for n = 3/2 and K for n = 1
-StiffnessRule = Literal["", "constant", "mindlin", "liggghts"]
-# how the damping is chosen: xt times that of the contact force; as LIGGGHTS does; as YADE does, by betas; c_t
-DampingRule = Literal["", "xt", "liggghts", "betas", "c_t"]
+# k_t times the radius of the contact in metres
+StiffnessRule = Literal["", "constant", "mindlin", "liggghts", "classic"]
+# how the damping is chosen: xt times that of the contact force; as LIGGGHTS does; as YADE does, by betas; c_t; as
+# MuJoCo does, b_t and the impedance
+DampingRule = Literal["", "xt", "liggghts", "betas", "c_t", "cone"]
 HERTZ = 1.5
 # the parameters that set the stiffness of the tangential spring
 STIFFNESS_PARAMETERS = ("k_t", "kt_over_kn")
@@ -59,13 +62,14 @@ class FrictionLaw:
     key : kebab-case name, unique in the catalogue
     title, year, reference, doi : name, year and sources of the law, separated by semicolons; the DOI of the first
     equation : the law in one line of Unicode
-    kind : "coulomb", f = mu N; "spring", a spring and a dashpot limited by mu N; "dashpot", limited by mu N; or
-        "regularized", f = mu(g) N
+    kind : "coulomb", f = mu N; "spring", a spring and a dashpot limited by mu N; "dashpot", limited by mu N;
+        "regularized", f = mu(g) N; or "cone", a dashpot limited by mu N, where N grows with what exceeds the limit
     evidence : where the law and the DOI were read or derived, or that they were not verified
     parameters : parameters that the user sets in `[friction.KEY]`
     same_as : key of the law that this one is another name for, or ""
     stiffness, damping : how the stiffness of the spring, and the damping, are chosen; "" for none
     memory, cap, coefficient : see `impact.contact.tangential.TangentialForm`
+    scheme : the only scheme that it is of, see `impact.contact.fixed_step.SCHEMES`; "" for a continuous law
 
     Raises
     ------
@@ -87,6 +91,7 @@ class FrictionLaw:
     memory: tuple[float, float] = (0.0, 0.0)
     cap: Literal["total", "spring"] = "total"
     coefficient: Formula | None = None
+    scheme: str = ""
 
     def __post_init__(self) -> None:
         if not re.fullmatch(r"[a-z0-9]+(-[a-z0-9]+)*", self.key):
@@ -102,9 +107,9 @@ class FrictionLaw:
 
     @property
     def default_limit(self) -> str:
-        """The word that `limit` has where the user sets none."""
-        limit = next(parameter for parameter in self.parameters if parameter.name == "limit")
-        return limit.choices[int(limit.default or 0.0)]
+        """The word that `limit` has where the user sets none; "" for a law without one."""
+        limits = (parameter for parameter in self.parameters if parameter.name == "limit")
+        return next((limit.choices[int(limit.default or 0.0)] for limit in limits), "")
 
 
 @dataclass(frozen=True)
@@ -147,6 +152,7 @@ class Pair:
             "liggghts": 0.5 * stiffness_power if n == HERTZ else normal_power,
             "betas": 0.5 * stiffness_power,
             "c_t": 0.0,
+            "cone": 0.0,
         }[law.damping]
         return TangentialForm(law.kind, stiffness_power, damping_power, law.memory, law.cap, law.coefficient)
 
@@ -178,12 +184,16 @@ def friction_values(pair: Pair, oblique: ObliqueImpacts) -> dict[str, Array]:
         The kind "coulomb" has no `SLIP`: one trajectory of it is that of every slip
     """
     law, impacts, mu = pair.friction, oblique.impacts, oblique.mu
-    values = {LIMIT_POSITIVE: _value(law, oblique, "limit")}
+    values = {} if law.kind == "cone" else {LIMIT_POSITIVE: _value(law, oblique, "limit")}
     if law.kind == "coulomb":
         return values
     values |= _spring_values(pair, oblique)
     with np.errstate(all="ignore"):
         values[SLIP] = np.abs(oblique.G0)
+        if law.kind == "cone":
+            values[COUPLING] = np.square(mu) * _cone_compliance(law, oblique)
+        if law.stiffness == "classic":
+            values[RADIUS] = np.sqrt(impacts.R_eff * impacts.length)
         if law.kind == "regularized":
             dynamic = _parameter(law, oblique, "mu_d")
             speed = _value(law, oblique, next(p.name for p in law.parameters if p.unit == "m/s"))
@@ -235,8 +245,9 @@ def parameter_problem(
         return "k_t: set together with kt_over_kn, expected one of the two"
     if chosen or not law.stiffness:
         return ""
-    if law.stiffness == "constant":
-        return "k_t: missing, expected a stiffness [N/m], such as 1e6; or kt_over_kn"
+    if law.stiffness in ("constant", "classic"):
+        expected = "[N/m], such as 1e6; or kt_over_kn" if len(names) > 1 else "[N/m^2], such as 1e6"
+        return f"k_t: missing, expected a stiffness {expected}"
     if has_stiffness and not (law.stiffness == "liggghts" and n == 1.0):
         return f"{names[0]}: missing, expected {' or '.join(names)}: K is set, so that 8 G* a may not belong to it"
     return ""
@@ -296,7 +307,7 @@ def _spring_values(pair: Pair, oblique: ObliqueImpacts) -> dict[str, Array]:
 
 
 def _stiffness_power(law: FrictionLaw, n: float) -> float:
-    return {"": 0.0, "constant": 0.0, "mindlin": 0.5, "liggghts": n - 1.0}[law.stiffness]
+    return {"": 0.0, "constant": 0.0, "mindlin": 0.5, "liggghts": n - 1.0, "classic": 0.5}[law.stiffness]
 
 
 def _stiffness(pair: Pair, oblique: ObliqueImpacts) -> Array:
@@ -308,6 +319,8 @@ def _stiffness(pair: Pair, oblique: ObliqueImpacts) -> Array:
         return ratio * n
     if law.stiffness == "constant":
         return _in_own_units(_value(law, oblique, "k_t"), "N/m", 1.0, impacts)
+    if law.stiffness == "classic":
+        return impacts.in_own_units(_value(law, oblique, "k_t") * np.sqrt(impacts.R_eff), "N/m^1.5")
     if _parameter(law, oblique, "k_t") is not None:
         return _in_own_units(_value(law, oblique, "k_t"), "N/m^1.5", HERTZ, impacts)
     G_eff = effective_shear_modulus(impacts.E1, impacts.nu1, impacts.E2, impacts.nu2)
@@ -340,6 +353,10 @@ def _damping(pair: Pair, oblique: ObliqueImpacts) -> Array:
             betas = _parameter(law, oblique, "betas")
             beta = gap_damping(impacts.e) if betas is None else betas
             return 2.0 * beta * np.sqrt(_stiffness(pair, oblique))
+        case "cone":
+            b_t = _parameter(law, oblique, "b_t")
+            b = _force_at(pair.model, impacts, v=1.0) if b_t is None else impacts.in_own_units(b_t, "1/s")
+            return b / _cone_compliance(law, oblique)
     is_on, is_hertz = _value(law, oblique, "tangential_damping"), impacts.n == HERTZ
     if not is_hertz.any():
         return _product(is_on, _normal_damping(pair.model, impacts))
@@ -347,6 +364,19 @@ def _damping(pair: Pair, oblique: ObliqueImpacts) -> Array:
     if not is_hertz.all():
         c = np.where(is_hertz, c, _normal_damping(pair.model, impacts))
     return _product(is_on, c)
+
+
+def _cone_compliance(law: FrictionLaw, oblique: ObliqueImpacts) -> Array:
+    """Compute the slip that an impulse of friction takes away, times the impedance d, in units of v0 and m v0."""
+    impedance = _value(law, oblique, "impedance")
+    return impedance / oblique.mass_ratio + (1.0 - impedance) / _value(law, oblique, "impratio")
+
+
+def _force_at(model: ForceModel, impacts: Impacts, v: float) -> Array:
+    """Compute the force at first contact at a velocity, in the contact's own units."""
+    values, shape = _law_values(model, model.quantities, impacts, float(impacts.n.flat[0]))
+    force = call_by_name(model.force, {**values, "x": 0.0, "v": v, "elastic": 0.0})
+    return np.broadcast_to(force, int(np.prod(shape))).reshape(shape)
 
 
 def _product(factor: Array, c: Array) -> Array:
@@ -424,15 +454,11 @@ def _problems(pair: Pair, oblique: ObliqueImpacts) -> Iterator[tuple[Mask, str]]
 
 def _adhesion_problems(pair: Pair, oblique: ObliqueImpacts) -> Iterator[tuple[Mask, str]]:
     """Find where a contact force pulls from the start and friction is not Coulomb's, of a pressing force."""
-    model, impacts = pair.model, oblique.impacts
     try:
-        n = float(impacts.n.flat[0])
-        values, shape = _law_values(model, model.quantities, impacts, n)
-        start = call_by_name(model.force, {**values, "x": 0.0, "v": 1.0, "elastic": 0.0})
+        pulls = _force_at(pair.model, oblique.impacts, v=1.0) < 0.0
     except ModelError:
         # the integration reports it
         return
-    pulls = np.broadcast_to(start < 0.0, int(np.prod(shape))).reshape(shape)
     is_allowed = (pair.friction.kind == "coulomb") & (_value(pair.friction, oblique, "limit") > 0.0)
     yield pulls & ~is_allowed, 'the contact force pulls from the start: expected coulomb-1785, limit = "positive"'
 

@@ -17,6 +17,7 @@ from ..array_types import Array
 from ..ode.problem import Params, Problem, Step
 from . import motion
 from .dimensionless import dimensionless_values, with_coefficients, with_units
+from .fixed_step_slip import LIMIT_POSITIVE
 from .friction import Pair, friction_values
 from .impacts import Impacts
 from .model import ForceModel
@@ -24,7 +25,7 @@ from .rigid import ObliqueImpacts
 from .simulate import integrate_phases
 from .slip_motion import LEAST_S, SLIP_ROW, TIME_ROW, SlipPhase
 from .status import Status
-from .tangential import LIMIT_POSITIVE, record_friction, simulate_friction
+from .tangential import record_friction, simulate_friction
 from .velocity_coordinates import is_strong
 
 # points at which a step is sampled, and Gauss points by which it is integrated

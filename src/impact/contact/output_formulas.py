@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..array_types import Array, Mask
 from .dimensionless import dimensionless_values
-from .fixed_step import EXACT
+from .fixed_step import EXACT, MUJOCO_CONE
 from .formula_calls import argument_names
 from .friction import Pair, check_friction, friction_values
 from .impacts import Impacts, check_inputs
@@ -100,6 +100,9 @@ def collide(
     with np.errstate(all="ignore"):
         of_law, checked = dimensionless_values(model, impacts), check_inputs(model, impacts)
     values = {**of_law, **(fixed_step or {})}
+    if oblique is not None and integrator == MUJOCO_CONE:
+        with np.errstate(all="ignore"):
+            values |= friction_values(*oblique)
     result = simulate(
         model,
         impacts.n,

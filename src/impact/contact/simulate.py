@@ -24,14 +24,15 @@ from ..ode.state import Workspace
 from . import motion
 from .deduplicate import deduplicate
 from .dimensionless import LawValues, chi_of, exact_restitution, with_coefficients, with_units
-from .fixed_step import EXACT, MAX_CONTACTS, FixedStepResult, collide_at_fixed_step
-from .fixed_step_slip import FixedStepSlip
+from .fixed_step import EXACT, MAX_CONTACTS, MUJOCO_CONE, FixedStepResult, collide_at_fixed_step
+from .fixed_step_slip import PREFIX, SLIP, FixedStepSlip
 from .formula_calls import argument_names, describe_error
 from .model import ForceModel
 from .numba import dispatch
 from .piecewise import in_parts
 from .powers import distinct_values
 from .records import Positions, Record, positions
+from .slip_motion import TangentialForm
 from .status import LIMIT, STATUS_OK, Status
 from .velocity_coordinates import VelocityCoordinate, is_strong
 
@@ -302,9 +303,16 @@ def collide_at_fixed_steps(
 ) -> CollisionResult:
     """Integrate impacts at a fixed step; if it is a part of the contact time, the continuous law comes first.
 
-    `slip`, of the same impacts under friction, is advanced to their ends.
+    `slip`, of the same impacts under friction, is advanced to their ends. A scheme in which friction changes the
+    restitution takes that of the values, if they have one.
     """
-    of_law = {name: array for name, array in values.items() if name not in (STEPS_PER_CONTACT, STEP, PHASE)}
+    if scheme == MUJOCO_CONE and slip is None and SLIP in values:
+        slip = FixedStepSlip.of(TangentialForm("cone"), values, count)
+    of_law = {
+        name: array
+        for name, array in values.items()
+        if name not in (STEPS_PER_CONTACT, STEP, PHASE) and not name.startswith(PREFIX)
+    }
 
     def contact_times(rows: Positions, size: int) -> tuple[Array, NDArray[np.int8]]:
         """Compute the contact times of the continuous law, and statuses that are OK where there is one."""

@@ -29,7 +29,7 @@ from .formula_calls import Formula, call_by_name
 from .piecewise import Breakpoint
 from .velocity_coordinates import signed_power
 
-FrictionKind = Literal["coulomb", "spring", "dashpot", "regularized"]
+FrictionKind = Literal["coulomb", "spring", "dashpot", "regularized", "cone"]
 
 # rows of the joint state and its rates after s and v; the first four rows are components, those from time on the
 # quadratures of `TangentialForm.quadratures`; the last row of rates is the normal force

@@ -20,7 +20,15 @@ from ..ode.rk45 import integrate
 from . import motion
 from .dimensionless import exact_restitution, with_coefficients, with_units
 from .fixed_step import EXACT
-from .fixed_step_slip import FixedStepSlip
+from .fixed_step_slip import (
+    LIMIT_POSITIVE,
+    PREFIX,
+    SLIP,
+    SLIP_SCALE,
+    TANGENTIAL_DAMPING,
+    TANGENTIAL_STIFFNESS,
+    FixedStepSlip,
+)
 from .formula_calls import argument_names
 from .model import ForceModel
 from .piecewise import in_parts
@@ -53,13 +61,6 @@ from .status import LIMIT, STATUS_OK, FrictionStatus, Status
 
 __all__ = ["FrictionKind", "TangentialForm", "TangentialResult", "simulate_friction"]
 
-# names of the values of a tangential problem, which no value of a law has: the size of the slip at first contact,
-# stiffness and damping of the tangential spring per power of x, 1 where only a pressing force limits friction, and
-# the factor from G to the slip y of a coefficient of friction that depends on it
-PREFIX = "friction."
-SLIP, TANGENTIAL_STIFFNESS, TANGENTIAL_DAMPING, LIMIT_POSITIVE, SLIP_SCALE = (
-    f"{PREFIX}{name}" for name in ("G0", "k", "c", "positive", "slip_scale")
-)
 # contact regimes, 0 where they are not defined
 STICKS, SLIDES, BOTH = 1, 2, 3
 
@@ -218,7 +219,7 @@ def _tangential_columns(form: TangentialForm, values: ValueArrays, count: int) -
     return TangentialColumns(
         np.ones(count) if form.kind == "coulomb" else np.abs(values[SLIP]),
         values[TANGENTIAL_STIFFNESS] if form.kind == "spring" else zero,
-        values.get(TANGENTIAL_DAMPING, zero) if form.kind in ("spring", "dashpot") else zero,
+        values.get(TANGENTIAL_DAMPING, zero) if form.kind in ("spring", "dashpot", "cone") else zero,
         values.get(LIMIT_POSITIVE, zero),
     )
 
@@ -236,13 +237,11 @@ def _slip_at_fixed_steps(
 ) -> TangentialResult:
     """Integrate slips at a fixed step; those without slip or friction as contacts without slip."""
     form, given = pair.form(n), _tangential_columns(pair.form(n), values, count)
-    is_finite = np.isfinite(given.slip)
-    slip = FixedStepSlip.of(form, np.where(is_finite, given.slip, 0.0), *given[1:])
-    of_law = {name: array for name, array in values.items() if not name.startswith(PREFIX)}
+    slip = FixedStepSlip.of(form, values, count)
     collisions = collide_at_fixed_steps(
         pair.model,
         n,
-        of_law,
+        values,
         count,
         scheme=scheme,
         compute=compute,

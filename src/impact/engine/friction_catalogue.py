@@ -18,6 +18,7 @@ STIFFNESS = {
     "constant": "k_t or kt_over_kn",
     "mindlin": "8 G* a of the materials, k_t or kt_over_kn",
     "liggghts": "8 G* a of the materials (n = 3/2), K (n = 1) or kt_over_kn",
+    "classic": "k_t a",
 }
 MEMORY = {
     (0.0, 0.0): "the force",
@@ -37,7 +38,8 @@ class FrictionDescription(Displayed):
     def as_dict(self) -> dict[str, Any]:
         """The declaration as plain data."""
         law = self.law
-        names = ("key", "title", "year", "kind", "equation", "reference", "doi", "same_as", "memory", "cap")
+        names = ["key", "title", "year", "kind", "equation", "reference", "doi", "same_as", "memory", "cap"]
+        names += ["scheme"] if law.scheme else []
         return {
             **{name: getattr(law, name) for name in names},
             "evidence": vars(law.evidence),
@@ -55,6 +57,7 @@ class FrictionDescription(Displayed):
             "reference": law.reference,
             "doi": law.doi,
             "evidence": str(law.evidence),
+            "only in": f'solver.integrator = "{law.scheme}"' if law.scheme else "",
             "stiffness": STIFFNESS.get(law.stiffness, ""),
             "keeps": MEMORY[law.memory] if is_spring else "",
             "limited": CAPS[law.cap] if is_spring else "",

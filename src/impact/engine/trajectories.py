@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ..contact.deduplicate import deduplicate
 from ..contact.dimensionless import dimensionless_values, exponent_names
 from ..contact.friction import Pair, check_friction, friction_values
+from ..contact.frictions.multibody_codes import MUJOCO_ELLIPTIC
 from ..contact.impacts import CHECKS, check_inputs
 from ..contact.model import ForceModel
 from ..contact.records import Record
@@ -153,6 +154,13 @@ def even_size(count: int, most: int) -> int:
     return -(-count // -(-count // most))
 
 
+def coupled_pair(inputs: Inputs, model: ForceModel) -> Pair | None:
+    """Find the friction law that changes the normal motion of a model in the scheme of the inputs."""
+    names = inputs.names()
+    is_coupled = "phase" in names and f"friction.{MUJOCO_ELLIPTIC.key}.impratio" in names
+    return Pair(model, MUJOCO_ELLIPTIC) if is_coupled else None
+
+
 def columns_at(inputs: Inputs, law: PlanLaw, axes: Sequence[int], index: Index) -> Columns:
     """Build the problems of a law at cells, arrays that broadcast; only inputs along `axes` are checked."""
     model = model_of(law)
@@ -170,10 +178,11 @@ def _values_at(inputs: Inputs, law: PlanLaw, index: Index) -> tuple[Columns, NDA
     impacts, status = build_impacts(inputs, model, index), np.full((1,) * dimensions(index), STATUS_OK, np.int8)
     with np.errstate(all="ignore"):
         values = {"n": impacts.n, **dimensionless_values(model, impacts), **fixed_steps_at(inputs, impacts, index)}
-        if isinstance(law, Pair):
-            oblique = build_oblique(inputs, impacts, index, law.friction)
-            values |= friction_values(law, oblique)
-            status = check_friction(law, oblique)
+        pair = law if isinstance(law, Pair) else coupled_pair(inputs, law)
+        if pair is not None:
+            oblique = build_oblique(inputs, impacts, index, pair.friction)
+            values |= friction_values(pair, oblique)
+            status = check_friction(pair, oblique)
     return values, status
 
 

@@ -287,7 +287,8 @@ def solve_damping(config: Config, plugins: Plugins, e: float) -> Config:
     """Set the damping parameter of a law without an e to the value that gives an e."""
     law = config.models[0]
     unknown = unknown_of(law, law.damping)
-    result = solve_input(config, plugins, unknown, {"e_out": e})
+    # the e of the continuous law, which friction does not change
+    result = solve_input(replace(config, frictions=()), plugins, unknown, {"e_out": e})
     if not result.roots:
         lower, upper = map(number, result.attainable)
         asked = argument("at", number(e), key="e")

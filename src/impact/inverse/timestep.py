@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, SupportsFloat
 
@@ -30,12 +31,14 @@ from ..contact.dimensionless import dimensionless_values
 from ..contact.fixed_step import (
     MAX_CONTACTS,
     MAX_STEPS_PER_CONTACT,
+    MUJOCO_CONE,
     FixedStepResult,
     check_scheme,
     collide_at_fixed_step,
     default_scheme,
     friction_problem,
 )
+from ..contact.fixed_step_slip import FixedStepSlip
 from ..contact.formula_calls import argument_names
 from ..contact.friction import Pair, friction_values
 from ..contact.impacts import Impacts
@@ -336,7 +339,8 @@ def timestep(
     if parameter is not None and (tol is None or len(given) != 1):
         raise UsageError(f"{argument('parameter')}: expected one {argument('dt')} and {argument('tol')} as well")
     plugin_set = read_plugins(plugins)
-    point_source = open_source(source, overrides, plugin_set)
+    opened = open_source(source, overrides, plugin_set)
+    point_source = replace(opened, config_draft=replace(opened.config_draft, has_own_scheme=True))
     point = point_with_e(point_source, find(model, plugin_set.models), at or {}, friction=friction)
     if point.config.frictions:
         Plan(point.config, plugin_set).pair_notes("frictions")
@@ -370,17 +374,18 @@ class ObliqueLaw:
     pair: Pair
     impact: ObliqueImpacts
 
+    def values(self, count: int) -> dict[str, Array]:
+        """Compute the values of the tangential problem for many steps or phases."""
+        values = friction_values(self.pair, self.impact)
+        return {name: np.broadcast_to(column.ravel(), count) for name, column in values.items()}
+
     def restitution(self, values: Mapping[str, Array], scheme: str, max_steps: int) -> Array:
         """Compute beta of impacts at fixed steps, from the values of the normal problem and of the steps."""
         count = values[STEP].size
-        friction = {
-            name: np.broadcast_to(column.ravel(), count)
-            for name, column in friction_values(self.pair, self.impact).items()
-        }
         result = simulate_friction(
             self.pair,
             np.full(count, float(self.impact.impacts.n[0])),
-            {**values, **friction},
+            {**values, **self.values(count)},
             np.full(count, STATUS_OK, np.int8),
             rtol=DEFAULT_RTOL,
             max_steps=max_steps,
@@ -412,6 +417,11 @@ class FixedStepLaw:
         return "e" in self.model.quantities
 
     @property
+    def is_coupled(self) -> bool:
+        """Whether friction changes the restitution."""
+        return self.oblique is not None and self.scheme == MUJOCO_CONE
+
+    @property
     def e(self) -> float:
         """The requested e; NaN for a law without one."""
         return float(self.impact.e[0]) if self.has_e else math.nan
@@ -426,8 +436,10 @@ class FixedStepLaw:
         if e is not None:
             values["e"] = np.repeat(e, self.phases)
         step, phase = values.pop(STEP), values.pop(PHASE)
-        n = float(self.impact.n[0])
-        return collide_at_fixed_step(self.model, n, values, step, phase, self._max_steps(dt), self.scheme)
+        n, slip = float(self.impact.n[0]), None
+        if self.oblique is not None and self.is_coupled:
+            slip = FixedStepSlip.of(self.oblique.pair.form(n), self.oblique.values(step.size), step.size)
+        return collide_at_fixed_step(self.model, n, values, step, phase, self._max_steps(dt), self.scheme, slip)
 
     def tangential_restitution(self, dt: Array) -> Array:
         """Compute beta at steps dt [s] over all phases, shape (k, phases); NaN without a friction law."""
@@ -547,6 +559,7 @@ def needed_parameter(
     e = None if point.solved is None else float(config.scalars["e"])
     unknown, path, value = _seek(config, law, name)
     base, damping_path = law, f"{model.key}.{model.damping}"
+    law_of = partial(fixed_step_law, phases=base.phases, scheme=base.scheme, of_friction=base.is_coupled)
 
     def damping_of(impact: Impacts) -> float:
         return float(impact.dimensionless(model, model.damping)[0])
@@ -554,15 +567,15 @@ def needed_parameter(
     def collide_at(value: float) -> tuple[Config, FixedStepLaw, dict[str, float]]:
         changed = replace(config, scalars={**config.scalars, path: value})
         if e is None:
-            return changed, *fixed_step_law(changed, base.phases, base.scheme)
+            return changed, *law_of(changed)
         damping = damping_of(build_impacts(Plan(changed).inputs, model, ()))
         scaled = float(changed.scalars[damping_path]) * (damping_of(base.impact) / damping if damping else 1.0)
         changed = replace(changed, scalars={**changed.scalars, damping_path: scaled})
-        law, collision = fixed_step_law(changed, base.phases, base.scheme)
+        law, collision = law_of(changed)
         if abs(collision["e_out"] - e) < HELD_E:
             return changed, law, collision
         changed = solve_damping(changed, plugins, e)
-        return changed, *fixed_step_law(changed, base.phases, base.scheme)
+        return changed, *law_of(changed)
 
     nearby = collide_at(NEARBY * value)[1]
     slope = math.log(nearby.contact_time / law.contact_time) / math.log(NEARBY)
@@ -645,22 +658,24 @@ def fixed_step_law(
     plan = Plan(config)
     model = config.models[0]
     impact = build_impacts(plan.inputs, model, ())
-    scheme = default_scheme(model) if scheme is None else scheme
+    law = config.frictions[0] if of_friction and config.frictions else None
+    if scheme is None:
+        scheme = (law.scheme if law else "") or default_scheme(model)
     check_scheme(model, float(impact.n[0]), scheme)
     oblique = None
-    if of_friction and config.frictions:
-        law = config.frictions[0]
+    if law is not None:
         problem = friction_problem(law.key, law.kind, scheme)
         if problem:
             raise UsageError(problem)
         oblique = ObliqueLaw(Pair(model, law), build_oblique(plan.inputs, impact, (), law))
+    continuous = oblique if law is not None and not law.scheme else None
     outputs = collide(
         model,
         impact,
         rtol=config.solver.rtol,
         max_steps=config.solver.max_steps,
-        names=(*CENTRAL_OUTPUTS, *(("beta", "friction_status") if oblique else ())),
-        oblique=(oblique.pair, oblique.impact) if oblique else None,
+        names=(*CENTRAL_OUTPUTS, *(("beta", "friction_status") if continuous else ())),
+        oblique=(continuous.pair, continuous.impact) if continuous else None,
     )
     collision = {name: array.ravel()[0].item() for name, array in outputs.items()}
     status = Status(collision["status"])

@@ -9,7 +9,7 @@ from ..catalogue import by_key, declared_laws, look_up, pickle_by_key
 from ..friction import FrictionLaw
 
 # the order of a list of friction laws, by what they remember
-KINDS = ("coulomb", "spring", "dashpot", "regularized")
+KINDS = ("coulomb", "spring", "dashpot", "regularized", "cone")
 
 
 @cache

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from ..evidence import Evidence
+from ..fixed_step import KICK_DRIFT
 from ..friction import FrictionLaw
 from ..model import Parameter
 from ..models.cited_sources import LIGGGHTS, YADE_2025
@@ -85,6 +86,32 @@ LAMMPS_LINEAR_NOHISTORY = FrictionLaw(
     evidence=Evidence("seen", LAMMPS, note=YEAR_NOT_SEEN),
     parameters=(XT, limit("abs")),
     damping="xt",
+)
+
+# only a fixed step has the displacement that a slip leaves
+LAMMPS_CLASSIC = replace(
+    LAMMPS_MINDLIN,
+    key="lammps-classic-2025",
+    title="LAMMPS fix wall/gran hooke/history and hertz/history (22 July 2025)",
+    year=2025,
+    equation="f = k_t a ξ + xₜ c_n g,  ξ̇ = g,  |f| ≤ μ |F|, where it slips ξ = (f − xₜ c_n g)/k_t, without a, so "
+    "that f depends on the unit of length",
+    reference="LAMMPS, fix wall/gran, linear_history_classic and mindlin_classic",
+    evidence=Evidence(
+        "seen",
+        LAMMPS,
+        note="that version has neither the a of hooke/history nor the a left out; both were found in runs of the "
+        "release of 22 July 2025",
+    ),
+    parameters=(
+        Parameter(
+            "k_t", "N/m^2", "stiffness over the radius of the contact, K_t of the code", least=1e-9, optional=True
+        ),
+        replace(XT, default=0.5),
+        limit("abs"),
+    ),
+    stiffness="classic",
+    scheme=KICK_DRIFT,
 )
 
 # ---- LIGGGHTS

@@ -1,4 +1,4 @@
-"""Regularized friction laws of multibody codes: the coefficient of friction is a function of the slip."""
+"""Friction laws of multibody codes: the coefficient of friction is a function of the slip, or a cone."""
 
 from __future__ import annotations
 
@@ -6,9 +6,11 @@ import numpy as np
 
 from ...array_types import Array
 from ..evidence import Evidence
+from ..fixed_step import MUJOCO_CONE
 from ..friction import FrictionLaw
 from ..model import Parameter
 from ..models.cited_sources import SIMBODY
+from ..models.multibody_codes import MUJOCO_DOI, MUJOCO_EVIDENCE, MUJOCO_REFERENCE
 from .parameters import limit
 
 DYNAMIC_FRICTION = Parameter(
@@ -67,4 +69,35 @@ SIMBODY_HUNT_CROSSLEY = FrictionLaw(
     coefficient=lambda y, ratio, viscous: (
         np.minimum(y, 1.0) * (ratio + 2.0 * (1.0 - ratio) / (1.0 + y * y)) + viscous * y
     ),
+)
+
+MUJOCO_ELLIPTIC = FrictionLaw(
+    key="mujoco-elliptic",
+    title="MuJoCo, elliptic cone, integrator Euler (4.0.0)",
+    year=2014,
+    equation="f = m b_t g/D,  |f| ≤ μ N,  N = F, where it slips N = max(0, F + μ m b_t |g|)/(1 + μ² D),  "
+    "D = d m/m_t + (1 − d)/i,  with the impedance d and i = impratio",
+    reference=MUJOCO_REFERENCE,
+    kind="cone",
+    doi=MUJOCO_DOI,
+    evidence=Evidence(
+        "seen",
+        "google-deepmind/mujoco, src/engine/engine_core_constraint.c @00010f58",
+        doi=MUJOCO_EVIDENCE.doi,
+        note="the closed form for one contact was derived from it, and agrees with runs of MuJoCo 4.0.0",
+    ),
+    parameters=(
+        Parameter("impratio", "1", "impedance of friction over that of the contact", default=1.0, least=1e-9),
+        Parameter("impedance", "1", "constant impedance d of solimp", default=0.9, least=1e-4, most=0.9999),
+        Parameter(
+            "b_t",
+            "1/s",
+            "damping of solreffriction: 2/timeconst, or its negative second number; unset, as in MuJoCo, that of "
+            "solref",
+            least=0.0,
+            optional=True,
+        ),
+    ),
+    damping="cone",
+    scheme=MUJOCO_CONE,
 )
