@@ -699,14 +699,62 @@ def test_the_tangential_stiffness_of_two_materials_is_a_number_in_lammps() -> No
     assert export.parameters["k_t"] == pytest.approx(8.0 * shear, rel=1e-14)
 
 
+@pytest.mark.parametrize(
+    ("key", "friction", "parameters", "expected"),
+    [
+        ("liggghts-hooke", "liggghts-history", {}, "hooke tangential history"),
+        ("liggghts-hooke", "liggghts-history", {"tangential_reduce": "on"}, "history ktToKnUser on"),
+        # only model hooke has that setting
+        ("liggghts-hertz", "liggghts-history", {"tangential_reduce": "on"}, "hertz tangential history"),
+        (
+            "liggghts-hertz-limit-force",
+            "liggghts-no-history",
+            {"tangential_damping": "off"},
+            "tangential no_history limitForce on tangential_damping off",
+        ),
+    ],
+)
+def test_liggghts_takes_the_settings_of_a_friction_law(
+    key: str, friction: str, parameters: dict[str, str], expected: str
+) -> None:
+    config = source("soft", "soft", mu=0.3, angle="40 deg") | {"friction": {friction: parameters}}
+    export = impact.export("liggghts", key, source=config, friction=friction, code_version="3.8.0", script=True)
+    (line,) = (line for line in export.lines if line.startswith("pair_style"))
+    assert line.endswith(expected)
+    assert export.parameters["coefficientFriction"] == "peratomtypepair 2 0.3 0.3 0.3 0.3"
+    assert not any("no friction" in remark for remark in export.header)
+    alternates = friction == "liggghts-history"
+    assert any("3 of 240 by up to 0.02" in text for text in export.warnings) == alternates
+    ratio = config | {"friction": {friction: {"kt_over_kn": 0.5}}}
+    with pytest.raises(UsageError, match="kt_over_kn: LIGGGHTS has none"):
+        impact.export("liggghts", key, source=ratio, friction=friction, code_version="3.8.0")
+
+
+def test_scripts_have_solid_balls() -> None:
+    config = source("soft", "soft", mu=0.3, angle="40 deg", inertia_factor2=0.6)
+    with pytest.raises(UsageError, match=r"inertia_factor2: got 0\.6, expected 0\.4: balls of scripts are solid"):
+        impact.export("liggghts", "liggghts-hertz", source=config, friction="liggghts-history",
+                      code_version="3.8.0", script=True)  # fmt: skip
+
+
 def test_friction_that_a_code_does_not_have_is_refused_or_left_out_with_a_warning() -> None:
     at = {**OBLIQUE, "K": 1e7}
     with pytest.raises(
         UsageError, match='LAMMPS, pair style granular has no "lammps-mindln"; did you mean "lammps-'
     ):
         impact.export("lammps", default_law("lammps"), at=at, friction="lammps-mindln", code_version="22Jul2025")
-    with pytest.raises(UsageError, match='YADE has no "coulomb-1785"; no friction is written for it'):
-        impact.export("yade", at=OBLIQUE, friction="coulomb-1785", code_version="2023.02a")
+    with pytest.raises(UsageError, match='EXUDYN has no "coulomb-1785"; no friction is written for it'):
+        impact.export("exudyn", at=OBLIQUE, friction="coulomb-1785", code_version=CODES["exudyn"].newest)
+    known = "known: liggghts-history, liggghts-no-history"
+    with pytest.raises(UsageError, match=f'has no "coulomb-1785"; {known}'):
+        impact.export("liggghts", at=OBLIQUE, friction="coulomb-1785", code_version="3.8.0")
+    # the law, and why it is not combined with a friction law that the code has
+    with pytest.raises(UsageError, match='no "liggghts-history" with liggghts-edinburgh; no friction is written'):
+        impact.export("liggghts", "liggghts-edinburgh", friction="liggghts-history", code_version="3.8.0")
+    law = "lammps-linear-nohistory"
+    with pytest.raises(UsageError, match=f"friction.{law}.limit: LAMMPS, pair style granular has only abs"):
+        impact.export("lammps", "lammps-coeff-restitution-hooke", at={**at, f"friction.{law}.limit": "positive"},
+                      friction=law, code_version="22Jul2025")  # fmt: skip
     config = {"models": "lammps-coeff-restitution-hooke", "frictions": "coulomb-1785", "sweep": {**at, "n": 1.0}}
     export = impact.export("lammps", source=config, code_version="22Jul2025")
     assert any(text.startswith("coulomb-1785: LAMMPS") and "no friction" in text for text in export.warnings)
