@@ -724,10 +724,34 @@ def test_liggghts_takes_the_settings_of_a_friction_law(
     assert export.parameters["coefficientFriction"] == "peratomtypepair 2 0.3 0.3 0.3 0.3"
     assert not any("no friction" in remark for remark in export.header)
     alternates = friction == "liggghts-history"
-    assert any("3 of 240 by up to 0.02" in text for text in export.warnings) == alternates
+    assert any("3 of 240 runs differed by up to 0.02" in text for text in export.warnings) == alternates
     ratio = config | {"friction": {friction: {"kt_over_kn": 0.5}}}
     with pytest.raises(UsageError, match="kt_over_kn: LIGGGHTS has none"):
         impact.export("liggghts", key, source=ratio, friction=friction, code_version="3.8.0")
+
+
+def test_yade_takes_the_tangential_springs_of_each_ball_and_an_angle_of_friction() -> None:
+    key = "yade-viscoelastic"
+    at = {"K": 1e6, f"{key}.C": 30.0, "mu": 0.3, "angle": "40 deg"}
+    own = {f"friction.{key}.k_t": 3e5, f"friction.{key}.c_t": 20.0}
+    export = impact.export("yade", key, source=source(), at=at | own, friction=key, code_version="2023.02a")
+    assert (export.parameters["ks"], export.parameters["cs"]) == (6e5, 40.0)
+    assert math.tan(float(export.parameters["frictionAngle"])) == pytest.approx(0.3, rel=1e-15)
+    assert f"frictionAngle={math.atan(0.3)!r})" in export.lines[0]
+    ratio = {f"friction.{key}.kt_over_kn": 0.25}
+    again = impact.export("yade", key, source=source(n=1.0), at=at | ratio, friction=key, code_version="2023.02a")
+    assert again.parameters["ks"] == 5e5
+    mindlin = source("soft", "hard", mu=0.3, angle="40 deg") | {"friction": {"yade-mindlin": {}}}
+    export = impact.export("yade", "yade-betan", source=mindlin, friction="yade-mindlin", code_version="2023.02a")
+    # by default that of the contact force
+    assert export.parameters["betas"] == export.parameters["betan"]
+    assert sum("frictionAngle=0.29" in line for line in export.lines) == 2
+    assert not any("frictionAngle=0:" in remark for remark in export.header)
+    with pytest.raises(UsageError, match="k_t: YADE has none with its MindlinPhys"):
+        impact.export("yade", "yade-betan", source=mindlin | {"friction": {"yade-mindlin": {"k_t": 1e8}}},
+                      friction="yade-mindlin", code_version="2023.02a")  # fmt: skip
+    with pytest.raises(UsageError, match='YADE has no "yade-mindlin" with yade-en; no friction is written'):
+        impact.export("yade", "yade-en", source=mindlin, friction="yade-mindlin", code_version="2023.02a")
 
 
 def test_scripts_have_solid_balls() -> None:

@@ -276,6 +276,11 @@ OBLIQUE: tuple[tuple[str, str, str, Values, Values], ...] = (
             ("liggghts-no-history", {}),
         )
     ),
+    *(("yade", "yade-betan", "yade-mindlin", parameters, HERTZIAN) for parameters in ({}, {"betas": 0.0})),
+    *(
+        ("yade", "yade-viscoelastic", "yade-viscoelastic", parameters, {**LINEAR, "yade-viscoelastic.C": 300.0})
+        for parameters in ({"k_t": 3e6}, {"k_t": 8e6, "c_t": 100.0})
+    ),
 )
 
 
@@ -342,6 +347,12 @@ PLANTED_FRICTION = (
     ("liggghts-hertz", "liggghts-history", "tangential_damping off", "tangential_damping on", "wall"),
     ("liggghts-hooke", "liggghts-history", "hooke tangential history", "hooke tangential no_history", "ball"),
     ("liggghts-hooke", "liggghts-no-history", "0.3 0.3 0.3", "0.3 0.2 0.2", "ball"),
+    ("yade-betan", "yade-mindlin", "-0.3, material1", "0.3, material1", "wall"),
+    ("yade-betan", "yade-mindlin", "0.5, material1)", "-0.5, material1)", "ball"),
+    ("yade-betan", "yade-mindlin", "betas=", "es=0.9, betas=", "wall"),
+    ("yade-betan", "yade-mindlin", "0.4 * mass", "0.6 * mass", "ball"),
+    ("yade-viscoelastic", "yade-viscoelastic", "ks=6000000.0", "ks=3000000.0", "wall"),
+    ("yade-viscoelastic", "yade-viscoelastic", "+ 0.08 * omega2", "- 0.08 * omega2", "ball"),
 )
 
 

@@ -13,6 +13,13 @@ from ..formatting import argument, number
 Parameters = Mapping[str, float | str]
 # moment of inertia of a ball over m R^2, in scripts
 SOLID = 0.4
+# of scripts in Python, before e_out: prints from u1, u2, omega1 and omega2
+PRINT_BETA = """\
+print("beta =", -(u1 + {R1} * omega1 - u2 + {rim2} * omega2) / {slip})
+print("omega1 =", omega1)
+print("omega2 =", omega2)
+print("e_out ="\
+"""
 
 
 @dataclass(frozen=True)

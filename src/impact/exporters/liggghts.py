@@ -155,7 +155,7 @@ def notes(collision: Collision) -> list[str]:
         return remarks
     return [
         *remarks,
-        "tangential_damping is on by default; ktToKnUser on: the tangential stiffness is 2/7 of that of model hooke",
+        "tangential_damping is on by default; ktToKnUser on: the tangential stiffness is 2/7 of that of hooke",
         "friction acts at the middle of the overlap, by half of the indentation nearer to the centre",
     ]
 
@@ -164,7 +164,7 @@ def warnings(collision: Collision) -> list[str]:
     if collision.friction == "liggghts-history" and collision["tangential_damping"]:
         return [
             "tangential history with damping alternates between slip and stick from step to step: 3 of 240 runs "
-            "differed from the predicted velocities by up to 0.02 of the speed; with tangential_damping off none did"
+            "differed by up to 0.02 of the speed from what is predicted; with tangential_damping off none did"
         ]
     return []
 
