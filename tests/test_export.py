@@ -754,6 +754,21 @@ def test_yade_takes_the_tangential_springs_of_each_ball_and_an_angle_of_friction
         impact.export("yade", "yade-en", source=mindlin, friction="yade-mindlin", code_version="2023.02a")
 
 
+def test_drake_takes_coulomb_friction_with_tamsi() -> None:
+    at = {"K": 1e6, "mu": 0.3, "angle": "40 deg", "v1": 2.0, "drake-point-contact.d": 0.5}
+    key, version = "drake-point-contact", "1.51.1"
+    export = impact.export("drake", key, at=at, friction="coulomb-1785", code_version=version)
+    assert "    friction=CoulombFriction(0.3, 0.3)," in export.lines
+    assert export.lines[-1] == "plant.set_stiction_tolerance(2e-05)"
+    assert any("SAP from 0.114 to 0.826" in text for text in export.warnings)
+    assert not any("no friction" in remark for remark in export.header)
+    with pytest.raises(UsageError, match='Drake has no "drake-regularized"; known: coulomb-1785'):
+        impact.export("drake", key, at=at, friction="drake-regularized", code_version=version)
+    straight = {name: value for name, value in at.items() if name not in ("mu", "angle")}
+    central = impact.export("drake", key, at=straight, code_version=version)
+    assert not any("stiction" in line for line in central.lines)
+
+
 def test_scripts_have_solid_balls() -> None:
     config = source("soft", "soft", mu=0.3, angle="40 deg", inertia_factor2=0.6)
     with pytest.raises(UsageError, match=r"inertia_factor2: got 0\.6, expected 0\.4: balls of scripts are solid"):

@@ -258,6 +258,7 @@ def test_a_script_runs_in_an_empty_folder(cli: Run, tmp_path: Path, name: str, w
 LAMMPS_HERTZ, LAMMPS_HOOKE = "lammps-coeff-restitution-hertz", "lammps-coeff-restitution-hooke"
 LINEAR: Values = {"K": 1e7, "n": 1.0}
 HERTZIAN: Values = {"material": "soft"}
+DRAKE: Values = {**LINEAR, "drake-point-contact.d": 0.5}
 # code, law, friction law, its parameters, inputs
 OBLIQUE: tuple[tuple[str, str, str, Values, Values], ...] = (
     ("lammps", LAMMPS_HOOKE, "lammps-linear-history", {"k_t": 3e6}, LINEAR),
@@ -280,6 +281,11 @@ OBLIQUE: tuple[tuple[str, str, str, Values, Values], ...] = (
     *(
         ("yade", "yade-viscoelastic", "yade-viscoelastic", parameters, {**LINEAR, "yade-viscoelastic.C": 300.0})
         for parameters in ({"k_t": 3e6}, {"k_t": 8e6, "c_t": 100.0})
+    ),
+    # it slides, and sticks
+    *(
+        ("drake", "drake-point-contact", "coulomb-1785", {}, DRAKE | {"angle": angle})
+        for angle in ("70 deg", "40 deg")
     ),
 )
 
@@ -351,6 +357,10 @@ PLANTED_FRICTION = (
     ("yade-betan", "yade-mindlin", "0.5, material1)", "-0.5, material1)", "ball"),
     ("yade-betan", "yade-mindlin", "betas=", "es=0.9, betas=", "wall"),
     ("yade-betan", "yade-mindlin", "0.4 * mass", "0.6 * mass", "ball"),
+    ("drake-point-contact", "coulomb-1785", "(-0.3,)", "(0.3,)", "wall"),
+    ("drake-point-contact", "coulomb-1785", "(-0.3, 0.5)", "(-0.3, -0.5)", "ball"),
+    ("drake-point-contact", "coulomb-1785", "CoulombFriction(0.3, 0.3)", "CoulombFriction(0.3, 0.2)", "wall"),
+    ("drake-point-contact", "coulomb-1785", "+ 0.08 * omega2", "- 0.08 * omega2", "ball"),
     ("yade-viscoelastic", "yade-viscoelastic", "ks=6000000.0", "ks=3000000.0", "wall"),
     ("yade-viscoelastic", "yade-viscoelastic", "+ 0.08 * omega2", "- 0.08 * omega2", "ball"),
 )
