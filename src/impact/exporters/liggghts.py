@@ -156,7 +156,7 @@ def notes(collision: Collision) -> list[str]:
     return [
         *remarks,
         "tangential_damping is on by default; ktToKnUser on: the tangential stiffness is 2/7 of that of hooke",
-        "friction acts at the middle of the overlap, by half of the indentation nearer to the centre",
+        "friction acts at less than the radius from the centre, by a part of the indentation",
     ]
 
 

@@ -172,15 +172,14 @@ def notes(collision: Collision) -> list[str]:
     remarks = ["in SI; NewtonIntegrator(damping=0): its default of 0.2 damps every motion"]
     if collision.friction:
         remarks += [
-            "frictionAngle is atan(mu); of two materials the smaller one counts",
-            "friction acts at the middle of the overlap, by half of the indentation nearer to the centre",
+            "frictionAngle is atan(mu), of both materials",
+            "friction acts at less than the radius from the centre, by a part of the indentation",
         ]
     if "viscoelastic" in collision.model.key:
         return [
             *remarks,
-            "kn and cn are of one ball: two balls act in series, so that they are twice those of the contact",
+            "kn, cn, ks and cs are of one ball: two balls act in series, and they are twice those of the contact",
             "en of ViscElMat finds its damping only roughly; kn and cn are exact",
-            "ks and cs likewise",
             "the force is never negative (since January 2014)",
         ]
     if collision.has_wall:
