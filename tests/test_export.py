@@ -721,14 +721,101 @@ def test_the_tangential_stiffness_of_two_materials_is_a_number_in_lammps() -> No
     assert export.parameters["k_t"] == pytest.approx(8.0 * shear, rel=1e-14)
 
 
+@pytest.mark.parametrize(
+    ("key", "friction", "parameters", "expected"),
+    [
+        ("liggghts-hooke", "liggghts-history", {}, "hooke tangential history"),
+        ("liggghts-hooke", "liggghts-history", {"tangential_reduce": "on"}, "history ktToKnUser on"),
+        # only model hooke has that setting
+        ("liggghts-hertz", "liggghts-history", {"tangential_reduce": "on"}, "hertz tangential history"),
+        (
+            "liggghts-hertz-limit-force",
+            "liggghts-no-history",
+            {"tangential_damping": "off"},
+            "tangential no_history limitForce on tangential_damping off",
+        ),
+    ],
+)
+def test_liggghts_takes_the_settings_of_a_friction_law(
+    key: str, friction: str, parameters: dict[str, str], expected: str
+) -> None:
+    config = source("soft", "soft", mu=0.3, angle="40 deg") | {"friction": {friction: parameters}}
+    export = impact.export("liggghts", key, source=config, friction=friction, code_version="3.8.0", script=True)
+    (line,) = (line for line in export.lines if line.startswith("pair_style"))
+    assert line.endswith(expected)
+    assert export.parameters["coefficientFriction"] == "peratomtypepair 2 0.3 0.3 0.3 0.3"
+    assert not any("no friction" in remark for remark in export.header)
+    alternates = friction == "liggghts-history"
+    assert any("3 of 240 runs differed by up to 0.02" in text for text in export.warnings) == alternates
+    ratio = config | {"friction": {friction: {"kt_over_kn": 0.5}}}
+    with pytest.raises(UsageError, match="kt_over_kn: LIGGGHTS has none"):
+        impact.export("liggghts", key, source=ratio, friction=friction, code_version="3.8.0")
+
+
+def test_yade_takes_the_tangential_springs_of_each_ball_and_an_angle_of_friction() -> None:
+    key = "yade-viscoelastic"
+    at = {"K": 1e6, f"{key}.C": 30.0, "mu": 0.3, "angle": "40 deg"}
+    own = {f"friction.{key}.k_t": 3e5, f"friction.{key}.c_t": 20.0}
+    export = impact.export("yade", key, source=source(), at=at | own, friction=key, code_version="2023.02a")
+    assert (export.parameters["ks"], export.parameters["cs"]) == (6e5, 40.0)
+    assert math.tan(float(export.parameters["frictionAngle"])) == pytest.approx(0.3, rel=1e-15)
+    assert f"frictionAngle={math.atan(0.3)!r})" in export.lines[0]
+    ratio = {f"friction.{key}.kt_over_kn": 0.25}
+    again = impact.export("yade", key, source=source(n=1.0), at=at | ratio, friction=key, code_version="2023.02a")
+    assert again.parameters["ks"] == 5e5
+    mindlin = source("soft", "hard", mu=0.3, angle="40 deg") | {"friction": {"yade-mindlin": {}}}
+    export = impact.export("yade", "yade-betan", source=mindlin, friction="yade-mindlin", code_version="2023.02a")
+    # by default that of the contact force
+    assert export.parameters["betas"] == export.parameters["betan"]
+    assert sum("frictionAngle=0.29" in line for line in export.lines) == 2
+    assert not any("frictionAngle=0:" in remark for remark in export.header)
+    with pytest.raises(UsageError, match="k_t: YADE has none with its MindlinPhys"):
+        impact.export("yade", "yade-betan", source=mindlin | {"friction": {"yade-mindlin": {"k_t": 1e8}}},
+                      friction="yade-mindlin", code_version="2023.02a")  # fmt: skip
+    with pytest.raises(UsageError, match='YADE has no "yade-mindlin" with yade-en; no friction is written'):
+        impact.export("yade", "yade-en", source=mindlin, friction="yade-mindlin", code_version="2023.02a")
+
+
+def test_drake_takes_coulomb_friction_with_tamsi() -> None:
+    at = {"K": 1e6, "mu": 0.3, "angle": "40 deg", "v1": 2.0, "drake-point-contact.d": 0.5}
+    key, version = "drake-point-contact", "1.51.1"
+    export = impact.export("drake", key, at=at, friction="coulomb-1785", code_version=version)
+    assert "    friction=CoulombFriction(0.3, 0.3)," in export.lines
+    assert export.lines[-1] == "plant.set_stiction_tolerance(2e-05)"
+    assert any("SAP from 0.114 to 0.826" in text for text in export.warnings)
+    assert not any("no friction" in remark for remark in export.header)
+    with pytest.raises(UsageError, match='Drake has no "drake-regularized"; known: coulomb-1785'):
+        impact.export("drake", key, at=at, friction="drake-regularized", code_version=version)
+    straight = {name: value for name, value in at.items() if name not in ("mu", "angle")}
+    central = impact.export("drake", key, at=straight, code_version=version)
+    assert not any("stiction" in line for line in central.lines)
+
+
+def test_scripts_have_solid_balls() -> None:
+    config = source("soft", "soft", mu=0.3, angle="40 deg", inertia_factor2=0.6)
+    with pytest.raises(UsageError, match=r"inertia_factor2: got 0\.6, expected 0\.4: balls of scripts are solid"):
+        impact.export("liggghts", "liggghts-hertz", source=config, friction="liggghts-history",
+                      code_version="3.8.0", script=True)  # fmt: skip
+
+
 def test_friction_that_a_code_does_not_have_is_refused_or_left_out_with_a_warning() -> None:
     at = {**OBLIQUE, "K": 1e7}
     with pytest.raises(
         UsageError, match='LAMMPS, pair style granular has no "lammps-mindln"; did you mean "lammps-'
     ):
         impact.export("lammps", default_law("lammps"), at=at, friction="lammps-mindln", code_version="22Jul2025")
-    with pytest.raises(UsageError, match='YADE has no "coulomb-1785"; no friction is written for it'):
-        impact.export("yade", at=OBLIQUE, friction="coulomb-1785", code_version="2023.02a")
+    with pytest.raises(UsageError, match='EXUDYN has no "coulomb-1785"; no friction is written for it'):
+        impact.export("exudyn", at=OBLIQUE, friction="coulomb-1785", code_version=CODES["exudyn"].newest)
+    known = "known: liggghts-history, liggghts-no-history"
+    with pytest.raises(UsageError, match=f'has no "coulomb-1785"; {known}'):
+        impact.export("liggghts", at=OBLIQUE, friction="coulomb-1785", code_version="3.8.0")
+    # the law, and why it is not combined with a friction law that the code has
+    with pytest.raises(UsageError, match='no "liggghts-history" with liggghts-edinburgh; no friction is written'):
+        impact.export("liggghts", "liggghts-edinburgh", friction="liggghts-history", code_version="3.8.0")
+    law = "lammps-linear-nohistory"
+    with pytest.raises(UsageError, match=f"friction.{law}.limit: LAMMPS, pair style granular has only abs"):
+        impact.export("lammps", "lammps-coeff-restitution-hooke", at={**at, f"friction.{law}.limit": "positive"},
+                      friction=law, code_version="22Jul2025")  # fmt: skip
     config = {"models": "lammps-coeff-restitution-hooke", "frictions": "coulomb-1785", "sweep": {**at, "n": 1.0}}
     export = impact.export("lammps", source=config, code_version="22Jul2025")
     assert any(text.startswith("coulomb-1785: LAMMPS") and "no friction" in text for text in export.warnings)

@@ -18,10 +18,10 @@ import pytest
 import impact
 from impact.errors import UsageError
 from impact.exporters.code import Code, Collision, Parameters
-from impact.exporters.problem import prepare_export
+from impact.exporters.problem import ExportProblem, prepare_export
 from impact.exporters.registry import CODES
 from impact.exporters.releases import choose_version, law_of_code
-from impact.exporters.verification import verify_scripts
+from impact.exporters.verification import run_script, verify_scripts
 
 from .conftest import Run, default_law
 from .test_peers import ENTRIES, MATERIALS, PYTHON, WITHOUT_PEER, Values, by_impact, config_of
@@ -170,6 +170,18 @@ PLANTED_WALLS = (
 )
 
 
+def replace_in_scripts(code: Code, old: str, new: str) -> Code:
+    """The code with another text in its scripts."""
+
+    class Wrong(Code):
+        def script(self, collision: Collision, parameters: Parameters) -> str:
+            text = super().script(collision, parameters)
+            assert old in text
+            return text.replace(old, new)
+
+    return Wrong(**vars(code))
+
+
 @pytest.mark.parametrize(
     ("name", "key", "old", "new", "second"),
     [(*words, "ball") for words in PLANTED] + [(*words, "wall") for words in PLANTED_WALLS],
@@ -180,16 +192,11 @@ def test_an_error_in_a_template_is_found(name: str, key: str, old: str, new: str
     collision = entry.collisions[0] if second == "ball" else with_wall(entry.collisions[0])
     problem = prepare_export(code, key, version, config_of(key, collision), {}, ())
 
-    class Wrong(Code):
-        def script(self, collision: Collision, parameters: Parameters) -> str:
-            text = super().script(collision, parameters)
-            assert old in text
-            return text.replace(old, new)
-
+    wrong = replace(problem, code=replace_in_scripts(code, old, new))
     # an extrapolation to a step of zero needs finer steps
     dt = problem.law.contact_time / (12 if code.scheme is not None else entry.code.steps_per_contact)
     assert verify_scripts(problem, program, dt).agrees
-    assert not verify_scripts(replace(problem, code=Wrong(**vars(code))), program, dt).agrees
+    assert not verify_scripts(wrong, program, dt).agrees
 
 
 @pytest.mark.parametrize("m2", [3.0, math.inf], ids=["ball", "wall"])
@@ -248,30 +255,127 @@ def test_a_script_runs_in_an_empty_folder(cli: Run, tmp_path: Path, name: str, w
     assert float(last.removeprefix("e_out = ")) == pytest.approx(predicted, abs=0.01)
 
 
-@pytest.mark.parametrize("second", ["ball", "wall"])
-@pytest.mark.parametrize("friction", CODES["lammps"].frictions)
-def test_a_script_of_an_oblique_impact_measures_beta(
-    friction: str, second: str, record_property: Callable[[str, object], None]
-) -> None:
-    """Against a wall to rounding; of two balls, whose normal turns, within a part of the indentation over R*."""
-    is_linear = friction.startswith("lammps-linear")
-    key = "lammps-coeff-restitution-hooke" if is_linear else "lammps-coeff-restitution-hertz"
-    code, program, version = code_and_version("lammps", key)
-    parameters = {"k_t": 3e6} if friction == "lammps-linear-history" else {}
-    sweep: Values = {"v1": 1.0, "m1": 0.5, "R1": 0.05, "e": 0.8, "mu": 0.3, "angle": "40 deg", "omega1": -3.0}
-    sweep |= {"K": 1e7, "n": 1.0} if is_linear else {"material": "soft"}
-    sweep |= {"m2": math.inf, "R2": math.inf} if second == "wall" else {"m2": 1.0, "R2": 0.08, "omega2": 5.0}
-    config: Values = {"models": key, "frictions": friction, "sweep": sweep, "materials": MATERIALS}
+LAMMPS_HERTZ, LAMMPS_HOOKE = "lammps-coeff-restitution-hertz", "lammps-coeff-restitution-hooke"
+LINEAR: Values = {"K": 1e7, "n": 1.0}
+HERTZIAN: Values = {"material": "soft"}
+DRAKE: Values = {**LINEAR, "drake-point-contact.d": 0.5}
+# code, law, friction law, its parameters, inputs
+OBLIQUE: tuple[tuple[str, str, str, Values, Values], ...] = (
+    ("lammps", LAMMPS_HOOKE, "lammps-linear-history", {"k_t": 3e6}, LINEAR),
+    ("lammps", LAMMPS_HOOKE, "lammps-linear-nohistory", {}, LINEAR),
+    *(
+        ("lammps", LAMMPS_HERTZ, friction, {}, HERTZIAN)
+        for friction in CODES["lammps"].frictions
+        if "mindlin" in friction
+    ),
+    *(
+        ("liggghts", key, friction, parameters, HERTZIAN)
+        for key in ("liggghts-hertz", "liggghts-hooke", "liggghts-hooke-limit-force")
+        for friction, parameters in (
+            ("liggghts-history", {"tangential_damping": "off"}),
+            ("liggghts-history", {"tangential_reduce": "on"}),
+            ("liggghts-no-history", {}),
+        )
+    ),
+    *(("yade", "yade-betan", "yade-mindlin", parameters, HERTZIAN) for parameters in ({}, {"betas": 0.0})),
+    *(
+        ("yade", "yade-viscoelastic", "yade-viscoelastic", parameters, {**LINEAR, "yade-viscoelastic.C": 300.0})
+        for parameters in ({"k_t": 3e6}, {"k_t": 8e6, "c_t": 100.0})
+    ),
+    # it slides, and sticks
+    *(
+        ("drake", "drake-point-contact", "coulomb-1785", {}, DRAKE | {"angle": angle})
+        for angle in ("70 deg", "40 deg")
+    ),
+)
+
+
+def oblique_problem(
+    name: str, key: str, friction: str, parameters: Values, inputs: Values, second: str
+) -> tuple[ExportProblem, str]:
+    """An impact at 40 degrees, so slow that the balls indent by a few thousandths of their radius."""
+    code, program, version = code_and_version(name, key)
+    sweep: Values = {"v1": 0.1, "m1": 0.5, "R1": 0.05, "e": 0.8, "mu": 0.3, "angle": "40 deg", "omega1": -0.3}
+    sweep |= {"m2": math.inf, "R2": math.inf} if second == "wall" else {"m2": 1.0, "R2": 0.08, "omega2": 0.5}
+    own = {name.split(".")[1]: value for name, value in inputs.items() if "." in name}
+    config: Values = {"models": key, "frictions": friction, "materials": MATERIALS, "model": {key: own}}
+    config["sweep"] = sweep | {name: value for name, value in inputs.items() if "." not in name}
     config["friction"] = {friction: parameters}
-    problem = prepare_export(code, key, version, config, {}, (), friction)
+    return prepare_export(code, key, version, config, {}, (), friction), program
+
+
+@pytest.mark.parametrize("second", ["ball", "wall"])
+@pytest.mark.parametrize("words", OBLIQUE, ids=lambda words: "-".join(map(str, (*words[1:3], *words[3]))))
+def test_a_script_of_an_oblique_impact_measures_beta(
+    words: tuple[str, str, str, Values, Values], second: str, record_property: Callable[[str, object], None]
+) -> None:
+    """Where arms are the radius, against a wall to rounding; else within a part of the indentation over R*."""
+    problem, program = oblique_problem(*words, second)
     verification = verify_scripts(problem, program, problem.law.contact_time / 31.0)
-    variant = f"{friction}, {second}, beta"
+    name, key, friction, parameters, _ = words
+    variant = ", ".join((friction, *(f"{name} {value}" for name, value in parameters.items()), second, "beta"))
     worst = (verification.beta_difference, verification.beta_uncertainty)
-    record_property("peer", (code.name, version, key, variant, len(verification.beta_measured), *worst))
+    record_property("peer", (name, problem.version, key, variant, len(verification.beta_measured), *worst))
     assert verification.agrees
     assert len(set(verification.beta_measured)) > 1
+    assert verification.beta_uncertainty <= 0.012
     if second == "wall":
-        assert verification.beta_uncertainty <= 1e-9
+        assert verification.uncertainty <= 1e-9
+        assert problem.code.shortens_arms or verification.beta_uncertainty <= 1e-9
+
+
+@pytest.mark.parametrize("name", dict.fromkeys(words[0] for words in OBLIQUE))
+def test_printed_spins_are_those_of_the_impulse_of_friction(name: str) -> None:
+    """R omega changes by 5/2 P/m, where P = m_t g0 (1 + beta)."""
+    words = next(words for words in OBLIQUE if words[0] == name)
+    problem, program = oblique_problem(*words, "ball")
+    collision = problem.collision(problem.law.contact_time / 31.0, 0.5)
+    printed = run_script(problem.code, program, problem.code.script(collision, problem.code.parameters(collision)))
+    assert list(printed) == ["beta", "omega1", "omega2", "e_out"]
+    oblique = problem.law.oblique
+    assert oblique is not None
+    impulse = (oblique.impact.m_t * oblique.impact.slip).item() * (1.0 + printed["beta"])
+    for ball in ("1", "2"):
+        expected = collision[f"omega{ball}"] - 2.5 * impulse / (collision[f"m{ball}"] * collision[f"R{ball}"])
+        assert printed[f"omega{ball}"] == pytest.approx(expected, rel=0.02)
+
+
+# errors of friction that a template could have: of the first entry of `OBLIQUE` with a law and a friction law
+PLANTED_FRICTION = (
+    (LAMMPS_HOOKE, "lammps-linear-history", "omega 0 0 -0.3", "omega 0 0 0.3", "ball"),
+    (LAMMPS_HOOKE, "lammps-linear-history", "omega 0 0 0.5", "omega 0 0 -0.5", "ball"),
+    (LAMMPS_HOOKE, "lammps-linear-history", "linear_history 3000000.0", "linear_history 1500000.0", "wall"),
+    (LAMMPS_HOOKE, "lammps-linear-history", "+0.08*v_omega2", "-0.08*v_omega2", "ball"),
+    (LAMMPS_HERTZ, "lammps-mindlin-force", "mindlin/force NULL", "mindlin NULL", "wall"),
+    ("liggghts-hertz", "liggghts-history", "omegaz -0.3", "omegaz 0.3", "wall"),
+    ("liggghts-hertz", "liggghts-history", "omegaz 0.5", "omegaz -0.5", "ball"),
+    ("liggghts-hertz", "liggghts-history", "+0.08*v_omega2", "-0.08*v_omega2", "ball"),
+    ("liggghts-hertz", "liggghts-history", "tangential_damping off", "tangential_damping on", "wall"),
+    ("liggghts-hooke", "liggghts-history", "hooke tangential history", "hooke tangential no_history", "ball"),
+    ("liggghts-hooke", "liggghts-no-history", "0.3 0.3 0.3", "0.3 0.2 0.2", "ball"),
+    ("yade-betan", "yade-mindlin", "-0.3, material1", "0.3, material1", "wall"),
+    ("yade-betan", "yade-mindlin", "0.5, material1)", "-0.5, material1)", "ball"),
+    ("yade-betan", "yade-mindlin", "betas=", "es=0.9, betas=", "wall"),
+    ("yade-betan", "yade-mindlin", "0.4 * mass", "0.6 * mass", "ball"),
+    ("drake-point-contact", "coulomb-1785", "(-0.3,)", "(0.3,)", "wall"),
+    ("drake-point-contact", "coulomb-1785", "(-0.3, 0.5)", "(-0.3, -0.5)", "ball"),
+    ("drake-point-contact", "coulomb-1785", "CoulombFriction(0.3, 0.3)", "CoulombFriction(0.3, 0.2)", "wall"),
+    ("drake-point-contact", "coulomb-1785", "+ 0.08 * omega2", "- 0.08 * omega2", "ball"),
+    ("yade-viscoelastic", "yade-viscoelastic", "ks=6000000.0", "ks=3000000.0", "wall"),
+    ("yade-viscoelastic", "yade-viscoelastic", "+ 0.08 * omega2", "- 0.08 * omega2", "ball"),
+)
+
+
+@pytest.mark.parametrize(("key", "friction", "old", "new", "second"), PLANTED_FRICTION)
+def test_an_error_of_friction_in_a_template_is_found(
+    key: str, friction: str, old: str, new: str, second: str
+) -> None:
+    words = next(words for words in OBLIQUE if words[1:3] == (key, friction))
+    problem, program = oblique_problem(*words, second)
+    wrong = replace(problem, code=replace_in_scripts(problem.code, old, new))
+    dt = problem.law.contact_time / 31.0
+    assert verify_scripts(problem, program, dt).agrees
+    assert not verify_scripts(wrong, program, dt).agrees
 
 
 def test_an_oblique_script_prints_beta_and_spins_before_e_out(cli: Run) -> None:

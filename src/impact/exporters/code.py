@@ -11,6 +11,15 @@ from ..errors import UsageError
 from ..formatting import argument, number
 
 Parameters = Mapping[str, float | str]
+# moment of inertia of a ball over m R^2, in scripts
+SOLID = 0.4
+# of scripts in Python, before e_out: prints from u1, u2, omega1 and omega2
+PRINT_BETA = """\
+print("beta =", -(u1 + {R1} * omega1 - u2 + {rim2} * omega2) / {slip})
+print("omega1 =", omega1)
+print("omega2 =", omega2)
+print("e_out ="\
+"""
 
 
 @dataclass(frozen=True)
@@ -81,6 +90,8 @@ class Collision:
         values = {
             "x1": -self["R1"] - self.gap,
             "x2": self["R2"],
+            "y1": 0.0,
+            "y2": 0.0,
             "d1": 2.0 * self["R1"],
             "d2": 2.0 * self["R2"],
             "dt": self.dt,
@@ -93,12 +104,20 @@ class Collision:
         }
         values |= {name: self[name] for name in ("R1", "R2", "m1", "m2", "v0")}
         if self.friction:
+            for ball in ("1",) if self.has_wall else ("1", "2"):
+                if self[f"inertia_factor{ball}"] != SOLID:
+                    found = f"inertia_factor{ball}: got {number(self[f'inertia_factor{ball}'])}"
+                    raise UsageError(
+                        f"{argument('script')}: {found}, expected {SOLID}: balls of scripts are solid"
+                    )
             u1, u2 = (self["u1"] - self["u2"], 0.0) if self.has_wall else (self["u1"], self["u2"])
             rim2 = 0.0 if self.has_wall else self["R2"]
             slip = u1 + self["R1"] * self["omega1"] - u2 + rim2 * self["omega2"]
             if slip == 0.0:
                 raise UsageError(f"{argument('script')}: there is no slip before the impact, and so no beta")
             values |= {"u1": u1, "u2": u2, "rim2": rim2, "slip": slip}
+            # so that the normal is along x at the first touch
+            values |= {"y1": -u1 * self.gap / self["v0"], "y2": -u2 * self.gap / self["v0"]}
             values |= {name: self[name] for name in ("omega1", "omega2")}
         return {name: repr(value) for name, value in values.items()}
 
@@ -128,6 +147,8 @@ class Code:
     template : a complete input that prints `e_out = VALUE` last, see `script`; "" if none was ever run
     wall : what the template has for a plane wall, by the text for ball 2 that it replaces; empty without one
     frictions : what the code calls each of its friction laws, by key of the catalogue
+    has_friction : whether the code has a friction law with a law, from the keys of the law and the friction law
+    shortens_arms : whether friction acts at less than the radius from the centre, by a part of the indentation
     oblique : what the template has for an oblique impact, by the text that it replaces, before a wall; it prints
         `beta = VALUE` and the spins before `e_out`
     wall_inputs : the inputs that a wall acts with where they differ from those of a plane of infinite mass, by
@@ -155,6 +176,8 @@ class Code:
     template: str = ""
     wall: Mapping[str, str] = field(default_factory=dict)
     frictions: Mapping[str, str] = field(default_factory=dict)
+    has_friction: Callable[[str, str], bool] = lambda key, friction: True
+    shortens_arms: bool = False
     oblique: Mapping[str, str] = field(default_factory=dict)
     wall_inputs: Callable[[str, str, Mapping[str, float]], Mapping[str, float]] = lambda key, version, values: {}
     suffix: str = ".py"
@@ -179,6 +202,10 @@ class Code:
         material2 = "material2" if any(line.startswith("material2 = ") for line in lines) else "material1"
         values = {**parameters, **collision.script_values(), "lines": "\n".join(lines), "material2": material2}
         return template.format(**values)
+
+    def frictions_of(self, key: str) -> list[str]:
+        """List the friction laws that the code has with a law."""
+        return [friction for friction in self.frictions if self.has_friction(key, friction)]
 
     def uncertainty_of(self, key: str) -> float:
         """Return the tolerance on e of a law."""

@@ -72,8 +72,8 @@ comm_modify     vel yes
 boundary        f f f
 region          box block -{reach} {reach} -{reach} {reach} -{reach} {reach}
 create_box      2 box
-create_atoms    1 single {x1} 0 0
-create_atoms    2 single {x2} 0 0
+create_atoms    1 single {x1} {y1} 0
+create_atoms    2 single {x2} {y2} 0
 set             atom 1 diameter {d1} mass {m1} vx {v1} vy 0 vz 0
 set             atom 2 diameter {d2} mass {m2} vx {v2} vy 0 vz 0
 neighbor        {skin} bin
@@ -87,12 +87,17 @@ variable        e_out equal (v_v2-v_v1)/{v0}
 print           "e_out = $(v_e_out:%.17g)"
 quit
 """
-# the normal is along x, the tangent along y, so that spins are about z
-OBLIQUE = {
-    "vx {v1} vy 0 vz 0": "vx {v1} vy {u1} vz 0 omega 0 0 {omega1}",
-    "vx {v2} vy 0 vz 0": "vx {v2} vy {u2} vz 0 omega 0 0 {omega2}",
-    # a compute has a value after the run if it was printed at the last step
-    "thermo          1000000000": """\
+# of LAMMPS and LIGGGHTS; the normal is along x, the tangent along y, so that spins are about z
+OBLIQUE_OUTPUT = """\
+variable        u1 equal vy[1]
+variable        u2 equal vy[2]
+variable        beta equal -(v_u1+{R1}*v_omega1-v_u2+{rim2}*v_omega2)/{slip}
+print           "beta = ${{beta}}"
+print           "omega1 = ${{omega1}}"
+print           "omega2 = ${{omega2}}"
+variable        e_out equal"""
+# a compute has a value after the run if it was printed at the last step
+SPINS = """\
 compute         spin all property/atom omegaz
 group           ball1 id 1
 compute         spin1 ball1 reduce sum c_spin
@@ -101,15 +106,18 @@ group           ball2 id 2
 compute         spin2 ball2 reduce sum c_spin
 variable        omega2 equal c_spin2
 thermo_style    custom step v_omega1 v_omega2
-thermo          1000000000""",
-    "variable        e_out equal": """\
-variable        u1 equal vy[1]
-variable        u2 equal vy[2]
-variable        beta equal -(v_u1+{R1}*v_omega1-v_u2+{rim2}*v_omega2)/{slip}
-print           "beta = $(v_beta:%.17g)"
-print           "omega1 = $(v_omega1:%.17g)"
-print           "omega2 = $(v_omega2:%.17g)"
-variable        e_out equal""",
+thermo          1000000000
+run             {steps}"""
+OBLIQUE_WALL = {
+    "vy[2]": "{u2}",
+    "group           ball2 id 2\ncompute         spin2 ball2 reduce sum c_spin\n": "",
+    "c_spin2": "0.0",
+}
+OBLIQUE = {
+    "vx {v1} vy 0 vz 0": "vx {v1} vy {u1} vz 0 omega 0 0 {omega1}",
+    "vx {v2} vy 0 vz 0": "vx {v2} vy {u2} vz 0 omega 0 0 {omega2}",
+    "thermo          1000000000\nrun             {steps}": SPINS,
+    "variable        e_out equal": OBLIQUE_OUTPUT,
 }
 
 
@@ -295,13 +303,11 @@ CODE = Code(
     template=TWO_BALLS,
     wall={
         "create_box      2 box": "create_box      1 box",
-        "create_atoms    2 single {x2} 0 0\n": "",
+        "create_atoms    2 single {x2} {y2} 0\n": "",
         "set             atom 2 diameter {d2} mass {m2} vx {v2} vy 0 vz 0\n": "",
         "set             atom 2 diameter {d2} mass {m2} vx {v2} vy {u2} vz 0 omega 0 0 {omega2}\n": "",
         "vx[2]": "{v2}",
-        "vy[2]": "{u2}",
-        "group           ball2 id 2\ncompute         spin2 ball2 reduce sum c_spin\n": "",
-        "c_spin2": "0.0",
+        **OBLIQUE_WALL,
     },
     frictions=FRICTIONS,
     oblique=OBLIQUE,

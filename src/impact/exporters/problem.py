@@ -18,7 +18,7 @@ from ..engine.plugins import Plugins
 from ..errors import UsageError, did_you_mean
 from ..formatting import argument, number, quantity
 from ..inverse.solve import PointWithE, point_with_e
-from ..inverse.timestep import FixedStepLaw, fixed_step_law
+from ..inverse.timestep import FixedStepLaw, ObliqueLaw, fixed_step_law
 from ..results.calibration import position_of_law, unidentified_notes
 from ..results.single_impact import Calibration, ConfigSource, PointSource, open_source
 from .code import Code, Collision
@@ -31,7 +31,7 @@ STEPS_BEFORE, CONTACTS_RUN = 3, 2.5
 # a ball whose radius is not known and does not matter is larger than its peak indentation by this factor
 RADIUS_PER_PEAK = 100.0
 # the tangential inputs of a collision
-OBLIQUE_VALUES = ("u1", "u2", "omega1", "omega2", "mu")
+OBLIQUE_VALUES = ("u1", "u2", "omega1", "omega2", "mu", "inertia_factor1", "inertia_factor2")
 
 
 @dataclass(frozen=True)
@@ -147,6 +147,8 @@ def prepare_export(
     if chosen:
         Plan(point.config).pair_notes("frictions")
     fixed, outputs = fixed_step_law(point.config, PHASES, code.scheme, of_friction=chosen is not None)
+    if fixed.oblique is not None:
+        _check_limit(code, fixed.oblique)
     calibration = point_source.calibration
     better_fit, fit_notes = _fit_notes(code, version, key, calibration) if calibration else ("", ())
     return ExportProblem(
@@ -167,14 +169,22 @@ def _choose_friction(
     code: Code, source: PointSource, model: str, friction: str | None
 ) -> tuple[str | None, tuple[str, ...]]:
     """Choose the friction law that is asked for, or the first of the source that a code has; else list those."""
-    if friction is not None and friction not in code.frictions:
-        expected = (
-            did_you_mean(friction, list(code.frictions)) if code.frictions else "no friction is written for it"
-        )
-        raise UsageError(f'{argument("friction")}: {code.title} has no "{friction}"; {expected}')
+    known = code.frictions_of(model)
+    if friction is not None and friction not in known:
+        beside = f" with {model}" if friction in code.frictions else ""
+        expected = did_you_mean(friction, known) if known else "no friction is written for it"
+        raise UsageError(f'{argument("friction")}: {code.title} has no "{friction}"{beside}; {expected}')
     keys = [law.key for law in source.draft(model).frictions]
-    chosen = friction or next((key for key in keys if key in code.frictions), None)
+    chosen = friction or next((key for key in keys if key in known), None)
     return chosen, () if chosen else tuple(keys)
+
+
+def _check_limit(code: Code, oblique: ObliqueLaw) -> None:
+    """Refuse the other normal force that limits friction; that of `coulomb-1785` is taken of any code."""
+    law, limit = oblique.pair.friction, oblique.impact.parameters.get("limit")
+    words = next(parameter.choices for parameter in law.parameters if parameter.name == "limit")
+    if law.kind != "coulomb" and limit is not None and words[int(limit.item())] != law.default_limit:
+        raise UsageError(f"friction.{law.key}.limit: {code.title} has only {law.default_limit}")
 
 
 def _defaults(source: PointSource, at: Mapping[str, object], config: Config) -> tuple[str, ...]:

@@ -188,17 +188,25 @@ def verify_scripts(problem: ExportProblem, program: str, dt: float) -> Verificat
 def _with_friction(
     verification: Verification, problem: ExportProblem, steps: Array, runs: list[list[dict[str, float]]]
 ) -> Verification:
-    """Add the tangential restitution; the normal of two balls turns, by a part of the indentation over R*."""
+    """Add the tangential restitution.
+
+    The normal of two balls turns, and some codes shorten the arm of friction: both change velocities by a part of
+    the speed before the impact, of the order of the indentation over R*.
+    """
+    oblique = problem.law.oblique
+    assert oblique is not None
     predicted = replace(problem.law, phases=PHASES).tangential_restitution(steps)
-    uncertainty = verification.uncertainty
-    if not problem.has_wall:
-        uncertainty = TURNING * problem.outputs["peak_indentation"] / float(problem.law.impact.R_eff[0])
+    exact, impact = verification.uncertainty, problem.law.impact
+    v0, slip = float(impact.v0[0]), float(oblique.impact.slip.item())
+    speed = math.hypot(v0, float((oblique.impact.u1 - oblique.impact.u2).item()))
+    turning = TURNING * problem.outputs["peak_indentation"] / float(impact.R_eff[0])
+    is_turning = problem.code.shortens_arms or not problem.has_wall
     return replace(
         verification,
-        uncertainty=uncertainty,
+        uncertainty=exact if problem.has_wall else turning * speed / v0,
         beta_measured=tuple(run.get("beta", math.nan) for row in runs for run in row),
         beta_predicted=tuple(predicted.ravel().tolist()),
-        beta_uncertainty=uncertainty,
+        beta_uncertainty=turning * max(1.0, speed / abs(slip)) if is_turning else exact,
     )
 
 

@@ -6,7 +6,7 @@ import math
 import re
 
 from ..errors import UsageError
-from .code import Code, Collision, Parameters
+from .code import PRINT_BETA, SOLID, Code, Collision, Parameters
 from .programs import printed_version
 
 LAWS = {
@@ -41,6 +41,24 @@ v1, v2 = (ball.state.vel[0] for ball in O.bodies)
 print("e_out =", (v2 - v1) / {v0})
 """
 
+# the normal is along x, the tangent along y, so that spins are about z
+OBLIQUE = {
+    "for x, radius, mass, speed,": "for x, y, radius, mass, speed, u, spin,",
+    "({x1}, {R1}, {m1}, {v1},": "({x1}, {y1}, {R1}, {m1}, {v1}, {u1}, {omega1},",
+    "({x2}, {R2}, {m2}, {v2},": "({x2}, {y2}, {R2}, {m2}, {v2}, {u2}, {omega2},",
+    "(x, 0, 0)": "(x, y, 0)",
+    "(speed, 0, 0)": f"(speed, u, 0)\n    ball.state.inertia = ({SOLID} * mass * radius**2,) * 3\n"
+    "    ball.state.angVel = (0, 0, spin)",
+    'print("e_out ="': "u1, u2 = (ball.state.vel[1] for ball in O.bodies)\n"
+    "omega1, omega2 = (ball.state.angVel[2] for ball in O.bodies)\n" + PRINT_BETA,
+}
+FRICTIONS = {
+    "yade-mindlin": "Law2_ScGeom_MindlinPhys_Mindlin, betas",
+    "yade-viscoelastic": "Law2_ScGeom_ViscElPhys_Basic, ks and cs",
+}
+# the laws that a friction law is combined with; beside en, betas is not heeded
+LAWS_WITH = {"yade-mindlin": "yade-betan", "yade-viscoelastic": "yade-viscoelastic"}
+
 
 def read_version(text: str) -> str:
     if not re.fullmatch(r"\d{4}\.\d{2}[a-z]?", text):
@@ -65,15 +83,40 @@ def parameters(collision: Collision) -> dict[str, float | str]:
     c = collision
     if "viscoelastic" in c.model.key:
         # the springs and dashpots of the two balls act in series
-        return {"kn": 2.0 * c["K"], "cn": 2.0 * c["C"], "ks": 0.0, "cs": 0.0}
+        return {"kn": 2.0 * c["K"], "cn": 2.0 * c["C"], **viscoelastic_friction(c)}
     c.require_materials("YADE takes Young's modulus and Poisson's ratio")
     elastic: dict[str, float | str] = {"young": c["E1"], "poisson": c["nu1"]}
     if not c.has_one_material:
         elastic |= {"young2": c["E2"], "poisson2": c["nu2"]}
     if c.model.key.startswith("yade-en"):
-        return elastic | {"en": c["e"]}
-    # ζ of the law is √1.2 β
-    return elastic | {"betan": c["betan"] if c.model.key == "yade-betan-direct" else linear_damping(c["e"])}
+        elastic |= {"en": c["e"]}
+    else:
+        # ζ of the law is √1.2 β
+        elastic |= {"betan": c["betan"] if c.model.key == "yade-betan-direct" else linear_damping(c["e"])}
+    return elastic | mindlin_friction(c)
+
+
+def viscoelastic_friction(collision: Collision) -> dict[str, float]:
+    """Return the tangential springs and dashpots of each ball, which act in series."""
+    if not collision.friction:
+        return {"ks": 0.0, "cs": 0.0}
+    k_t = collision["k_t"]
+    if math.isnan(k_t):
+        k_t = collision["kt_over_kn"] * collision["K"]
+    angle = {"frictionAngle": math.atan(collision["mu"])}
+    return {"ks": 2.0 * k_t, "cs": 2.0 * collision["c_t"], **angle}
+
+
+def mindlin_friction(collision: Collision) -> dict[str, float]:
+    """Return the damping of the tangential stiffness, which is 8 G* a."""
+    c = collision
+    if not c.friction:
+        return {}
+    for name in ("k_t", "kt_over_kn"):
+        if not math.isnan(c[name]):
+            raise UsageError(f"{name}: YADE has none with its MindlinPhys, whose tangential stiffness is 8 G* a")
+    betas = linear_damping(c["e"]) if math.isnan(c["betas"]) else c["betas"]
+    return {"betas": betas, "frictionAngle": math.atan(c["mu"])}
 
 
 def is_hertzian(version: str) -> bool:
@@ -92,18 +135,19 @@ def linear_damping(e: float) -> float:
 
 def lines(collision: Collision, parameters: Parameters) -> list[str]:
     remaining = dict(parameters)
+    angle = {"frictionAngle": remaining.pop("frictionAngle", 0)}
     second = {name: remaining.pop(f"{name}2") for name in ("young", "poisson") if f"{name}2" in remaining}
     if "kn" in remaining:
-        material, physics = f"ViscElMat({_arguments(remaining)}", "Ip2_ViscElMat_ViscElMat_ViscElPhys()"
+        material, physics = f"ViscElMat({_arguments(remaining | angle)})", "Ip2_ViscElMat_ViscElMat_ViscElPhys()"
         law = "Law2_ScGeom_ViscElPhys_Basic()"
     else:
         elastic = {name: remaining.pop(name) for name in ("young", "poisson")}
-        material = f"FrictMat({_arguments(elastic)}"
+        material = f"FrictMat({_arguments(elastic | angle)})"
         physics = f"Ip2_FrictMat_FrictMat_MindlinPhys({_arguments(remaining)})"
         law = "Law2_ScGeom_MindlinPhys_Mindlin()"
-    text = [f"material1 = O.materials.append({material}, frictionAngle=0))"]
+    text = [f"material1 = O.materials.append({material})"]
     if second:
-        text.append(f"material2 = O.materials.append(FrictMat({_arguments(second)}, frictionAngle=0))")
+        text.append(f"material2 = O.materials.append(FrictMat({_arguments(second | angle)}))")
     bounds, geometries = "Bo1_Sphere_Aabb()", "Ig2_Sphere_Sphere_ScGeom()"
     if collision.has_wall:
         bounds += ", Bo1_Wall_Aabb()"
@@ -126,10 +170,15 @@ def _arguments(values: Parameters) -> str:
 
 def notes(collision: Collision) -> list[str]:
     remarks = ["in SI; NewtonIntegrator(damping=0): its default of 0.2 damps every motion"]
+    if collision.friction:
+        remarks += [
+            "frictionAngle is atan(mu), of both materials",
+            "friction acts at less than the radius from the centre, by a part of the indentation",
+        ]
     if "viscoelastic" in collision.model.key:
         return [
             *remarks,
-            "kn and cn are of one ball: two balls act in series, so that they are twice those of the contact",
+            "kn, cn, ks and cs are of one ball: two balls act in series, and they are twice those of the contact",
             "en of ViscElMat finds its damping only roughly; kn and cn are exact",
             "the force is never negative (since January 2014)",
         ]
@@ -143,7 +192,13 @@ def notes(collision: Collision) -> list[str]:
         *remarks,
         "two materials: 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2; en and betan are set for each pair by MatchMaker",
         "set en or betan, not both; en of 2023.02a is by Thornton and others, before that by Tsuji and others",
-        "the force is never negative (since September 2013); frictionAngle=0: replace it by yours",
+        "the force is never negative (since September 2013)"
+        + ("" if collision.friction else "; frictionAngle=0: replace it by yours"),
+        *(
+            ["unset, betas is betan; beside en it is not heeded: betas=0 gave a beta of 0.097 where 0.279 was due"]
+            if collision.friction
+            else []
+        ),
     ]
 
 
@@ -162,9 +217,19 @@ CODE = Code(
     template=TWO_BALLS,
     wall={
         "    ({x2}, {R2}, {m2}, {v2}, {material2}),\n": "",
+        "    ({x2}, {y2}, {R2}, {m2}, {v2}, {u2}, {omega2}, {material2}),\n": "",
+        "u1, u2 = (ball.state.vel[1] for ball in O.bodies)": "u1, u2 = ball.state.vel[1], {u2}",
+        "omega1, omega2 = (ball.state.angVel[2] for ball in O.bodies)": (
+            "omega1, omega2 = ball.state.angVel[2], 0.0"
+        ),
         "O.run(": "O.bodies.append(utils.wall(0, axis=0, material={material2}))\nO.run(",
         "v1, v2 = (ball.state.vel[0] for ball in O.bodies)": "v1, v2 = ball.state.vel[0], {v2}",
     },
+    frictions=FRICTIONS,
+    # betas is not heeded beside en
+    has_friction=lambda key, friction: key.startswith(LAWS_WITH[friction]),
+    shortens_arms=True,
+    oblique=OBLIQUE,
     wall_inputs=lambda key, version, values: {"R2": WALL_RADII[is_hertzian(version)] * values["R1"]},
     program="yade",
     install="on Debian: apt-get install yade",
