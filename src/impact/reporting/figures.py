@@ -106,6 +106,14 @@ class _Drawing:
         except ImpactError:
             return None
 
+    def has_answer(self, position: Mapping[Hashable, int]) -> bool:
+        """Whether a model has an answer for an impact at some values of axes."""
+        if "status" not in self.dataset:
+            return True
+        status = self.dataset["status"].isel(model=law_positions(self.keys, self.dataset))
+        values = status.isel({dim: place for dim, place in position.items() if dim in status.dims}).values
+        return bool(((values < FIRST_FAILURE) & (values != NO_IMPACT)).any())
+
     def choice_at(self, choice: Choice, index: Mapping[Hashable, int]) -> Choice:
         """Choose the same figure at other values of axes."""
         sel = {str(dim): self.dataset[dim].values[position].item() for dim, position in index.items()}
@@ -176,18 +184,18 @@ class _OtherValues:
             pairs = ((table, tables[*index[:axis], base, *index[axis + 1 :]]) for index, table in tables.items())
             if not all(_are_equal(*pair) for pair in pairs):
                 differ.append(dim)
-        return cls(*_described(dims, differ, compared, position, sizes))
+        return cls(*_described(drawing, dims, differ, compared, position))
 
 
 def _described(
+    drawing: _Drawing,
     dims: Sequence[Hashable],
     differ: Sequence[Hashable],
     compared: Mapping[Hashable, Sequence[int]],
     position: Mapping[Hashable, int],
-    sizes: Mapping[Hashable, int],
 ) -> tuple[list[str], list[tuple[Hashable, int]]]:
     """Describe which axes do not matter and what is not drawn; choose the values that are drawn too."""
-    equal, sentences = [dim for dim in dims if dim not in differ], []
+    equal, sentences, sizes = [dim for dim in dims if dim not in differ], [], drawing.dataset.sizes
     if equal:
         thinned = any(len(compared[dim]) < sizes[dim] for dim in dims)
         combinations = math.prod(sizes[dim] for dim in dims)
@@ -201,7 +209,7 @@ def _described(
         [
             (dim, place)
             for place in reversed(_spread(sizes[dim], MAX_VALUES, position[dim]))
-            if place != position[dim]
+            if place != position[dim] and drawing.has_answer({**position, dim: place})
         ]
         for dim in differ
         if dim != SAMPLE
