@@ -293,13 +293,13 @@ def drawn_elements(svg: bytes) -> Counter[tuple[str, ...]]:
     )
 
 
-@pytest.mark.parametrize("name", ["wide", "frictions", "many"])
+@pytest.mark.parametrize("name", ["wide", "frictions"])
 def test_the_commands_draw_the_figures_again(cli: Run, tmp_path: Path, name: str, wide: xr.Dataset) -> None:
     path = tmp_path / "my results.h5"
     if name == "wide":
         impact.save(wide, path)
     else:
-        shutil.copy(ROOT / "tests" / "data" / f"{'every_model' if name == 'many' else name}.h5", path)
+        shutil.copy(ROOT / "tests" / "data" / f"{name}.h5", path)
     text = build(impact.load(path))
     commands = [html.unescape(command) for command in re.findall("<li><code>(impact plot .*?)</code></li>", text)]
     embedded = re.findall(r'<img src="data:image/svg\+xml;base64,([^"]*)"', text)
