@@ -554,7 +554,7 @@ def test_the_command_writes_the_page(cli: Run, stored: Path, tmp_path: Path) -> 
     written = tmp_path / "results.html"
     size = f"{written.stat().st_size / 1000:,.0f} kB"
     assert done.stderr == f"results.html: 4 figures, {size}\n"
-    assert written.read_text(encoding="utf-8") == build(impact.load(stored))
+    assert written.read_text(encoding="utf-8") == build(impact.load(result))
     # an existing page is replaced only with --overwrite
     written.write_text("a note", encoding="utf-8")
     again = cli("report", "results.h5", cwd=tmp_path)
