@@ -148,7 +148,7 @@ def test_labels_name_what_differs(beads: xr.Dataset) -> None:
     # a single model is not named, and nor are parameters at their defaults
     alone = curves_of(beads, "beta", models=[HOOKE], frictions=[CONSTANT, COULOMB])
     shown = [curve.label.replace("\N{NO-BREAK SPACE}", " ") for curve in of_pairs(alone)]
-    assert shown == ["Cundall and Strack, k_t = 1e+06", "Coulomb"]
+    assert shown == ["Cundall and Strack, k_t = 1 MN/m", "Coulomb"]
     assert "angle" not in conditions_of(alone)
     assert "mu = 0.1" in conditions_of(alone)
     assert "angle = 1°" in conditions_of(curves_of(beads, "beta", x="mu"))

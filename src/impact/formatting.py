@@ -6,6 +6,7 @@ import json
 import math
 import re
 import shlex
+from collections.abc import Callable
 from pathlib import Path
 from unicodedata import category
 
@@ -134,6 +135,21 @@ def quantity(value: object, unit: str = "1", digits: int = 6) -> str:
     """
     text = number(value, digits)
     return text if unit in ("", "1") or text == "–" else f"{text} {unit}"
+
+
+def prefixed(value: object, unit: str = "1", write: Callable[[object], str] = label) -> str:
+    """Format a value with its unit and the prefix that suits it, in print notation.
+
+    >>> prefixed(1e-6, "s"), prefixed(2.1e11, "Pa"), prefixed(7850.0, "kg/m^3"), prefixed(math.inf, "kg")
+    ('1 µs', '210 GPa', '7850 kg/m³', 'inf kg')
+    >>> prefixed(math.pi / 6.0, "rad"), prefixed("steel"), prefixed(0.3)
+    ('30°', 'steel', '0.3')
+    """
+    if not isinstance(value, float) or unit in ("", "1") or value != value:
+        return write(value)
+    size, shown = scaled_unit(unit, abs(value))
+    superscript = re.sub(r"\^(-?\d+)(?![\d.])", lambda power: power[1].translate(SUPERSCRIPTS), shown)
+    return write(value / size) + superscript if unit == "rad" else f"{write(value / size)} {superscript}"
 
 
 def degrees(angle: float) -> str:

@@ -28,6 +28,6 @@ def report(
 
     output = output or result.with_suffix(".html")
     page = impact.report(result, output=output, overwrite=overwrite, plugins=plugin or ())
-    figures = page.count("<figure>")
+    figures = page.count("<figure")
     size = f"{len(page.encode()) / 1000:,.0f} kB"
     exits.print_line(f"{output}: {figures} figure{'' if figures == 1 else 's'}, {size}")

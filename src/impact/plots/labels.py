@@ -19,7 +19,7 @@ from ..contact.models import catalogue
 from ..contact.variables import HISTORY, OUTPUTS
 from ..errors import UsageError
 from ..formatting import NO_BREAK, argument, safe_text, scaled_unit, typographic, with_year
-from .slices import parameter_text, scalars_of
+from .slices import parameter_text, scalars_of, units_of
 from .style import WITH, law_key
 
 if TYPE_CHECKING:
@@ -130,7 +130,10 @@ def law_text(title: str, year: int, equation: str, parameters: str, *, numbered:
 def model_label(model_data: xr.Dataset, *, numbered: bool = False) -> str:
     """Write the title of a model of a result, with the values of its parameters."""
     title, year, equation = (model_data[name].item() for name in ("title", "year", "equation"))
-    parameters = parameter_text(str(model_data["model"].item()), scalars_of(model_data))
+    inputs = scalars_of(model_data)
+    if "exponent" in model_data.coords and model_data["exponent"].ndim == 0:
+        inputs["n"] = float(model_data["exponent"].item())
+    parameters = parameter_text(str(model_data["model"].item()), inputs, units_of(model_data))
     return law_text(str(title), int(year), str(equation), parameters, numbered=numbered)
 
 
@@ -177,17 +180,17 @@ def split_by_law(data: xr.Dataset, *, numbered: bool) -> Iterator[LawPart]:
             continue
         for pair in (of_model.isel(friction=friction) for friction in range(data.sizes["friction"])):
             friction_key = str(pair["friction"].item())
-            of_friction = friction_text(friction_key, scalars_of(pair))
+            of_friction = friction_text(friction_key, scalars_of(pair), units_of(pair))
             # a single model is not named beside every friction law
             shown = of_friction if data.sizes["model"] == 1 else f"{label} with {of_friction}"
             yield LawPart(shown, key, friction_key, pair)
 
 
-def friction_text(key: str, inputs: Mapping[str, object]) -> str:
+def friction_text(key: str, inputs: Mapping[str, object], units: Mapping[str, str]) -> str:
     """Write the title of a friction law, with those of its parameters that differ from their defaults.
 
     >>> inputs = {"friction.lammps-mindlin.xt": 0.5, "friction.lammps-mindlin.limit": 1.0}
-    >>> friction_text("lammps-mindlin", inputs).replace(NO_BREAK, " ")
+    >>> friction_text("lammps-mindlin", inputs, {}).replace(NO_BREAK, " ")
     'LAMMPS mindlin, xt = 0.5, limit = positive'
     """
     law = frictions().get(key)
@@ -201,7 +204,7 @@ def friction_text(key: str, inputs: Mapping[str, object]) -> str:
         value, default = (words.get(each, each) for each in (inputs.get(name), parameter.default))
         if value not in (None, default):
             chosen[name] = value
-    return ", ".join(filter(None, (law.title, parameter_text(f"friction.{key}", chosen))))
+    return ", ".join(filter(None, (law.title, parameter_text(f"friction.{key}", chosen, units))))
 
 
 def label_axis(

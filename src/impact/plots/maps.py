@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from ..errors import UsageError, did_you_mean
 from ..formatting import argument, heading, percentage, safe_text
+from ..results.ranking import error_floor
 from .data import Points
 from .kinds import Choice, Kind
 from .labels import REFERENCE, label_axis, number_axis, pretty_conditions, split_by_law, symbol, words_of
@@ -36,8 +37,6 @@ FloatArray = NDArray[np.float64]
 # a value at each y and x
 Plane = tuple[tuple[float, ...], ...]
 MAX_PANELS = 12
-# errors that differ by less are equal
-TIE_TOLERANCE = 1e-9
 # the smallest error on a logarithmic scale: smaller ones are errors of the solver
 MIN_DRAWN_DISTANCE = 1e-9
 # a map of more cells is stored as an image
@@ -46,6 +45,9 @@ MAX_VECTOR_CELLS = 2_000
 CONTOURS: dict[float, Any] = {0.01: ":", 0.05: "-"}
 FAILED: dict[str, Any] = {"facecolor": "#ebebeb", "edgecolor": "#b4b4b4", "hatch": "/////", "linewidth": 0}
 NO_VALUE = "failed or not defined"
+# where several models are closest, in place of a key, which has no space
+SEVERAL = "several models"
+TIED: dict[str, Any] = {"facecolor": "#bdbdbd", "linewidth": 0}
 # least width of a panel of a map, and of one of the closest model [in]
 MIN_PANEL_WIDTH, MIN_CLOSEST_PANEL_WIDTH = 1.6, 3.0
 # width of what is next to the panels: labels and colour bar [in]
@@ -91,7 +93,8 @@ class MapData:
     panels: tuple[Field, ...]
     not_drawn: tuple[str, ...] = ()
     left_out: tuple[str, ...] = ()  # keys of the models without a panel
-    closest: tuple[tuple[str | None, ...], ...] = ()  # keys of the models with the smallest |e_error|
+    # keys of the models with the smallest |e_error|, or SEVERAL
+    closest: tuple[tuple[str | None, ...], ...] = ()
     distance: Plane = ()  # that |e_error|
 
     takes_points: ClassVar[bool] = False
@@ -102,9 +105,9 @@ class MapData:
 
     @property
     def shares(self) -> dict[str | None, float]:
-        """The fraction of cells where each model is closest, in the order of the result; None: where none is."""
+        """The fraction of cells where each model, or SEVERAL, is closest, in order; None: where none is."""
         count = Counter(key for row in self.closest for key in row)
-        keys = (*(panel.model for panel in self.panels), None)
+        keys = (*(panel.model for panel in self.panels), SEVERAL, None)
         return {key: count[key] / count.total() for key in keys if count[key]}
 
     @property
@@ -220,14 +223,13 @@ def field_map(dataset: xr.Dataset, choice: Choice) -> MapData:
 
 
 def validity_map(dataset: xr.Dataset, choice: Choice) -> MapData:
-    """Find the model with the smallest |e_error| over two axes, the first of equal ones, and that error."""
+    """Find the model with the smallest |e_error| over two axes, or that several are equal, and that error."""
     plot_data = _map_data("validity", dataset, "e_error", choice)
     error = np.abs([panel.values for panel in plot_data.panels])
     error[np.isnan(error)] = np.inf
-    # argmax gives the first model of which this is true
-    best = np.argmax(error <= error.min(axis=0) + TIE_TOLERANCE, axis=0)
-    closest = np.array([panel.model for panel in plot_data.panels], object)[best]
-    distance = np.take_along_axis(error, best[None], axis=0)[0]
+    distance = error.min(axis=0)
+    closest = np.array([panel.model for panel in plot_data.panels], object)[error.argmin(axis=0)]
+    closest[np.count_nonzero(error <= distance + error_floor(dataset), axis=0) > 1] = SEVERAL
     no_value = np.isinf(distance)
     closest[no_value], distance[no_value] = None, np.nan
     return replace(plot_data, closest=_nested_tuples(closest), distance=_nested_tuples(distance))
@@ -338,17 +340,12 @@ def _draw_closest(
     closest = np.array(plot_data.closest, object)
     entries: list[tuple[Artist, str]] = []
     for key, share in plot_data.shares.items():
-        style = FAILED
-        if key:
-            model_style = styles[key]
-            style = {
-                "facecolor": model_style["color"],
-                "hatch": model_style["hatch"],
-                "edgecolor": "white",
-                "linewidth": 0,
-            }
+        style, name = (TIED, f"{SEVERAL}, equally close") if key else (FAILED, NO_VALUE)
+        if key in styles:
+            look, name = styles[key], names[key]
+            style = {"facecolor": look["color"], "hatch": look["hatch"], "edgecolor": "white", "linewidth": 0}
         axes[0].add_patch(_merged_cells(x, y, closest == key, style))
-        entries.append((Patch(**style), f"{percentage(share)}  {names[key] if key else NO_VALUE}"))
+        entries.append((Patch(**style), f"{percentage(share)}  {name}"))
     shown = np.ma.maximum(np.ma.masked_invalid(plot_data.distance), MIN_DRAWN_DISTANCE)
     norm = LogNorm(shown.min(), max(shown.max(), 10.0 * shown.min()))
     mesh, rest = _draw_values(plot_data, axes[1:], x, y, shown[None], norm, "viridis")
@@ -418,5 +415,9 @@ MAP = Kind(
     along=("x", "y"),
 )
 VALIDITY = Kind(
-    "validity", "Model with the smallest error, and that error.", validity_map, choose_plane, along=("x", "y")
+    "validity",
+    "Model with the smallest error, or several with equal errors, and that error.",
+    validity_map,
+    choose_plane,
+    along=("x", "y"),
 )

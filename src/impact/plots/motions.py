@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..array_types import Array
-from ..config.tables import SWEEP_QUANTITIES
+from ..config.input_names import InputName
 from ..contact.models import catalogue
 from ..errors import UsageError
 from ..formatting import safe_text
@@ -150,14 +150,16 @@ def _axis_label_and_unit(history: xr.Dataset, name: str) -> tuple[str, str]:
 
 def _pair_label(history: xr.Dataset, is_single: bool) -> str:
     """Write the names of both laws; a single model is not named beside every friction law."""
-    friction = friction_text(str(history["friction"].item()), _impact_inputs(history))
+    inputs = _impact_inputs(history)
+    friction = friction_text(str(history["friction"].item()), inputs, _units_of(inputs))
     return friction if is_single else f"{_model_label(history, numbered=False)} with {friction}"
 
 
 def _model_label(history: xr.Dataset, numbered: bool) -> str:
     """Write the name of a law, which may be a plug-in that is not installed."""
     key = str(history["model"].item())
-    model, parameters = catalogue().get(key), parameter_text(key, _impact_inputs(history))
+    inputs = _impact_inputs(history)
+    model, parameters = catalogue().get(key), parameter_text(key, inputs, _units_of(inputs))
     if model is None:
         return ", ".join(filter(None, (safe_text(key, 80), parameters)))
     return law_text(model.title, model.year, model.equation, parameters, numbered=numbered)
@@ -183,8 +185,19 @@ def _conditions_text(histories: Sequence[xr.Dataset]) -> str:
     by_model = {str(history["model"].item()): _impact_inputs(history).get("n") for history in histories}
     exponents = {key: n for key, n in by_model.items() if isinstance(n, float)}
     text = exponent_text(exponents) if len(exponents) == len(by_model) else None
-    units = {name: SWEEP_QUANTITIES[name].unit if name in SWEEP_QUANTITIES else "1" for name in inputs}
-    return described_inputs(inputs, units, text)
+    return described_inputs(inputs, _units_of(inputs), text)
+
+
+def _units_of(inputs: Mapping[str, object]) -> dict[str, str]:
+    """Find the units of the inputs of an impact; "1" for those of plug-ins, which may not be installed."""
+    units = {}
+    for name in inputs:
+        try:
+            quantity = InputName.parse(name).quantity(catalogue())
+        except KeyError:
+            quantity = None
+        units[name] = quantity.unit if quantity else "1"
+    return units
 
 
 def choose_point(dataset: xr.Dataset, keys: Sequence[str]) -> Choice | None:

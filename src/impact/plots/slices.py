@@ -10,9 +10,9 @@ import numpy as np
 from ..config.grid import SAMPLE
 from ..config.input_names import InputName, is_input
 from ..config.tables import OBLIQUE_DEFAULTS
-from ..contact.units import with_numbers
+from ..contact.units import names_in, with_numbers
 from ..errors import UsageError, did_you_mean
-from ..formatting import NO_BREAK, argument, degrees, quantity, safe_text
+from ..formatting import NO_BREAK, argument, degrees, number, prefixed, quantity, safe_text
 from ..results.schema import exponents_of, plain_unit
 from ..results.selection import law_positions, select
 from .kinds import Choice
@@ -242,6 +242,11 @@ def conditions_of(dataset: xr.Dataset, *drawn: str) -> str:
     return described_inputs(inputs, units, exponents_of(dataset))
 
 
+def units_of(dataset: xr.Dataset) -> dict[str, str]:
+    """Read the units of all coordinates."""
+    return {str(name): unit_of(coordinate) for name, coordinate in dataset.coords.items()}
+
+
 def scalars_of(dataset: xr.Dataset) -> dict[str, object]:
     """Find the inputs that have one value."""
     return {
@@ -268,15 +273,19 @@ def described_inputs(inputs: Mapping[str, object], units: Mapping[str, str], exp
     return ", ".join(parts)
 
 
-def parameter_text(key: str, inputs: Mapping[str, object]) -> str:
-    """Write the parameters of a law among some inputs, for its name.
+def parameter_text(key: str, inputs: Mapping[str, object], units: Mapping[str, str]) -> str:
+    """Write the parameters of a law among some inputs, for its name; a unit of unknown exponents is left out.
 
-    >>> parameter_text("bilinear", {"bilinear.K": 1e9, "hertz.K": 2e9, "e": 0.5}).replace(NO_BREAK, " ")
-    'K = 1e+09'
+    >>> inputs = {"bilinear.K": 1e9, "bilinear.C": 2e-3, "hertz.K": 2e9, "n": 1.5}
+    >>> units = {"bilinear.K": "N/m^n", "bilinear.C": "N s^p/m^n"}
+    >>> parameter_text("bilinear", inputs, units).replace(NO_BREAK, " ")
+    'K = 1 GN/m^1.5, C = 0.002'
     """
-    parameters = (
-        (name.removeprefix(f"{key}."), value) for name, value in inputs.items() if name.startswith(f"{key}.")
-    )
-    return ", ".join(
-        safe_text(f"{name} = {quantity(value)}", 60).replace(" ", NO_BREAK) for name, value in parameters
-    )
+    own = {name.removeprefix(f"{key}."): value for name, value in inputs.items() if name.startswith(f"{key}.")}
+    numbers = {name: value for name, value in ({"n": inputs.get("n")} | own).items() if isinstance(value, float)}
+    parts = []
+    for name, value in own.items():
+        unit = units.get(f"{key}.{name}", "1")
+        unit = with_numbers(unit, numbers) if names_in(unit) <= numbers.keys() else "1"
+        parts.append(safe_text(f"{name} = {prefixed(value, unit, number)}", 60).replace(" ", NO_BREAK))
+    return ", ".join(parts)

@@ -3,24 +3,31 @@
 from __future__ import annotations
 
 import base64
+import itertools
 import math
+import shlex
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..config.grid import SAMPLE
 from ..config.input_names import InputName, is_input
 from ..contact.model import ForceModel
 from ..contact.status import FIRST_FAILURE, NO_IMPACT
+from ..contact.units import names_in, with_numbers
 from ..errors import ImpactError
-from ..formatting import degrees, label
+from ..formatting import number, prefixed
+from ..plots.data import PlotData
 from ..plots.draw import draw, get_plot_data
 from ..plots.kinds import STUDIES, Choice, Kind, Look, kinds_of
 from ..plots.slices import numeric_axes, unit_of, varying_inputs
 from ..plots.style import encoded
+from ..results.ranking import MIN_ERROR_FLOOR
+from ..results.replay_command import command_start
 from ..results.schema import columns_along
 from ..results.selection import law_positions
 from ..results.slabs import distinct_points, is_computed, slabs
@@ -30,39 +37,225 @@ if TYPE_CHECKING:
 
 # points that are searched for the first one with an answer, at which the figures are drawn
 MAX_SEARCHED = 2**18
+# most combinations of values of other axes at which the numbers of a figure are compared, values of an axis that
+# are drawn, and further figures of a kind
+MAX_COMPARED, MAX_VALUES, MAX_MORE = 48, 4, 4
+# of the largest number: what is hardly visible
+MAX_DIFFERENCE = 1e-3
 
 
 @dataclass(frozen=True)
 class Figure:
-    """A figure of a report: what it shows, a caption with its point, and the picture as a data URL."""
+    """A figure: what it shows, a caption with its point, the picture as a data URL, and the command to draw it."""
 
     label: str
     caption: str
     source: str
     of_friction: bool
+    is_first: bool  # of its kind; others are at other values
+    command: str
+
+
+@dataclass(frozen=True)
+class _Drawing:
+    """What a figure is drawn from."""
+
+    dataset: xr.Dataset
+    keys: Sequence[str]
+    plugins: Sequence[ForceModel | str | Path]
+    name: str
+
+    def figure(
+        self, number: int, kind: Kind, choice: Choice, caption: str, plot_data: PlotData, *, is_first: bool = False
+    ) -> Figure:
+        """Draw a figure; title and conditions are in the caption, and the legend beside the first of a kind.
+
+        It is narrow, so that its text is legible on a phone.
+        """
+        # the legend of the closest model depends on the values
+        legend = "full" if is_first or "y" in kind.along else "none"
+        picture = draw(plot_data, Look(width="single", title=False, legend=legend))
+        # transparent, because the page may be dark
+        for background in (picture.patch, *(axes.patch for axes in picture.axes)):
+            background.set_visible(False)
+        source = f"data:image/svg+xml;base64,{base64.b64encode(encoded(picture, 'svg')).decode()}"
+        command = self.command(number, kind, choice, legend)
+        label = kind.caption if is_first else caption
+        return Figure(label, f"Figure {number}. {caption}", source, kind.of_friction, is_first, command)
+
+    def command(self, number: int, kind: Kind, choice: Choice, legend: str) -> str:
+        """Write the command that draws a figure; empty if a model is a Python value."""
+        options = {"x": choice.x, "y": choice.y, "variable": choice.variable}
+        words = [f"--{name}={value}" for name, value in options.items() if value is not None]
+        words += [
+            f"--sel={name}={value!r}" if isinstance(value, float) else f"--sel={name}={value}"
+            for name, value in (choice.sel or {}).items()
+        ]
+        if choice.models and len(choice.models) < self.dataset.sizes["model"]:
+            words += [f"--model={key}" for key in choice.models]
+        words += [f"--friction={key}" for key in choice.frictions or ()]
+        words += ["--legend=none"] if legend == "none" else []
+        words += ["--width=single", "--no-title", f"--output=figure{number}.svg"]
+        start = command_start(self.name or "RESULT.h5", self.dataset, "plot")
+        return shlex.join([*start, f"--kind={kind.name}", *words]) if start else ""
+
+    def plot_data(self, kind: Kind, choice: Choice) -> PlotData | None:
+        """Read the data of a figure; None where it has no values."""
+        try:
+            return get_plot_data(self.dataset, kind.name, choice, self.plugins)
+        except ImpactError:
+            return None
+
+    def has_answer(self, position: Mapping[Hashable, int]) -> bool:
+        """Whether a model has an answer for an impact at some values of axes."""
+        if "status" not in self.dataset:
+            return True
+        status = self.dataset["status"].isel(model=law_positions(self.keys, self.dataset))
+        values = status.isel({dim: place for dim, place in position.items() if dim in status.dims}).values
+        return bool(((values < FIRST_FAILURE) & (values != NO_IMPACT)).any())
+
+    def choice_at(self, choice: Choice, index: Mapping[Hashable, int]) -> Choice:
+        """Choose the same figure at other values of axes."""
+        sel = {str(dim): self.dataset[dim].values[position].item() for dim, position in index.items()}
+        return replace(choice, sel={**(choice.sel or {}), **sel})
 
 
 def figures_of(
-    dataset: xr.Dataset, keys: Sequence[str], plugins: Sequence[ForceModel | str | Path]
+    dataset: xr.Dataset, keys: Sequence[str], plugins: Sequence[ForceModel | str | Path], name: str = ""
 ) -> tuple[list[Figure], list[str]]:
-    """Draw the figures of a result; returns them, and a sentence for each figure that cannot be drawn."""
-    drawn, reasons = [], []
-    for kind, choice, position in iterate_choices(dataset, keys):
-        try:
-            plot_data = get_plot_data(dataset, kind.name, choice, plugins)
-            # title and conditions are in the caption; the figure is narrow, so that its text is legible on a phone
-            figure = draw(plot_data, Look(width="single", title=False))
-        except ImpactError as error:
-            reasons.append(f"The figure {kind.name} is left out: {'; '.join(error.problems)}")
-            continue
-        # transparent, because the page may be dark
-        for background in (figure.patch, *(axes.patch for axes in figure.axes)):
-            background.set_visible(False)
-        source = f"data:image/svg+xml;base64,{base64.b64encode(encoded(figure, 'svg')).decode()}"
-        sentences = [kind.caption, *_condition_sentences(dataset, position, keys)]
-        sentences += [f"Not drawn: {'; '.join(plot_data.not_drawn)}."] if plot_data.not_drawn else []
-        drawn.append(Figure(kind.caption, " ".join(sentences), source, kind.of_friction))
-    return drawn, reasons
+    """Draw the figures of a result, whose file has a name; also returns a sentence for each that is left out."""
+    drawing, figures, left_out = _Drawing(dataset, keys, plugins, name), list[Figure](), list[str]()
+    choices = list(iterate_choices(dataset, keys))
+    # numbered as they stand on the page: those of friction have a section of their own
+    for of_friction in (False, True):
+        others: list[tuple[int, Kind, Choice, Hashable, int]] = []
+        for kind, choice, position in choices:
+            if kind.of_friction != of_friction:
+                continue
+            place_on_page = len(figures) + 1
+            try:
+                plot_data = get_plot_data(dataset, kind.name, choice, plugins)
+                other_values = _OtherValues.of(drawing, kind, choice, position)
+                sentences = [kind.caption, *_condition_sentences(dataset, position, keys), *other_values.sentences]
+                sentences += [f"Not drawn: {'; '.join(plot_data.not_drawn)}."] if plot_data.not_drawn else []
+                caption = " ".join(sentences)
+                figures.append(drawing.figure(place_on_page, kind, choice, caption, plot_data, is_first=True))
+            except ImpactError as error:
+                left_out.append(f"The figure {kind.name} is left out: {'; '.join(error.problems)}")
+                continue
+            others += [(place_on_page, kind, choice, dim, place) for dim, place in other_values.drawn]
+        for first, kind, choice, dim, place in others:
+            choice = drawing.choice_at(choice, {dim: place})
+            more = drawing.plot_data(kind, choice)
+            if more is not None:
+                along = [name for name in varying_inputs(dataset) if dataset[name].dims == (dim,)]
+                caption = f"As Figure {first}, at {at_text(dataset.isel({dim: place}), along or [str(dim)])}."
+                figures.append(drawing.figure(len(figures) + 1, kind, choice, caption, more))
+    return figures, left_out
+
+
+@dataclass(frozen=True)
+class _OtherValues:
+    """What a figure is at other values of the axes that it does not draw: sentences, and those to draw too."""
+
+    sentences: list[str]
+    drawn: list[tuple[Hashable, int]]
+
+    @classmethod
+    def of(cls, drawing: _Drawing, kind: Kind, choice: Choice, position: Mapping[Hashable, int]) -> _OtherValues:
+        """Compare the numbers of a figure at the values of all other axes, at most MAX_COMPARED combinations."""
+        sizes = drawing.dataset.sizes
+        dims = [dim for dim in position if sizes[dim] > 1]
+        if kind.source == "history" or not dims:
+            return cls([f"Other values of {_and(dims)} are not drawn."] if dims else [], [])
+        count = {dim: sizes[dim] for dim in dims}
+        while math.prod(count.values()) > MAX_COMPARED:
+            count[max(count, key=lambda dim: count[dim])] -= 1
+        compared = {dim: _spread(sizes[dim], count[dim], position[dim]) for dim in dims}
+        tables = {
+            index: _numbers(
+                drawing.plot_data(kind, drawing.choice_at(choice, dict(zip(dims, index, strict=True))))
+            )
+            for index in itertools.product(*compared.values())
+        }
+        differ = []
+        for axis, dim in enumerate(dims):
+            base = position[dim]
+            pairs = ((table, tables[*index[:axis], base, *index[axis + 1 :]]) for index, table in tables.items())
+            if not all(_are_equal(*pair) for pair in pairs):
+                differ.append(dim)
+        return cls(*_described(drawing, dims, differ, compared, position))
+
+
+def _described(
+    drawing: _Drawing,
+    dims: Sequence[Hashable],
+    differ: Sequence[Hashable],
+    compared: Mapping[Hashable, Sequence[int]],
+    position: Mapping[Hashable, int],
+) -> tuple[list[str], list[tuple[Hashable, int]]]:
+    """Describe which axes do not matter and what is not drawn; choose the values that are drawn too."""
+    equal, sentences, sizes = [dim for dim in dims if dim not in differ], [], drawing.dataset.sizes
+    if equal:
+        thinned = any(len(compared[dim]) < sizes[dim] for dim in dims)
+        combinations = math.prod(sizes[dim] for dim in dims)
+        among = (
+            f" of {math.prod(map(len, compared.values())):,} of {combinations:,} combinations" if thinned else ""
+        )
+        verb = "do" if len(equal) > 1 else "does"
+        sentences.append(f"{_and(equal)} {verb} not matter (differences{among} below {MAX_DIFFERENCE:.1%}).")
+    # the last value of each axis first, which differs most; samples are not drawn one by one
+    columns = [
+        [
+            (dim, place)
+            for place in reversed(_spread(sizes[dim], MAX_VALUES, position[dim]))
+            if place != position[dim] and drawing.has_answer({**position, dim: place})
+        ]
+        for dim in differ
+        if dim != SAMPLE
+    ]
+    chosen = [value for row in itertools.zip_longest(*columns) for value in row if value is not None][:MAX_MORE]
+    drawn = sorted(chosen, key=lambda value: (dims.index(value[0]), value[1]))
+    left = {dim: sizes[dim] - 1 - sum(dim == of for of, _ in drawn) for dim in differ}
+    parts = [f"{number:,} value{'s' * (number > 1)} of {dim}" for dim, number in left.items() if number]
+    parts += [f"combinations of {_and(differ)}"] if len(differ) > 1 else []
+    sentences += [f"Not drawn: {_and(parts)}."] if parts else []
+    return sentences, drawn
+
+
+def _spread(size: int, count: int, position: int) -> list[int]:
+    """Choose indices of an axis: the first, the last and some between them, and a position."""
+    return sorted({*np.linspace(0, size - 1, min(size, count)).round().astype(int).tolist(), position})
+
+
+def _and(names: Sequence[object]) -> str:
+    """Join names for a sentence."""
+    words = [str(name) for name in names]
+    return " and ".join(filter(None, (", ".join(words[:-1]), *words[-1:])))
+
+
+def _numbers(plot_data: PlotData | None) -> tuple[NDArray[np.float64], list[object]] | None:
+    """Read the numbers that a picture shows, and the closest models."""
+    if plot_data is None:
+        return None
+    table = plot_data.long_table()
+    closest = list(table.get("closest", []))
+    shown = table[["abs_e_error"]] if closest else table.select_dtypes("number")
+    return shown.to_numpy(float), closest
+
+
+def _are_equal(
+    first: tuple[NDArray[np.float64], list[object]] | None, second: tuple[NDArray[np.float64], list[object]] | None
+) -> bool:
+    """Whether no number differs by more than MAX_DIFFERENCE of the largest in its column, or than rounding."""
+    if first is None or second is None:
+        return first is second
+    (a, words), (b, other_words) = first, second
+    if a.shape != b.shape or words != other_words:
+        return False
+    largest = np.fmax.reduce(np.where(np.isfinite(a), np.abs(a), 0.0), axis=0, initial=0.0)
+    most = np.fmax(MAX_DIFFERENCE * largest, MIN_ERROR_FLOOR)
+    return bool(np.all((np.abs(a - b) <= most) | (a == b) | (np.isnan(a) & np.isnan(b))))
 
 
 def _condition_sentences(
@@ -160,7 +353,13 @@ def _first_answered_of_model(model_data: xr.Dataset, axes: Sequence[Hashable]) -
 
 def coordinate_text(coordinate: xr.DataArray) -> str:
     """Write the value of a scalar coordinate with its unit."""
-    unit = unit_of(coordinate)
-    if unit == "rad":
-        return degrees(coordinate.values.item())
-    return label(coordinate.values.item()) + (f" {unit}" if unit not in ("", "1") else "")
+    value = InputName.parse(str(coordinate.name)).word(coordinate.values.item())
+    return prefixed(value, numbered_unit(coordinate), number)
+
+
+def numbered_unit(coordinate: xr.DataArray) -> str:
+    """Read the unit of a coordinate, with the number of the exponent n if that has a single value."""
+    unit, n = unit_of(coordinate), coordinate.coords.get("n")
+    return (
+        with_numbers(unit, {"n": float(n)}) if n is not None and n.ndim == 0 and names_in(unit) == {"n"} else unit
+    )

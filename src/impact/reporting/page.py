@@ -24,9 +24,11 @@ from ..contact.evidence import Evidence
 from ..contact.frictions import frictions
 from ..contact.model import ForceModel
 from ..contact.models import catalogue
-from ..errors import UsageError
-from ..formatting import label, number, safe_text, with_year
-from ..plots.slices import unit_of, varying_inputs
+from ..engine.plan import Plan
+from ..engine.plugins import read_plugins
+from ..errors import ImpactError, UsageError
+from ..formatting import number, prefixed, safe_text, scaled_unit, with_year
+from ..plots.slices import varying_inputs
 from ..results.attributes import read_attribute
 from ..results.board import BOARD_HEADINGS, Board, board_rows, check_rows, engine_headline, failure_lines
 from ..results.calibration import (
@@ -38,6 +40,7 @@ from ..results.calibration import (
 )
 from ..results.kinds import is_board, is_calibration, is_sensitivity
 from ..results.plausibility import input_notes, inputs_of, result_notes, with_depths
+from ..results.provenance import stored_config
 from ..results.ranking import DEFAULT_TOL, Ranking, rank_models, rankable_parts
 from ..results.replay_command import describe_point
 from ..results.schema import FIT_STATUSES, count_points, exponents_of
@@ -45,13 +48,15 @@ from ..results.sensitivity import INDEX_HEADINGS, describe_design, describe_stud
 from ..results.slabs import MAX_SUMMARY_POINTS, is_large
 from ..results.summary import Summary, extremes_of, summarize
 from ..results.xarray_backend import result_of
-from .figures import at_text, coordinate_text, figures_of
+from .figures import at_text, coordinate_text, figures_of, numbered_unit
 
 if TYPE_CHECKING:
     import xarray as xr
 
 # the most that is shown: letters of a text and of a line of the config, values of an axis, failed points
 MAX_TEXT_LETTERS, MAX_LINE_LETTERS, MAX_VALUES, MAX_FAILED = 2000, 100_000, 8, 20
+# letters of the title at the top of a printed page
+MAX_RUNNING_LETTERS = 80
 # with more than MAX_FIGURE_MODELS models the figures show the BEST_MODELS best
 MAX_FIGURE_MODELS, BEST_MODELS = 12, 8
 
@@ -109,7 +114,7 @@ def page(dataset: xr.Dataset, plugins: Sequence[ForceModel | str | Path] = ()) -
         best = [row.model for row in ranked.models] if ranked else keys
         selection = f"The figures show {BEST_MODELS} of the {len(keys)} models: {', '.join(best[:BEST_MODELS])}."
         keys = best[:BEST_MODELS]
-    drawn, left_out = figures_of(dataset, keys, plugins)
+    drawn, left_out = figures_of(dataset, keys, plugins, Path(str(dataset.encoding.get("source", ""))).name)
     models = [_model_section(dataset.isel(model=index)) for index in range(dataset.sizes["model"])]
     inputs = inputs_of(dataset)
     lines = str(dataset.attrs.get("config", "")).replace("\r\n", "\n").expandtabs(4).split("\n")
@@ -120,7 +125,7 @@ def page(dataset: xr.Dataset, plugins: Sequence[ForceModel | str | Path] = ()) -
         studies=studies,
         index_headings=INDEX_HEADINGS,
         design=describe_design(dataset),
-        notes=[*(input_notes(inputs) if inputs else ()), *result_notes(summary)],
+        notes=[*(input_notes(inputs) if inputs else ()), *_pair_notes(dataset, plugins), *result_notes(summary)],
         outcomes=list(_outcomes(summary)),
         axes=[_axis_row(dataset[name]) for name in varying_inputs(dataset)],
         single_values=list(_single_values(dataset)),
@@ -129,6 +134,7 @@ def page(dataset: xr.Dataset, plugins: Sequence[ForceModel | str | Path] = ()) -
         selection=selection,
         figures=drawn,
         left_out=left_out,
+        running_title=_css_text(_title(dataset)),
         failures=_failures_section(dataset, summary),
         friction=_friction_section(dataset, summary) if "friction" in dataset.dims else None,
         facts=_facts(dataset),
@@ -158,6 +164,19 @@ def _board_page(dataset: xr.Dataset) -> str:
             for engine in engines
         ],
         facts=_facts(dataset),
+        running_title=_css_text(_title(dataset)),
+    )
+
+
+def _css_text(text: str) -> Markup:
+    """Write a text as a string of a style sheet: all but letters and digits of ASCII are escaped.
+
+    >>> str(_css_text('a "</style>'))
+    '"a\\\\000020\\\\000022\\\\00003c\\\\00002fstyle\\\\00003e"'
+    """
+    shown = safe_text(text, MAX_RUNNING_LETTERS)
+    return Markup('"{}"').format(
+        Markup("").join(c if c.isascii() and c.isalnum() else f"\\{ord(c):06x}" for c in shown)
     )
 
 
@@ -177,6 +196,19 @@ def _fits_section(dataset: xr.Dataset) -> dict[str, Any]:
         "notes": fit_notes(dataset),
         "statuses": [f"{name}: {meaning}" for name, meaning in FIT_STATUSES.items() if name != "ok"],
     }
+
+
+def _pair_notes(dataset: xr.Dataset, plugins: Sequence[ForceModel | str | Path]) -> list[str]:
+    """Note the pairs of a model and a friction law that have no meaning at some points, as the sweep did."""
+    if "friction" not in dataset.dims:
+        return []
+    try:
+        plugin_set = read_plugins(plugins)
+        config = stored_config(dataset.attrs, (), plugin_set, "the result")
+        return Plan(config, plugin_set.of(config.models)).pair_notes("frictions")
+    except ImpactError:
+        # without its plug-ins, or its config, a result has no law to ask
+        return []
 
 
 def _studies(dataset: xr.Dataset) -> Iterator[dict[str, Any]]:
@@ -211,7 +243,7 @@ def _summary_sentence(dataset: xr.Dataset) -> str:
     models, axes = dataset.sizes["model"], [str(dim) for dim in dataset.sizes if dim not in ("model", "friction")]
     points, over = count_points(dataset), f" over {', '.join(axes)}" if axes else ""
     return (
-        f"{models:,} model{_plural_s(models)} of the impact of two balls{over}, judged by the "
+        f"{models:,} model{_plural_s(models)} of the impact of two balls{over}, compared with the "
         f"impulse-momentum solution: {points:,} point{_plural_s(points)}."
     )
 
@@ -258,10 +290,10 @@ def _single_values(dataset: xr.Dataset) -> Iterator[tuple[str, str, str]]:
         if coordinate.ndim == 0 and is_input(name):
             value = (exponents_of(dataset) if name == "n" else None) or coordinate_text(coordinate)
             yield str(name), value, str(coordinate.attrs.get("long_name", ""))
-    units = {key: rule.unit.removesuffix("1") for key, rule in MATERIAL_QUANTITIES.items()}
+    units = {key: rule.unit for key, rule in MATERIAL_QUANTITIES.items()}
     for name, material in read_attribute(dataset.attrs, "materials").items():
         values = (
-            f"{key} = {label(value)} {units.get(key, '')}".strip()
+            f"{key} = {prefixed(value, units.get(key, '1'))}"
             for key, value in material.items()
             if value is not None
         )
@@ -271,21 +303,24 @@ def _single_values(dataset: xr.Dataset) -> Iterator[tuple[str, str, str]]:
 def _axis_row(coordinate: xr.DataArray) -> tuple[str, ...]:
     """Describe a coordinate: name, meaning, unit, ends, number of values, and how they are spaced."""
     meaning = str(coordinate.attrs.get("long_name", ""))
-    unit = unit_of(coordinate)
-    if unit == "rad":
-        unit, coordinate = "°", coordinate.copy(data=np.degrees(coordinate.values))
-    return str(coordinate.name), meaning, unit if unit not in ("", "1") else "–", *_range(coordinate)
+    unit = numbered_unit(coordinate)
+    if coordinate.dtype.kind == "f" and not is_large(coordinate.variable):
+        values = coordinate.values
+        largest = np.max(np.abs(values), initial=0.0, where=np.isfinite(values))
+        size, unit = scaled_unit(unit, float(largest))
+        coordinate = coordinate.copy(data=values / size)
+    return str(coordinate.name), meaning, unit if unit not in ("", "1") else "", *_range(coordinate)
 
 
 def _range(coordinate: xr.DataArray) -> tuple[str, str, str, str]:
     """Find the ends of a coordinate, the number of values, and how they are spaced."""
-    ends, large = ("–", "–"), is_large(coordinate.variable)
+    ends, large = ("", ""), is_large(coordinate.variable)
     if large:
         extremes = extremes_of(coordinate.to_dataset(name="values"), "values")
-        ends = (label(extremes.smallest), label(extremes.largest)) if extremes else ends
+        ends = (number(extremes.smallest), number(extremes.largest)) if extremes else ends
     elif coordinate.dtype.kind == "f":
         smallest, largest = (end.reduce(coordinate.values, axis=None) for end in (np.fmin, np.fmax))
-        ends = label(float(smallest)), label(float(largest))
+        ends = number(float(smallest)), number(float(largest))
     spacing = str(coordinate.attrs.get("equation", "")) or ("–" if large else _spacing(coordinate.values.ravel()))
     if coordinate.name not in coordinate.dims:
         spacing = f"varies with {' and '.join(map(str, coordinate.dims))}: {spacing}"
@@ -306,7 +341,7 @@ def _spacing(values: NDArray[Any]) -> str:
             ratio = np.log(values[-1] / values[0]) / (values.size - 1)
             if np.allclose(np.diff(np.log(values)), ratio, rtol=1e-6, atol=0.0):
                 return f"geometric, by {number(float(np.exp(ratio)))}"
-    return ", ".join(map(label, values[:MAX_VALUES].tolist())) + (", …" if values.size > MAX_VALUES else "")
+    return ", ".join(map(number, values[:MAX_VALUES].tolist())) + (", …" if values.size > MAX_VALUES else "")
 
 
 def _rank_models(dataset: xr.Dataset) -> tuple[Ranking | None, str]:

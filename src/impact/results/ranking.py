@@ -36,12 +36,14 @@ MAX_RANKED_POINTS = 2**30
 MAX_PARAMETER_COMBINATIONS = 2**24
 # accepted |e_out - e|
 DEFAULT_TOL = 0.01
+# errors that differ by less are equal; smaller ones are errors of the integrator, which are up to about rtol
+MIN_ERROR_FLOOR = 1e-9
 # outputs that may be a target: numbers of the order of 1
 TARGETS = tuple(name for name, variable in OUTPUTS.items() if variable.scale == "1" and variable.per_model)
 # rows of the text; the rest is only counted
 MAX_ROWS = 30
-# ranges of e that a table lists
-MAX_RANGES = 8
+# ranges of e that a table lists, and models that a sentence names
+MAX_RANGES, MAX_NAMED = 8, 3
 
 
 @dataclass(frozen=True)
@@ -140,9 +142,12 @@ class Ranked:
 
         >>> Ranked("hertz", {}, 10, 1, 0, 0.45, 0.9, {"e": 0.1}, 1.0, ((1.0, 1.0),)).row
         ('hertz', '10.0%', '0.9', '0.45', '0', 'e=0.1: e_out 1', '1')
+        >>> Ranked("exact-hysteresis", {}, 9, 9, 0, 2e-12, 5e-11, {"e": 0.1}, 0.1, ((0.1, 0.9),)).row
+        ('exact-hysteresis', '100%', '<1e-9', '<1e-9', '0', '–', '0.1 to 0.9')
         """
-        errors = (number(error, 3) for error in (self.max_error, self.mean_error))
-        worst = f"{describe_point(self.at)}: {self.output} {number(self.e_out, 4)}" if self.at else "–"
+        errors = map(_error_text, (self.max_error, self.mean_error))
+        has_worst = self.at and self.max_error > MIN_ERROR_FLOOR
+        worst = f"{describe_point(self.at)}: {self.output} {number(self.e_out, 4)}" if has_worst else "–"
         return (self.name, self.percent, *errors, f"{self.failed:,}", worst, self._served_text)
 
     @property
@@ -157,11 +162,15 @@ class Ranked:
 
 @dataclass(frozen=True)
 class Ranking(Displayed, Sequence[Ranked]):
-    """The models or pairs of a result, ordered by their share of points within the tolerance, then by errors."""
+    """The models or pairs of a result, ordered by their share of points within the tolerance, then by errors.
+
+    Errors below `floor`, see `error_floor`, are equal; equal models are in the order of the result.
+    """
 
     tol: float
     models: tuple[Ranked, ...]
     criterion: Criterion = BY_ERROR
+    floor: float = MIN_ERROR_FLOOR
 
     @overload
     def __getitem__(self, index: int) -> Ranked: ...
@@ -180,12 +189,12 @@ class Ranking(Displayed, Sequence[Ranked]):
         """Headings of a table of `Ranked.row`; the first and the last two columns are text, the others numbers."""
         return (
             "model",
-            f"within {number(self.tol)}",
+            f"points within {number(self.tol)}",
             "max error",
             "mean error",
             "failed",
             "worst point",
-            f"{self.criterion.along} served",
+            f"{self.criterion.along} within {number(self.tol)}",
         )
 
     @property
@@ -197,15 +206,18 @@ class Ranking(Displayed, Sequence[Ranked]):
     def headline(self) -> str:
         """The result in a sentence."""
         first = self.models[0]
-        key, tol, points = safe_text(first.name, 120), number(self.tol), f"{first.points:,} points"
+        tol, points = number(self.tol), f"{first.points:,} points"
         alone = "the only point" if first.points == 1 else ""
         if self.best:
-            others = len(self.best) - 1
-            subject = f"{key} and {others} more give" if others else f"{key} gives"
-            return f"{subject} {self.criterion.text} within {tol} at {alone or f'all {points}'}"
+            verb = "give" if len(self.best) > 1 else "gives"
+            return f"{_listed(self.best)} {verb} {self.criterion.text} within {tol} at {alone or f'all {points}'}"
         nothing = f"no {'pair' if first.friction else 'model'} gives {self.criterion.text} within {tol}"
         if first.within:
-            return f"{nothing} everywhere; {key} is nearest: {first.percent} of {points}"
+            nearest = [
+                ranked for ranked in self.models if _rank_key(ranked, self.floor) == _rank_key(first, self.floor)
+            ]
+            verb = "are" if len(nearest) > 1 else "is"
+            return f"{nothing} everywhere; {_listed(nearest)} {verb} nearest: {first.percent} of {points}"
         return f"{nothing} at {alone or f'any of {points}'}"
 
     def as_dict(self) -> dict[str, Any]:
@@ -237,6 +249,15 @@ class Ranking(Displayed, Sequence[Ranked]):
 
     def _repr_html_(self) -> str:
         return html_of([self.headline, self._table(self.models)])
+
+
+def error_floor(dataset: xr.Dataset) -> float:
+    """The difference of restitutions below which they are equal: two errors of the integrator.
+
+    >>> error_floor(xr.Dataset(attrs={"rtol": 1e-10})), error_floor(xr.Dataset(attrs={"rtol": 1e-4}))
+    (1e-09, 0.0002)
+    """
+    return max(MIN_ERROR_FLOOR, 2.0 * float(dataset.attrs.get("rtol", 0.0)))
 
 
 def recommend(
@@ -341,7 +362,9 @@ def rank_models(parts: Sequence[xr.Dataset], tol: float, criterion: Criterion = 
     if not any(law.points for law in ranked):
         wanted = "a requested e" if criterion.target is None else f"a value of {criterion.output}"
         raise UsageError(f"nothing to rank: no point has both {wanted} and an impact")
-    return Ranking(tol, tuple(sorted(ranked, key=_rank_key)), criterion)
+    floor = error_floor(parts[0])
+    ranked.sort(key=lambda law: _rank_key(law, floor))
+    return Ranking(tol, tuple(ranked), criterion, floor)
 
 
 def _check_rankable(dataset: xr.Dataset, criterion: Criterion) -> None:
@@ -364,10 +387,23 @@ def _check_rankable(dataset: xr.Dataset, criterion: Criterion) -> None:
         raise UsageError("e_error, status and e of this result do not lie along the axes of a sweep")
 
 
-def _rank_key(ranked: Ranked) -> tuple[float, ...]:
-    # a model that failed everywhere has no errors
-    errors = (ranked.max_error, ranked.mean_error)
+def _rank_key(ranked: Ranked, floor: float) -> tuple[float, ...]:
+    # a model that failed everywhere has no errors; those below the floor are equal
+    errors = (0.0 if error < floor else error for error in (ranked.max_error, ranked.mean_error))
     return (-ranked.share, *(math.inf if math.isnan(error) else error for error in errors))
+
+
+def _listed(models: Sequence[Ranked]) -> str:
+    """Name the first models in a sentence, and count the others."""
+    names = [safe_text(ranked.name, 120) for ranked in models[:MAX_NAMED]]
+    others = len(models) - MAX_NAMED
+    names += [f"{others} other{'s' * (others > 1)}"] if others > 0 else []
+    return " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))
+
+
+def _error_text(error: float) -> str:
+    """Write an error; the digits of one of the integrator mean nothing."""
+    return "<1e-9" if 0.0 < error < MIN_ERROR_FLOOR else number(error, 3)
 
 
 def _uses_e(dataset: xr.Dataset) -> bool:

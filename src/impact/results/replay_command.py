@@ -15,8 +15,8 @@ from .attributes import read_attribute
 InputValue = TypeVar("InputValue")
 
 
-def command_start(path: str, dataset: xr.Dataset) -> tuple[str, ...]:
-    """Start the command that runs a point of a result again; empty for a dataset without a file.
+def command_start(path: str, dataset: xr.Dataset, act: str = "run") -> tuple[str, ...]:
+    """Start the command that runs a point of a result again, or plots it; empty for a dataset without a file.
 
     Also empty if a model is a Python value, which no command line can name.
 
@@ -26,7 +26,7 @@ def command_start(path: str, dataset: xr.Dataset) -> tuple[str, ...]:
     files = [record.file for record in read_attribute(dataset.attrs, "plugins").values() if not record.package]
     if not path or None in files:
         return ()
-    return ("impact", "run", path, *(word for file in dict.fromkeys(files) for word in ("--plugin", str(file))))
+    return ("impact", act, path, *(word for file in dict.fromkeys(files) for word in ("--plugin", str(file))))
 
 
 def inputs_of_model(at: Mapping[str, InputValue]) -> dict[str, InputValue]:
