@@ -193,6 +193,20 @@ def scaled_unit(unit: str, largest: float) -> tuple[float, str]:
     return 10.0**power, text + unit
 
 
+def prefixed(value: object, unit: str = "1", digits: int = 6) -> str:
+    """Format a value in the prefix of its unit that suits it; angles are in degrees.
+
+    >>> prefixed(1.008542975e-4, "m", 4), prefixed(56e9, "Pa"), prefixed(0.0, "m/s"), prefixed("steel")
+    ('100.9 µm', '56 GPa', '0 m/s', 'steel')
+    >>> prefixed(math.pi / 6.0, "rad"), prefixed(math.inf, "kg"), prefixed(-1.5e-3, "J")
+    ('30°', 'inf kg', '-1.5 mJ')
+    """
+    if not isinstance(value, float):
+        return str(value)
+    size, shown = scaled_unit(unit, abs(value))
+    return quantity(value / size, shown, digits).replace(" °", "°")
+
+
 def _prefixed(largest: float) -> tuple[int, str]:
     """Choose the power of ten of a prefix, and the prefix; 0 and "" for numbers that need none."""
     if not 0.0 < largest < float("inf") or 0.1 <= largest < 1000.0:
