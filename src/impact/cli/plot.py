@@ -29,7 +29,7 @@ def plot(
         typer.Option(
             "-o",
             "--output",
-            help="The picture: .png, .svg, .pdf, .eps or .pgf; several kinds: one file each. "
+            help="The picture: .png, .svg, .pdf, .eps, .pgf, or .gif (animation); several kinds: one file each. "
             "\\[default: RESULT.png]",
         ),
     ] = None,
@@ -134,7 +134,7 @@ def plot(
 ) -> None:
     """Plot a stored result: by default the final-velocity comparison, Figure 6 of the paper.
 
-    loop, history and impulse integrate one point of the result again; --sel selects it.
+    loop, history, impulse and animation integrate one point of the result again; --sel selects it.
     Of several kinds, those that --sel leaves no axis are drawn over the whole axis, and those that do not apply
     are reported with the reason.
     """

@@ -109,6 +109,8 @@ def plot_to_files(
     measured = None if points is None else read_points(points)
     dataset = load(result)
     kinds = kinds or [default_kind(dataset).name]
+    if output.suffix.lower() == ".gif" and set(kinds) != {"animation"}:
+        raise UsageError(f"{output}: a .gif is an animation, expected {argument('kind', 'animation')}")
     plot_data, left_out = _read_kinds(kinds, dataset, choice, plugins)
     if plot_data:
         check_labels(look.labels or {}, set().union(*(label_keys(shown, look) for shown in plot_data.values())))

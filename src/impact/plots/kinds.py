@@ -32,6 +32,7 @@ KINDS = {
     "loop": "motions",
     "history": "motions",
     "impulse": "motions",
+    "animation": "animation",
     "beta": "oblique",
     "e-t": "oblique",
     "impulse-ratio": "oblique",

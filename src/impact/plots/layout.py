@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import matplotlib
@@ -50,6 +50,9 @@ class Picture(Figure):
         self.header = [self.text(0.0, 1.0, text, va="top", **style) for text, style in texts if text]
         self.entries: list[tuple[Artist, str]] = []
         self.shared: tuple[Text, ...] = ()
+        # of an animation, which can show each frame
+        self.show_frame: Callable[[int], None] | None = None
+        self.frame_count = 0
         # a later change of the size makes the legend again, in the present style
         self.style = {
             key: value for key, value in matplotlib.rcParams.items() if key.startswith(("legend", "font"))

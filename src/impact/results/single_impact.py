@@ -206,9 +206,7 @@ class Impact(Displayed):
             checks.append(("integrator", self.integrator, "scheme with a fixed step"))
         return {"Inputs": inputs, "Outputs": outputs, "Checks": checks}
 
-    def _derived_rows(
-        self, quantities: Iterable[tuple[str, str, str]], digits: int
-    ) -> list[tuple[str, str, str]]:
+    def _derived_rows(self, quantities: Iterable[tuple[str, str, str]], digits: int) -> list[tuple[str, str, str]]:
         """Write the derived quantities that apply and are not inputs."""
         return [
             (name, prefixed(self.derived[name], self._with_numbers(plain_unit(unit)), digits), meaning)
@@ -254,9 +252,8 @@ class Impact(Displayed):
 
     def _unit_and_meaning(self, name: str) -> tuple[str, str]:
         """Find the unit and meaning of an input, which may be a parameter of a law or a property of a material."""
-        laws = {law.key: law for law in (self.model, self.friction) if law}
         try:
-            rule = InputName.parse(name).quantity(laws)
+            rule = InputName.parse(name).quantity({self.model.key: self.model})
         except KeyError:
             rule = None
         return ("1", "") if rule is None else (self._with_numbers(rule.unit), rule.meaning)
