@@ -307,6 +307,8 @@ def test_labels_of_bands_are_apart_and_inside_their_panel(
     assert wide.y0 > narrow.y1
     panel = axes.get_window_extent()
     assert panel.y0 <= narrow.y0 < wide.y1 <= panel.y1
+    # beside the axes, where no curve is
+    assert min(wide.x0, narrow.x0) > panel.x1
 
 
 @pytest.mark.parametrize("width", WIDTHS)
@@ -712,12 +714,12 @@ def test_a_table_is_latex_by_its_ending_and_parquet_needs_pyarrow(
     assert done.returncode == 0, done.stderr
     text = (tmp_path / "a.tex").read_text("utf-8")
     assert r"\begin{tabular}" in text
-    assert r"v1\_post reference [m/s]" in text
+    assert r"{v1\_post reference [\unit{m/s}]}" in text
     words = ("plot", coarse_file, "-o", "b.svg", "--data", "b.parquet")
     refused = forked(*words, cwd=tmp_path, code="import sys; sys.modules['pyarrow'] = None")
     assert refused.returncode == 2
     assert refused.stderr == (
-        '--data: .parquet needs pyarrow, which is not installed: pip install "impact-sweep[parquet]"\n'
+        '.parquet needs pyarrow, which is not installed: pip install "impact-sweep[parquet]"\n'
     )
     assert not (tmp_path / "b.svg").exists()
 

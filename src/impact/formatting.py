@@ -155,13 +155,13 @@ def heading(name: str, of: str = "", unit: str = "1") -> str:
 
 
 def typographic(value: float, *, powers: bool = False) -> str:
-    """Format a number with a minus sign and powers of ten as in print; with `powers`, also 1e-4 is a power of ten.
+    """Format a number with a minus sign and powers of ten as in print; with `powers` always with a power of ten.
 
-    >>> [typographic(value) for value in (0.25, -3.0, -1e-9, 2.5e10, 1e-4)], typographic(1e-4, powers=True)
-    (['0.25', '−3', '−10⁻⁹', '2.5·10¹⁰', '0.0001'], '10⁻⁴')
+    >>> [typographic(value) for value in (0.25, -3.0, -1e-9, 2.5e10, 1e-4)], typographic(1.0, powers=True)
+    (['0.25', '−3', '−10⁻⁹', '2.5·10¹⁰', '0.0001'], '10⁰')
     """
     text = number(float(value))
-    if powers and value and not 0.01 <= abs(value) < 1e5:
+    if powers and value:
         digits, _, exponent = f"{value:.5e}".partition("e")
         text = f"{float(digits):g}e{exponent}"
     mantissa, _, power = text.partition("e")

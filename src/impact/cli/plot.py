@@ -16,7 +16,17 @@ from ..formatting import safe_text
 from ..plots.kinds import KINDS, WIDTHS
 from . import exits
 from .completion import complete_axis, complete_kind, complete_output
-from .options import FrictionOption, JsonOption, ModelOption, OverwriteOption, PluginOption, SelectOption
+from .options import (
+    DecimalOption,
+    DigitsOption,
+    FrictionOption,
+    JsonOption,
+    ModelOption,
+    OverwriteOption,
+    PluginOption,
+    RowsOption,
+    SelectOption,
+)
 
 if TYPE_CHECKING:
     from ..plots.data import PlotData
@@ -128,6 +138,9 @@ def plot(
             "--data-form", metavar="FORM", help="wide: a column for each curve; long: a row for each point."
         ),
     ] = "wide",
+    rows: RowsOption = None,
+    digits: DigitsOption = None,
+    decimal: DecimalOption = "point",
     overwrite: OverwriteOption = False,
     plugin: PluginOption = None,
     as_json: JsonOption = False,
@@ -160,6 +173,9 @@ def plot(
         frictions=friction,
         data=data,
         data_form=data_form,
+        rows=rows,
+        digits=digits,
+        decimal=decimal,
         overwrite=overwrite,
         plugins=plugin or (),
     )

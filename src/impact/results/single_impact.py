@@ -206,6 +206,11 @@ class Impact(Displayed):
             checks.append(("integrator", self.integrator, "scheme with a fixed step"))
         return {"Inputs": inputs, "Outputs": outputs, "Checks": checks}
 
+    def rows(self) -> dict[str, str]:
+        """The lines of all groups, by name."""
+        groups = self.groups().values()
+        return {name: "  ".join(filter(None, words)) for group in groups for name, *words in group}
+
     def _derived_rows(self, quantities: Iterable[tuple[str, str, str]], digits: int) -> list[tuple[str, str, str]]:
         """Write the derived quantities that apply and are not inputs."""
         return [
