@@ -170,7 +170,7 @@ def test_different_in_five_formats(forked: ForkServer, folder: Path) -> None:
     replay = f"impact run faulty.h5 --model {KEY} --at e=0.05"
     lines = outputs["table"].splitlines()
     assert lines[:4] == [headline, f"missing variable: {missing}", WORST, f"  {replay}"]
-    assert re.search(r"v1_post +scaled by v0 +1e-09 +2 of 303 +1\.6e-07 +160", outputs["table"])
+    assert re.search(r"v1_post +scaled by v0 +1e-09 +2 of 303 +160 nm/s +160", outputs["table"])
 
     data = json.loads(outputs["json"])
     assert (data["equal"], data["headline"]) == (False, headline)
