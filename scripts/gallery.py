@@ -64,7 +64,12 @@ class Entry:
         # of these results it is the default
         kind = [] if self.kind in ("final-velocities", "sensitivity") else ["--kind", self.kind]
         options = [*kind, *shlex.split(self.options)]
-        return ["impact", "plot", f"{self.result}.h5", *options, "-o", f"{self.kind}.svg"]
+        return ["impact", "plot", f"{self.result}.h5", *options, "-o", self.picture]
+
+    @property
+    def picture(self) -> str:
+        """The file of the picture."""
+        return f"{self.kind}.{'gif' if self.kind == 'animation' else 'svg'}"
 
 
 # result, options and caption of the kinds that need others than those of `entry_of`
@@ -101,6 +106,12 @@ EXAMPLES = {
         "figure6",
         "--sel e=0.5 --model lankarani-nikravesh-1990 --model gharib-hurmuzlu-2012",
         "The impulse-velocity diagram, Figure 2. All models follow the same lines and differ in the end point.",
+    ),
+    "animation": (
+        "figure6",
+        "--sel e=0.5 --model gharib-hurmuzlu-2012",
+        "Both balls of one impact, with displacements much larger than in proportion to the balls, the force over "
+        "time, and the loop.",
     ),
     "beta": (
         "oblique",
@@ -179,7 +190,7 @@ def _sections() -> Iterator[str]:
 {shlex.join(entry.command)}
 ```
 
-![{find_kind(entry.kind).caption}](gallery/{entry.kind}.svg)"""
+![{find_kind(entry.kind).caption}](gallery/{entry.picture})"""
 
 
 def write_results(folder: Path) -> None:

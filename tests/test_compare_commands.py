@@ -11,6 +11,7 @@ import stat
 import subprocess
 import sys
 import tomllib
+from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
 from unicodedata import category
@@ -169,7 +170,7 @@ def test_different_in_five_formats(forked: ForkServer, folder: Path) -> None:
     replay = f"impact run faulty.h5 --model {KEY} --at e=0.05"
     lines = outputs["table"].splitlines()
     assert lines[:4] == [headline, f"missing variable: {missing}", WORST, f"  {replay}"]
-    assert re.search(r"v1_post +scaled by v0 +1e-09 +2 of 303 +1\.6e-07 +160", outputs["table"])
+    assert re.search(r"v1_post +scaled by v0 +1e-09 +2 of 303 +160 nm/s +160", outputs["table"])
 
     data = json.loads(outputs["json"])
     assert (data["equal"], data["headline"]) == (False, headline)
@@ -831,3 +832,26 @@ def test_a_narrow_terminal_shows_sentences_and_no_table(forked: ForkServer, fold
         _, printed = printed_on_terminal(forked, *words, COLUMNS=columns)
         assert printed.startswith("not equal: ")
         assert ("scaled by v0" in printed) == has_table
+
+
+def test_the_table_of_changes_has_units_and_names_what_is_unchanged() -> None:
+    config = {"models": "gharib-hurmuzlu-2012", "sweep": {"e": [0.2, 0.5], "m1": 1.0, "m2": 1.0, "K": 6e9}}
+    slow, fast = (impact.sweep({**config, "sweep": {**config["sweep"], "v1": v1}}) for v1 in (1.0, 1.5))
+    lines = str.splitlines(impact.compare(fast, slow)._repr_html_().replace("</tr>", "\n").replace("<p>", "\n"))
+    row = next(line for line in lines if ">peak_force<" in line)
+    assert re.search(r">[\d.]+ kN<", row)
+    # the restitution of this law does not depend on the speed
+    assert any(line.startswith("unchanged: e_out, ") for line in lines)
+
+
+def test_a_changed_plug_in_is_a_note_without_records() -> None:
+    law = impact.models()["hertz"]
+    config = {"models": "mine", "sweep": {"e": 0.5, "v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 6e9}}
+    results = []
+    for digit in "ab":
+        result = impact.sweep(config, plugins=[replace(law, key="mine")])
+        result.attrs["plugins"] = json.dumps({"mine": {"file": "my.py", "sha256": digit * 64}})
+        results.append(result)
+    verdict = impact.compare(*results)
+    assert "the code of mine changed" in verdict.notes
+    assert not [note for note in verdict.notes if "sha256" in note]

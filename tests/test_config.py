@@ -247,7 +247,8 @@ BAD = [
      ["x.toml:4: sweep.K: its unit N/m^n depends on n, which is an axis; expected one K for each n, zipped with it",
       "x.toml:4: sweep.K: got a stiffness for an axis n, but test-linear has n = 1; " "expected K under [model.test-linear], or no K"]),
     ('["lankarani-nikravesh-1990"]', '["test-plastic"]',
-     ["x.toml:9: materials.steel.yield_strength: missing, expected a number > 0 Pa (used by test-plastic)"]),
+     ["x.toml:9: materials.steel.yield_strength: missing, expected a number > 0 Pa (used by test-plastic), "
+      "or other models"]),
     ('["lankarani-nikravesh-1990"]', '["test-driven"]',
      ["x.toml:2: model.test-driven.S: missing, expected a number >= 1 N/m^n: stiffness of the test"]),
     ("rho = 7850\n", "",

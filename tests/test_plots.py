@@ -212,7 +212,9 @@ def test_a_motion_is_that_of_a_single_impact(
     curve_data = plot_data_by_kind[kind]
     assert "e = 0.5" in conditions_of(curve_data)
     for panel in curve_data.panels:
-        assert single_impacts.keys() <= {curve.model for curve in panel.curves}
+        # an animation shows the first law
+        drawn = {curve.model for curve in panel.curves}
+        assert len(drawn) == 1 if kind == "animation" else single_impacts.keys() <= drawn
         for curve in panel.curves:
             if curve.model not in single_impacts:
                 continue
@@ -223,7 +225,7 @@ def test_a_motion_is_that_of_a_single_impact(
             if kind == "loop":
                 np.testing.assert_array_equal(curve.x, history["delta"])
                 np.testing.assert_array_equal(curve.y, history["F"])
-            elif kind == "history":
+            elif kind in ("history", "animation"):
                 np.testing.assert_array_equal(curve.x, history["t"])
             else:
                 # the last impulse is that of both phases, m v0 (1 + e_out)
@@ -305,6 +307,8 @@ def test_labels_of_bands_are_apart_and_inside_their_panel(
     assert wide.y0 > narrow.y1
     panel = axes.get_window_extent()
     assert panel.y0 <= narrow.y0 < wide.y1 <= panel.y1
+    # beside the axes, where no curve is
+    assert min(wide.x0, narrow.x0) > panel.x1
 
 
 @pytest.mark.parametrize("width", WIDTHS)
@@ -482,7 +486,7 @@ def test_the_same_bytes_in_every_process(stored: Path, tmp_path: Path) -> None:
 def test_a_file_of_another_format_is_not_written(
     coarse: xr.Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    with pytest.raises(UsageError, match=r"\.png, \.svg, \.pdf, \.eps or \.pgf"):
+    with pytest.raises(UsageError, match=r"\.png, \.svg, \.pdf, \.eps, \.pgf or \.gif"):
         save_figure(impact.plot(coarse), tmp_path / "results.h5")
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(UsageError, match=r"pgf needs xelatex of LaTeX, which is not installed"):
@@ -710,12 +714,12 @@ def test_a_table_is_latex_by_its_ending_and_parquet_needs_pyarrow(
     assert done.returncode == 0, done.stderr
     text = (tmp_path / "a.tex").read_text("utf-8")
     assert r"\begin{tabular}" in text
-    assert r"v1\_post reference [m/s]" in text
+    assert r"{v1\_post reference [\unit{m/s}]}" in text
     words = ("plot", coarse_file, "-o", "b.svg", "--data", "b.parquet")
     refused = forked(*words, cwd=tmp_path, code="import sys; sys.modules['pyarrow'] = None")
     assert refused.returncode == 2
     assert refused.stderr == (
-        '--data: .parquet needs pyarrow, which is not installed: pip install "impact-sweep[parquet]"\n'
+        '.parquet needs pyarrow, which is not installed: pip install "impact-sweep[parquet]"\n'
     )
     assert not (tmp_path / "b.svg").exists()
 

@@ -1,4 +1,4 @@
-"""Results as text, HTML, JSON and data frames; rich and pandas are imported when they are needed.
+"""Results as text, HTML, JSON, data frames and files of tables; rich and pandas are imported when they are needed.
 
 A result defines once what is shown of it, `sections`: lines of text and tables. All text is escaped here.
 """
@@ -7,14 +7,18 @@ from __future__ import annotations
 
 import io
 import json
+import re
 import sys
 from abc import abstractmethod
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TextIO, TypeAlias
 
-from .formatting import number, safe_text
+from .atomic import check_output, write_file
+from .errors import UsageError
+from .formatting import argument, number, safe_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -24,6 +28,17 @@ if TYPE_CHECKING:
 PIPE_WIDTH = 160
 # characters of a cell, and of a line, which may be a command that is copied
 MAX_CELL, MAX_LINE = 200, 4000
+# files of tables, and their decimal separators
+TABLE_SUFFIXES = (".csv", ".tex", ".parquet")
+DECIMALS = {"point": ".", "comma": ","}
+LATEX_CHARACTERS = str.maketrans(
+    {
+        "\\": r"\textbackslash{}",
+        "^": r"\textasciicircum{}",
+        "~": r"\textasciitilde{}",
+        **{character: "\\" + character for character in "&%$#_{}"},
+    }
+)
 
 
 class Styled(NamedTuple):
@@ -91,6 +106,150 @@ class Table:
         head = f"<thead><tr>{cells('th', self.headings)}</tr></thead>" if self.headings else ""
         body = "".join(f"<tr>{cells('td', row)}</tr>" for row in self.rows)
         return f"<table>{head}<tbody>{body}</tbody></table>"
+
+
+@dataclass(frozen=True)
+class TableForm:
+    """How a table is written to a file.
+
+    Parameters
+    ----------
+    rows : at most this number of rows, evenly spread from the first to the last; by default all
+    digits : significant digits; by default all, in .tex six
+    decimal : "point", or "comma" with columns that are separated by semicolons
+    """
+
+    rows: int | None = None
+    digits: int | None = None
+    decimal: str = "point"
+
+    def __post_init__(self) -> None:
+        for name, value, least in (("rows", self.rows, 2), ("digits", self.digits, 1)):
+            if value is not None and value < least:
+                raise UsageError(f"{argument(name)}: got {value}, expected a whole number >= {least}")
+        check_decimal(self.decimal)
+
+
+def check_decimal(decimal: str) -> None:
+    """Raise a UsageError unless a decimal separator is known."""
+    if decimal not in DECIMALS:
+        raise UsageError(f"{argument('decimal')}: got {decimal}, expected {' or '.join(DECIMALS)}")
+
+
+def check_table(path: Path, name: str) -> None:
+    """Check the suffix of a table that an argument names."""
+    if path.suffix.lower() not in TABLE_SUFFIXES:
+        *most, last = TABLE_SUFFIXES
+        raise UsageError(f"{argument(name, path)}: expected a name that ends in {', '.join(most)} or {last}")
+
+
+def encode_frame(frame: pd.DataFrame, suffix: str, form: TableForm | None = None) -> bytes:
+    """Encode a table for a file of a suffix of TABLE_SUFFIXES.
+
+    >>> import pandas as pd
+    >>> print(encode_frame(pd.DataFrame({"law": ["a_b"], "t [s]": [1.25e-5]}), ".tex").decode())
+    \\begin{tabular}{lS[table-format=1.2e-1]}
+    \\toprule
+    {law} & {t [\\unit{s}]} \\\\
+    \\midrule
+    a\\_b & 1.25e-5 \\\\
+    \\bottomrule
+    \\end{tabular}
+    <BLANKLINE>
+    """
+    form = form or TableForm()
+    if form.rows is not None and form.rows < len(frame):
+        last = len(frame) - 1
+        frame = frame.iloc[[round(last * row / (form.rows - 1)) for row in range(form.rows)]]
+    if suffix == ".tex":
+        return _latex(frame, form).encode()
+    if form.digits is not None:
+        digits = form.digits
+        frame = frame.map(
+            lambda cell: float(number(cell, digits)) if isinstance(cell, float) and cell == cell else cell
+        )
+    if suffix == ".parquet":
+        buffer = io.BytesIO()
+        try:
+            frame.to_parquet(buffer, index=False, engine="pyarrow")
+        except ImportError:
+            needs = 'needs pyarrow, which is not installed: pip install "impact-sweep[parquet]"'
+            raise UsageError(f".parquet {needs}") from None
+        return buffer.getvalue()
+    separator = "," if form.decimal == "point" else ";"
+    text = frame.to_csv(index=False, lineterminator="\n", sep=separator, decimal=DECIMALS[form.decimal])
+    return str(text).encode()
+
+
+def check_table_output(path: Path | None, *, overwrite: bool) -> None:
+    """Check, before any work, the file of the option for a table."""
+    if path is not None:
+        check_table(path, "output")
+        check_output(path, overwrite=overwrite)
+
+
+def write_table(value: Displayed, path: Path, form: TableForm, *, overwrite: bool) -> None:
+    """Write the rows of a result to a file."""
+    frame = value.to_dataframe().map(_flat_cell)
+    # such as the parameters of laws that have none
+    frame = frame.loc[:, [not frame[name].eq("").all() for name in frame.columns]]
+    write_file(path, encode_frame(frame, path.suffix.lower(), form), overwrite=overwrite)
+
+
+def _flat_cell(cell: object) -> object:
+    """Write values by name, and ranges, as text."""
+    match cell:
+        case dict():
+            return ", ".join(f"{name} = {number(value)}" for name, value in cell.items())
+        case (float() as low, float() as high):
+            return f"{number(low)} to {number(high)}"
+        case tuple() | list():
+            return ", ".join(str(_flat_cell(part)) for part in cell)
+    return cell
+
+
+def _latex(frame: pd.DataFrame, form: TableForm) -> str:
+    """Write a tabular of booktabs, with an S column of siunitx for each column of numbers."""
+    formats, columns = "", []
+    for _, column in frame.items():
+        cells = column.tolist()
+        is_numeric = all(isinstance(cell, int | float) and not isinstance(cell, bool) for cell in cells)
+        texts = [_latex_cell(cell, form.digits or 6) for cell in cells]
+        columns.append(texts)
+        formats += f"S[{_siunitx_format(texts, form.decimal)}]" if is_numeric else "l"
+    rows = [[_latex_heading(str(name)) for name in frame.columns], *zip(*columns, strict=True)]
+    head, *body = (f"{' & '.join(row)} \\\\" for row in rows)
+    lines = [f"\\begin{{tabular}}{{{formats}}}", r"\toprule", head, r"\midrule", *body, r"\bottomrule"]
+    return "\n".join([*lines, r"\end{tabular}", ""])
+
+
+def _latex_heading(name: str) -> str:
+    """Write a heading in braces, so that siunitx does not read it as a number."""
+    words, bracket, unit = name.rpartition(" [")
+    if not bracket:
+        return f"{{{name.translate(LATEX_CHARACTERS)}}}"
+    unit = re.sub(r"\^(-?[\d.]+|\([^)]*\))", r"^{\1}", unit.removesuffix("]"))
+    return f"{{{words.translate(LATEX_CHARACTERS)} [\\unit{{{unit}}}]}}"
+
+
+def _latex_cell(cell: object, digits: int) -> str:
+    if isinstance(cell, float) and not abs(cell) < float("inf"):
+        return "" if cell != cell else r"{$\infty$}" if cell > 0.0 else r"{$-\infty$}"
+    if isinstance(cell, int | float):
+        return re.sub(r"e([+-])0*", lambda sign: f"e{sign[1].strip('+')}", number(cell, digits))
+    return str(cell).translate(LATEX_CHARACTERS)
+
+
+def _siunitx_format(texts: Sequence[str], decimal: str) -> str:
+    """Describe the widest number of a column, so that siunitx aligns it at the decimal separator."""
+    parts = [re.fullmatch(r"(-?)(\d+)(?:\.(\d+))?(?:e(-?)(\d+))?", text) for text in texts]
+    found = [part for part in parts if part]
+    signs, whole, fraction, power_signs, powers = (
+        zip(*(part.groups("") for part in found), strict=True) if found else [[""]] * 5
+    )
+    exponent = f"e{max(power_signs)}{max(map(len, powers))}" if any(powers) else ""
+    size = f"{max(signs)}{max(map(len, whole))}.{max(map(len, fraction))}{exponent}"
+    return f"table-format={size}" + (", output-decimal-marker={,}" if decimal == "comma" else "")
 
 
 class Wrapped(str):

@@ -171,13 +171,13 @@ def heading(name: str, of: str = "", unit: str = "1") -> str:
 
 
 def typographic(value: float, *, powers: bool = False) -> str:
-    """Format a number with a minus sign and powers of ten as in print; with `powers`, also 1e-4 is a power of ten.
+    """Format a number with a minus sign and powers of ten as in print; with `powers` always with a power of ten.
 
-    >>> [typographic(value) for value in (0.25, -3.0, -1e-9, 2.5e10, 1e-4)], typographic(1e-4, powers=True)
-    (['0.25', '−3', '−10⁻⁹', '2.5·10¹⁰', '0.0001'], '10⁻⁴')
+    >>> [typographic(value) for value in (0.25, -3.0, -1e-9, 2.5e10, 1e-4)], typographic(1.0, powers=True)
+    (['0.25', '−3', '−10⁻⁹', '2.5·10¹⁰', '0.0001'], '10⁰')
     """
     text = number(float(value))
-    if powers and value and not 0.01 <= abs(value) < 1e5:
+    if powers and value:
         digits, _, exponent = f"{value:.5e}".partition("e")
         text = f"{float(digits):g}e{exponent}"
     mantissa, _, power = text.partition("e")
@@ -207,6 +207,20 @@ def scaled_unit(unit: str, largest: float) -> tuple[float, str]:
         return 1.0, unit
     power, text = _prefixed(largest)
     return 10.0**power, text + unit
+
+
+def prefixed(value: object, unit: str = "1", digits: int = 6) -> str:
+    """Format a value in the prefix of its unit that suits it; angles are in degrees.
+
+    >>> prefixed(1.008542975e-4, "m", 4), prefixed(56e9, "Pa"), prefixed(0.0, "m/s"), prefixed("steel")
+    ('100.9 µm', '56 GPa', '0 m/s', 'steel')
+    >>> prefixed(math.pi / 6.0, "rad"), prefixed(math.inf, "kg"), prefixed(-1.5e-3, "J")
+    ('30°', 'inf kg', '-1.5 mJ')
+    """
+    if not isinstance(value, float):
+        return str(value)
+    size, shown = scaled_unit(unit, abs(value))
+    return quantity(value / size, shown, digits).replace(" °", "°")
 
 
 def _prefixed(largest: float) -> tuple[int, str]:

@@ -9,16 +9,28 @@ import typer
 
 import impact
 
-from ..display import show
+from ..display import TABLE_SUFFIXES, TableForm, check_table_output, show, write_table
 from . import exits
 from .completion import complete_model
-from .options import JobsOption, JsonOption, OverwriteOption, PluginOption, SetOption
+from .options import (
+    DecimalOption,
+    DigitsOption,
+    JobsOption,
+    JsonOption,
+    OverwriteOption,
+    PluginOption,
+    RowsOption,
+    SetOption,
+)
 
 
 def calibrate(
     config: Annotated[Path, typer.Argument(help="A TOML file with \\[data] and { fit = \\[least, most] }.")],
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="The result file. \\[default: none]")
+        Path | None,
+        typer.Option(
+            "-o", "--output", help="The result file, or of its table .csv, .tex or .parquet. \\[default: none]"
+        ),
     ] = None,
     overwrite: OverwriteOption = False,
     best: Annotated[
@@ -37,6 +49,9 @@ def calibrate(
     sets: SetOption = None,
     plugins: PluginOption = None,
     jobs: JobsOption = 1,
+    rows: RowsOption = None,
+    digits: DigitsOption = None,
+    decimal: DecimalOption = "point",
     as_json: JsonOption = False,
 ) -> None:
     """Fit laws to measurements, and rank them.
@@ -44,9 +59,13 @@ def calibrate(
     Intervals are those of 95 % by profile likelihood. A parameter that the data do not determine has none.
     """
 
+    form = TableForm(rows, digits, decimal)
+    is_table = output is not None and output.suffix.lower() in TABLE_SUFFIXES
+    if is_table:
+        check_table_output(output, overwrite=overwrite)
     result = impact.calibrate(
         config,
-        output=output,
+        output=None if is_table else output,
         best=best,
         model=model,
         overwrite=overwrite,
@@ -54,7 +73,10 @@ def calibrate(
         plugins=plugins or (),
         jobs=jobs,
     )
-    show(impact.describe(result), as_json=as_json)
+    described = impact.describe(result)
+    if is_table and output is not None:
+        write_table(described, output, form, overwrite=overwrite)
+    show(described, as_json=as_json)
     for path in (output, best):
         if path is not None:
             exits.print_line(f"{path}: written")

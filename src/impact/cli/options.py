@@ -55,6 +55,32 @@ FrictionKeyOption = Annotated[
 ]
 OutputOption = Annotated[Path, typer.Option("-o", "--output", help="The result file.")]
 OverwriteOption = Annotated[bool, typer.Option("--overwrite", help="Replace the output if it exists.")]
+RowsOption = Annotated[
+    int | None,
+    typer.Option(
+        "--rows",
+        metavar="N",
+        parser=parse_whole_number,
+        help="Write at most N rows of a table, evenly spread. \\[default: all]",
+    ),
+]
+DigitsOption = Annotated[
+    int | None,
+    typer.Option(
+        "--digits",
+        metavar="N",
+        parser=parse_whole_number,
+        help="Significant digits of a table. \\[default: all, in .tex 6]",
+    ),
+]
+DecimalOption = Annotated[
+    str,
+    typer.Option("--decimal", metavar="NAME", help="point, or comma: then semicolons separate columns."),
+]
+TableOption = Annotated[
+    Path | None,
+    typer.Option("-o", "--output", metavar="FILE", help="Write the table: .csv, .tex or .parquet."),
+]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON on stdout.")]
 QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")]
 AllowFailedOption = Annotated[bool, typer.Option("--allow-failed", help="Exit 0 even if points failed.")]

@@ -16,7 +16,17 @@ from ..formatting import safe_text
 from ..plots.kinds import KINDS, WIDTHS
 from . import exits
 from .completion import complete_axis, complete_kind, complete_output
-from .options import FrictionOption, JsonOption, ModelOption, OverwriteOption, PluginOption, SelectOption
+from .options import (
+    DecimalOption,
+    DigitsOption,
+    FrictionOption,
+    JsonOption,
+    ModelOption,
+    OverwriteOption,
+    PluginOption,
+    RowsOption,
+    SelectOption,
+)
 
 if TYPE_CHECKING:
     from ..plots.data import PlotData
@@ -29,7 +39,7 @@ def plot(
         typer.Option(
             "-o",
             "--output",
-            help="The picture: .png, .svg, .pdf, .eps or .pgf; several kinds: one file each. "
+            help="The picture: .png, .svg, .pdf, .eps, .pgf, or .gif (animation); several kinds: one file each. "
             "\\[default: RESULT.png]",
         ),
     ] = None,
@@ -128,13 +138,16 @@ def plot(
             "--data-form", metavar="FORM", help="wide: a column for each curve; long: a row for each point."
         ),
     ] = "wide",
+    rows: RowsOption = None,
+    digits: DigitsOption = None,
+    decimal: DecimalOption = "point",
     overwrite: OverwriteOption = False,
     plugin: PluginOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Plot a stored result: by default the final-velocity comparison, Figure 6 of the paper.
 
-    loop, history and impulse integrate one point of the result again; --sel selects it.
+    loop, history, impulse and animation integrate one point of the result again; --sel selects it.
     Of several kinds, those that --sel leaves no axis are drawn over the whole axis, and those that do not apply
     are reported with the reason.
     """
@@ -160,6 +173,9 @@ def plot(
         frictions=friction,
         data=data,
         data_form=data_form,
+        rows=rows,
+        digits=digits,
+        decimal=decimal,
         overwrite=overwrite,
         plugins=plugin or (),
     )

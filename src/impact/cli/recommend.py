@@ -8,9 +8,21 @@ import typer
 
 import impact
 
-from ..display import show
+from ..display import TableForm, check_table_output, show, write_table
+from . import exits
 from .completion import complete_target
-from .options import FrictionOption, JsonOption, ModelOption, ResultArgument, SelectOption
+from .options import (
+    DecimalOption,
+    DigitsOption,
+    FrictionOption,
+    JsonOption,
+    ModelOption,
+    OverwriteOption,
+    ResultArgument,
+    RowsOption,
+    SelectOption,
+    TableOption,
+)
 from .parsing import Target, parse_number, parse_target
 
 
@@ -38,6 +50,11 @@ def recommend(
     sel: SelectOption = None,
     model: ModelOption = None,
     friction: FrictionOption = None,
+    output: TableOption = None,
+    rows: RowsOption = None,
+    digits: DigitsOption = None,
+    decimal: DecimalOption = "point",
+    overwrite: OverwriteOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Rank the models of a result by the error of their restitution over the swept range.
@@ -45,6 +62,8 @@ def recommend(
     With --target, rank them, or their pairs with friction laws, by the distance of an output from it.
     """
 
+    form = TableForm(rows, digits, decimal)
+    check_table_output(output, overwrite=overwrite)
     ranking = impact.recommend(
         impact.load(result),
         tol=tol,
@@ -53,4 +72,8 @@ def recommend(
         target=dict([target]) if target else None,
         frictions=friction,
     )
+    if output is not None:
+        write_table(ranking, output, form, overwrite=overwrite)
     show(ranking, as_json=as_json)
+    if output is not None:
+        exits.print_line(f"{output}: written")

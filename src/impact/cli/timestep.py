@@ -8,18 +8,23 @@ import typer
 
 import impact
 
-from ..display import show
+from ..display import TableForm, check_table_output, show, write_table
 from . import exits
 from .completion import complete_scheme
 from .options import (
     AtOption,
+    DecimalOption,
+    DigitsOption,
     FrictionKeyOption,
     JsonOption,
     ModelKeyOption,
+    OverwriteOption,
     ParameterOption,
     PluginOption,
+    RowsOption,
     SetOption,
     SourceArgument,
+    TableOption,
 )
 from .parsing import parse_number, parse_whole_number
 
@@ -79,6 +84,11 @@ def timestep(
     friction: FrictionKeyOption = None,
     sets: SetOption = None,
     plugins: PluginOption = None,
+    output: TableOption = None,
+    rows: RowsOption = None,
+    digits: DigitsOption = None,
+    decimal: DecimalOption = "point",
+    overwrite: OverwriteOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Show which restitution a code delivers at a fixed time step, and which e to ask it for.
@@ -90,6 +100,8 @@ def timestep(
     If a phase fails, its step has none of them, and the exit code is 3.
     """
 
+    form = TableForm(rows, digits, decimal)
+    check_table_output(output, overwrite=overwrite)
     result = impact.timestep(
         model,
         source=source,
@@ -106,6 +118,10 @@ def timestep(
     )
     for warning in result.warnings:
         exits.print_line(f"warning: {warning}")
+    if output is not None:
+        write_table(result, output, form, overwrite=overwrite)
     show(result, as_json=as_json)
+    if output is not None:
+        exits.print_line(f"{output}: written")
     if any(row.failed for row in result.rows):
         raise typer.Exit(exits.EXIT_POINTS_FAILED)

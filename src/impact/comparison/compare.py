@@ -203,9 +203,14 @@ def _sweep_notes(new: xr.Dataset, baseline: xr.Dataset, aligned: Alignment) -> l
     # results of the continuous law have no attribute `integrator`
     defaults = {"rtol": None, "max_steps": None, "integrator": EXACT, "impact_version": None}
     notes = _attribute_notes(new.attrs, baseline.attrs, defaults)
-    for name in ("packages", "plugins"):
-        a, b = (read_attribute(dataset.attrs, name) for dataset in (new, baseline))
-        notes += _attribute_notes(a, b, dict.fromkeys(sorted({*a, *b})))
+    a, b = (read_attribute(dataset.attrs, "packages") for dataset in (new, baseline))
+    notes += _attribute_notes(a, b, dict.fromkeys(sorted({*a, *b})))
+    a, b = (read_attribute(dataset.attrs, "plugins") for dataset in (new, baseline))
+    # records of files and hashes say nothing to a reader
+    notes += [
+        f"the code of {safe_text(key, 60)} changed" for key in sorted(a.keys() & b.keys()) if a[key] != b[key]
+    ]
+    notes += _attribute_notes(a, b, dict.fromkeys(sorted(a.keys() ^ b.keys())))
     return notes + _model_metadata_notes(aligned.new.coords, aligned.baseline.coords)
 
 

@@ -10,8 +10,9 @@ from typing import Any, Literal
 import xarray as xr
 
 from ..contact.status import Status
-from ..display import Block, Displayed, Table
-from ..formatting import number, safe_text
+from ..contact.variables import OUTPUTS
+from ..display import Block, Displayed, Table, Wrapped
+from ..formatting import number, prefixed, safe_text
 from ..results.replay_command import describe_point, replay_command
 
 DifferenceKind = Literal["nothing in common", "physics config", "labels", "units", "missing variable", "values"]
@@ -202,7 +203,7 @@ class Verdict(Displayed):
                 variable.judged,
                 number(variable.tolerance, 3),
                 f"{variable.different} of {variable.points}",
-                number(variable.worst, 3),
+                prefixed(variable.worst, OUTPUTS[variable.name].unit if variable.name in OUTPUTS else "1", 3),
                 number(variable.ratio if variable.tolerance == variable.tolerance else math.nan, 3),
             )
             for variable in self.ranked
@@ -244,6 +245,11 @@ class Verdict(Displayed):
         if rows and width >= MIN_TABLE_WIDTH:
             yield ""
             yield Table(rows, VERDICT_HEADINGS, text=(0, 1))
+        same = [
+            variable.name for variable in self.variables if not variable.ratio and variable.judged != "reported"
+        ]
+        if rows and same:
+            yield Wrapped(f"unchanged: {', '.join(same)}")
 
     def replay(self, variable: VariableComparison) -> str:
         """Write the command that runs the worst point of a variable again; empty if there is none."""

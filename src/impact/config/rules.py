@@ -177,7 +177,8 @@ def _yield_strength_problems(draft: Draft) -> Iterable[ConfigProblem]:
             if name not in reported:
                 reported.add(name)
                 expected = MATERIAL_QUANTITIES["yield_strength"].expected
-                yield ("materials", name, "yield_strength"), f"missing, expected {expected} (used by {users})"
+                expected = f"missing, expected {expected} (used by {users}), or other models"
+                yield ("materials", name, "yield_strength"), expected
 
 
 def _mass_problems(draft: Draft) -> Iterable[ConfigProblem]:

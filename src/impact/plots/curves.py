@@ -336,7 +336,7 @@ def _draw_bands(axes: Axes, panel: Panel) -> None:
 
 
 def _label_bands(axes: Axes, panel: Panel) -> None:
-    """Write the values of bands at their lines on a logarithmic axis."""
+    """Write the values of bands at the ends of their lines, beside a logarithmic axis."""
     low, high = axes.get_ylim()
     # narrower bands have their label below the line, except near the lower end, where only the space above is left
     for band in panel.bands if panel.y_log else ():
@@ -344,13 +344,14 @@ def _label_bands(axes: Axes, panel: Panel) -> None:
         axes.annotate(
             f"{band:g}",
             (1, band),
-            (-2, -1 if is_below else 1),
+            (3, -1 if is_below else 1),
             xycoords=("axes fraction", "data"),
             textcoords="offset points",
-            ha="right",
+            ha="left",
             va="top" if is_below else "bottom",
             fontsize="x-small",
             color="#0072B2",
+            annotation_clip=False,
         )
 
 
@@ -385,7 +386,9 @@ def _label_curve_ends(axes: Axes, curves: Sequence[Curve], labels: Mapping[str, 
     for curve in curves:
         drawn = np.flatnonzero(np.isfinite(curve.y))
         if curve.end and drawn.size:
-            ends.setdefault(curve.variable, (curve.x[drawn[-1]], curve.y[drawn[-1]]))
+            end = curve.x[drawn[-1]], curve.y[drawn[-1]]
+            # beside the longest curve, so that no other one is below the name
+            ends[curve.variable] = max(ends.get(curve.variable, end), end, key=lambda point: point[0])
     low, high = axes.get_ylim()
     ordered = sorted((point[1], name) for name, point in ends.items())
     for rank, (y, name) in enumerate(ordered):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import Field, dataclass, replace
@@ -14,8 +13,9 @@ from ..config.measurements import SIGMA, SPECIMEN, derive_impacts
 from ..config.quantities import Quantity
 from ..config.tables import LABORATORY, STANDARD_GRAVITY, SWEEP_QUANTITIES
 from ..contact.variables import HISTORY, OUTPUTS
+from ..display import TableForm, encode_frame
 from ..errors import ConfigError, UsageError
-from ..formatting import argument, heading, number, safe_text
+from ..formatting import argument, heading, safe_text
 from ..results.schema import plain_unit
 
 if TYPE_CHECKING:
@@ -25,8 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# suffixes of a table, and its forms
-TABLE_SUFFIXES = (".csv", ".tex", ".parquet")
+# forms of a table
 TABLE_FORMS = ("wide", "long")
 MEASURED = "Measured"
 
@@ -74,41 +73,25 @@ class PlotData(Protocol):
         """Draw the panels, with labels that replace those of names; returns handles and names of the legend."""
 
 
-def check_table(path: Path, form: str) -> None:
-    """Check the suffix and the form of a table."""
-    if path.suffix.lower() not in TABLE_SUFFIXES:
-        *most, last = TABLE_SUFFIXES
-        raise UsageError(f"{argument('data', path)}: expected a name that ends in {', '.join(most)} or {last}")
+def check_data_form(form: str) -> None:
+    """Check the form of a table."""
     if form not in TABLE_FORMS:
         raise UsageError(f"{argument('data_form')}: got {form}, expected {' or '.join(TABLE_FORMS)}")
 
 
-def encode_table(plot_data: PlotData, suffix: str, form: str = "wide") -> bytes:
-    """Encode the data of a picture as a table, with all digits except in .tex."""
-    frame = plot_data.long_table() if form == "long" else plot_data.wide_table()
-    if suffix == ".tex":
-        text: str = frame.to_latex(index=False, escape=True, na_rep="", float_format=number)
-        return text.encode()
-    if suffix == ".parquet":
-        buffer = io.BytesIO()
-        try:
-            frame.to_parquet(buffer, index=False, engine="pyarrow")
-        except ImportError:
-            needs = 'needs pyarrow, which is not installed: pip install "impact-sweep[parquet]"'
-            raise UsageError(f"{argument('data')}: .parquet {needs}") from None
-        return buffer.getvalue()
-    return _csv_bytes(frame)
+def encode_table(
+    plot_data: PlotData, suffix: str, form: str = "wide", table_form: TableForm | None = None
+) -> bytes:
+    """Encode the data of a picture as a table."""
+    return encode_frame(plot_data.long_table() if form == "long" else plot_data.wide_table(), suffix, table_form)
 
 
 def encode_history(history: xr.Dataset) -> bytes:
     """Write a time history as a CSV table with units and all digits, which `read_points` reads again."""
     frame = history.drop_vars(["model", "friction"], errors="ignore").to_dataframe().reset_index()
     units = {name: plain_unit(str(history[name].attrs["units"])) for name in frame.columns}
-    return _csv_bytes(frame.rename(columns={name: heading(name, unit=unit) for name, unit in units.items()}))
-
-
-def _csv_bytes(frame: pd.DataFrame) -> bytes:
-    return str(frame.to_csv(index=False, lineterminator="\n")).encode()
+    frame = frame.rename(columns={name: heading(name, unit=unit) for name, unit in units.items()})
+    return encode_frame(frame, ".csv")
 
 
 @dataclass(frozen=True)

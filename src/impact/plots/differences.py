@@ -15,7 +15,7 @@ from matplotlib.lines import Line2D
 from ..comparison.verdict import VariableComparison, Verdict
 from ..errors import UsageError
 from ..formatting import number, safe_text
-from .labels import axis_text, escape_mathtext, words_of
+from .labels import axis_text, escape_mathtext, number_axis, words_of
 from .layout import Picture
 from .slices import unit_of
 from .style import COLOURS, MARKERS, default_size, is_geometric, styled
@@ -31,6 +31,8 @@ MAX_TICKS = 24
 MANY_POINTS = 40
 # ratio of the ends of the band above the panel for differences that have no number
 NO_NUMBER_BAND = 20.0
+# distance of the first and the last symbol at a name, over that of names
+NAMES_SPREAD = 0.4
 # letters of all names below an axis of half the width
 MAX_NAMES_LENGTH = 30
 
@@ -102,7 +104,7 @@ def draw_differences(plot_data: DifferenceData) -> Figure:
             for column, panel in enumerate(panels):
                 axes = figure.add_subplot(grid[row, :] if len(panels) == 1 else grid[row, column])
                 entries = {**_draw_panel(axes, panel, names, ends), **entries}
-        figure.share_labels("", "Largest |new − baseline|, in tolerances")
+        figure.share_labels("", "Largest |new − baseline| over the tolerance")
         if plot_data.not_shown:
             entries[f"and {plot_data.not_shown} more"] = Line2D([], [], linestyle="")
         figure.add_legend(
@@ -136,9 +138,12 @@ def _draw_panel(
     axes.axhspan(1.0, top, color="#fbf1eb", linewidth=0, zorder=0.5)
     _draw_limit(axes, 1.0, "tolerance", linewidth=1.0)
     x = np.asarray(panel.values, float)
+    # symbols of equal differences beside each other, where there is room between names
+    spread = NAMES_SPREAD / max(1, len(names) - 1) if panel.names else 0.0
     entries: dict[str, Artist] = {}
     for index, name in enumerate(names):
         ratio = np.asarray(panel.ratios.get(name, np.full(len(x), np.nan)), float)
+        shifted = x + spread * (index - 0.5 * (len(names) - 1))
         style: dict[str, Any] = {
             "color": COLOURS[index % len(COLOURS)],
             "marker": MARKERS[index % len(MARKERS)],
@@ -146,10 +151,12 @@ def _draw_panel(
             "markersize": 4.5 if len(x) <= MANY_POINTS else 2.5,
         }
         counted = np.where(np.isfinite(ratio) & (ratio > 0.0), np.maximum(ratio, bottom), np.nan)
-        (entries[name],) = axes.plot(x, counted, linewidth=0.9, linestyle="" if panel.names else "-", **style)
+        (entries[name],) = axes.plot(
+            shifted, counted, linewidth=0.9, linestyle="" if panel.names else "-", **style
+        )
         # a difference without a number, such as a NaN against a number, is drawn in a band at the top
         height = top / NO_NUMBER_BAND ** ((index + 1) / (len(names) + 1))
-        axes.plot(x, np.where(np.isinf(ratio), height, np.nan), linestyle="", **style)
+        axes.plot(shifted, np.where(np.isinf(ratio), height, np.nan), linestyle="", **style)
     if any(np.isinf(row).any() for row in panel.ratios.values()):
         _draw_limit(axes, top / NO_NUMBER_BAND, "above: no number", linewidth=0.6, linestyle=":")
     axes.set_yscale("log")
@@ -160,10 +167,13 @@ def _draw_panel(
         margin = (x[-1] / x[0]) ** 0.03
         axes.set_xlim(x[0] / margin, x[-1] * margin)
     else:
-        margin = 0.04 * (x[-1] - x[0]) or 0.5
+        margin = NAMES_SPREAD if panel.names else 0.04 * (x[-1] - x[0]) or 0.5
         axes.set_xlim(x[0] - margin, x[-1] + margin)
+    number_axis(axes.yaxis, log=True)
     if panel.names:
         _label_ticks(axes, panel, x)
+    else:
+        number_axis(axes.xaxis, log=is_geometric(x))
     return entries
 
 
@@ -193,5 +203,6 @@ def _label_ticks(axes: Axes, panel: DifferencePanel, x: np.ndarray) -> None:
         parse_math=False,
         fontsize="small",
         rotation=20 if is_wide else 0,
+        rotation_mode="anchor",
         ha="right" if is_wide else "center",
     )

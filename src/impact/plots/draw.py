@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter
 
 from ..contact.model import ForceModel
 from ..engine.plugins import read_plugins
@@ -17,7 +20,7 @@ from ..results.single_impact import Impact, histories
 from ..results.xarray_backend import result_of
 from .data import PlotData, Points, read_points
 from .kinds import STUDIES, Choice, Look, default_kind, find_kind
-from .labels import check_labels, escape_mathtext, legend_labels, pretty_conditions
+from .labels import check_labels, escape_mathtext, legend_labels, pretty_conditions, tick_with_comma, with_comma
 from .layout import Picture
 from .style import default_size, styled
 
@@ -44,6 +47,7 @@ def plot(
     style: str | Path | None = None,
     title: bool | None = None,
     legend: str = "full",
+    decimal: str = "point",
     labels: Mapping[str, str] | None = None,
     equations: bool = False,
     frictions: Sequence[str] | None = None,
@@ -73,6 +77,7 @@ def plot(
     title : write the title and the conditions; by default unless `ax` is set
     legend : name laws by title, year and parameters ("full"), by first author and year ("short"), or by key
         ("keys"); "none" for no legend
+    decimal : "point" or "comma", in all numbers
     labels : texts by the name of an axis, of a variable whose name is at the end of its curve, the key of a law,
         "reference" or "title"
     equations : name the laws with the numbers of their equations in the paper
@@ -99,7 +104,7 @@ def plot(
         dataset = dataset.history
     dataset = result_of(dataset)
     choice = Choice(x, y, variable, sel, models, log, equations, frictions)
-    look = Look(width, height, style, ax is None if title is None else title, labels, legend)
+    look = Look(width, height, style, ax is None if title is None else title, labels, legend, decimal)
     return draw(get_plot_data(dataset, kind or default_kind(dataset).name, choice, plugins), look, points, ax)
 
 
@@ -139,7 +144,7 @@ def draw(
     heading = labels.get("title", escape_mathtext(plot_data.title))
     if ax is not None:
         all_axes = _check_axes(ax, plot_data.panel_count)
-        entries = plot_data.draw(all_axes, labels, measured)
+        entries = _draw_panels(plot_data, all_axes, labels, measured, look)
         if look.title:
             all_axes[0].set_title(heading)
         if entries and look.legend != "none":
@@ -153,9 +158,27 @@ def draw(
         texts = (heading, pretty_conditions(plot_data.conditions)) if look.title else ()
         picture = Picture(width, *texts)
         all_axes, panels_height = plot_data.place_panels(picture, width)
-        entries = plot_data.draw(all_axes, labels, measured)
+        entries = _draw_panels(plot_data, all_axes, labels, measured, look)
+        if look.decimal == "comma":
+            for text in picture.header:
+                text.set_text(with_comma(text.get_text()))
         picture.add_legend(panels_height, height, [] if look.legend == "none" else entries)
     return picture
+
+
+def _draw_panels(
+    plot_data: PlotData, all_axes: Sequence[Axes], labels: Mapping[str, str], measured: Points | None, look: Look
+) -> list[tuple[Artist, str]]:
+    """Draw the panels, with the decimal separator of the look; returns handles and names of the legend."""
+    entries = plot_data.draw(all_axes, labels, measured)
+    if look.decimal == "point":
+        return entries
+    for axes in all_axes:
+        for text in axes.texts:
+            text.set_text(with_comma(text.get_text()))
+        for axis in (axes.xaxis, axes.yaxis):
+            axis.set_major_formatter(FuncFormatter(partial(tick_with_comma, axis.get_major_formatter())))
+    return [(artist, with_comma(name)) for artist, name in entries]
 
 
 def _check_axes(ax: Axes | Sequence[Axes], count: int) -> list[Axes]:

@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from ..atomic import check_outputs, write_file
 from ..contact.model import ForceModel
+from ..display import TableForm, check_table
 from ..errors import UsageError
 from ..formatting import argument
 from ..results.xarray_backend import load
-from .data import PlotData, check_table, encode_table, read_points
+from .data import PlotData, check_data_form, encode_table, read_points
 from .draw import draw, get_plot_data, label_keys
 from .kinds import Choice, Look, check_kind, default_kind, find_kind
 from .labels import check_labels
@@ -55,6 +56,9 @@ def plot_to_files(
     frictions: Sequence[str] | None = None,
     data: str | Path | None = None,
     data_form: str = "wide",
+    rows: int | None = None,
+    digits: int | None = None,
+    decimal: str = "point",
     overwrite: bool = False,
     plugins: Sequence[ForceModel | str | Path] = (),
 ) -> PlotFiles:
@@ -71,6 +75,8 @@ def plot_to_files(
     kinds : see `impact.plots.kinds.KINDS`
     data : file for the numbers behind the picture: .csv, .tex or .parquet
     data_form : "wide", a column for each curve, or "long", a row for each point
+    rows, digits : of the numbers: at most so many rows, evenly spread, and significant digits; by default all
+    decimal : "point" or "comma", of the picture and of the numbers, whose columns semicolons then separate
     overwrite : replace existing files
     x, y, variable, sel, models, log, points, width, height, style, title, legend, labels, equations, frictions :
         see `plot`
@@ -93,7 +99,8 @@ def plot_to_files(
     ['r.png']
     """
     choice = Choice(x, y, variable, sel, models, log, equations, frictions)
-    look = Look(width, height, style, title, labels, legend)
+    look = Look(width, height, style, title, labels, legend, decimal)
+    table_form = TableForm(rows, digits, decimal)
     kinds = list(dict.fromkeys(kinds))
     for kind in kinds:
         check_kind(kind)
@@ -102,13 +109,16 @@ def plot_to_files(
     check_picture(output)
     table = Path(data) if data is not None else None
     if table is not None:
-        check_table(table, data_form)
+        check_table(table, "data")
+        check_data_form(data_form)
     # the default kind depends on the result, which is read after the paths are checked
     targets = [_with_kind(path, kind, kinds) for path in (output, table) if path for kind in kinds or [""]]
     check_outputs(targets, [result, points], overwrite=overwrite)
     measured = None if points is None else read_points(points)
     dataset = load(result)
     kinds = kinds or [default_kind(dataset).name]
+    if output.suffix.lower() == ".gif" and set(kinds) != {"animation"}:
+        raise UsageError(f"{output}: a .gif is an animation, expected {argument('kind', 'animation')}")
     plot_data, left_out = _read_kinds(kinds, dataset, choice, plugins)
     if plot_data:
         check_labels(look.labels or {}, set().union(*(label_keys(shown, look) for shown in plot_data.values())))
@@ -118,7 +128,7 @@ def plot_to_files(
         own_look = replace(look, labels={key: text for key, text in (labels or {}).items() if key in keys})
         try:
             figure = draw(shown, own_look, measured)
-            numbers = encode_table(shown, table.suffix.lower(), data_form) if table else b""
+            numbers = encode_table(shown, table.suffix.lower(), data_form, table_form) if table else b""
         except UsageError as error:
             left_out[kind] = str(error)
             continue

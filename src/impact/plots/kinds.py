@@ -13,6 +13,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..display import check_decimal
 from ..errors import UsageError, did_you_mean
 from ..formatting import argument
 
@@ -32,6 +33,7 @@ KINDS = {
     "loop": "motions",
     "history": "motions",
     "impulse": "motions",
+    "animation": "animation",
     "beta": "oblique",
     "e-t": "oblique",
     "impulse-ratio": "oblique",
@@ -83,11 +85,13 @@ class Look:
     title: bool = True
     labels: Mapping[str, str] | None = None
     legend: str = "full"
+    decimal: str = "point"
 
     def __post_init__(self) -> None:
         _ = self.size
         if self.legend not in LEGENDS:
             raise UsageError(f"{argument('legend')}: got {self.legend}, expected {', '.join(LEGENDS)}")
+        check_decimal(self.decimal)
 
     @property
     def size(self) -> tuple[float | None, float | None]:

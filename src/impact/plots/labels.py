@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from matplotlib.axis import Axis
 from matplotlib.mathtext import MathTextParser
-from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
+from matplotlib.ticker import Formatter, FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from ..config.input_names import InputName
 from ..contact.frictions import frictions
@@ -44,6 +44,8 @@ MATH_SYMBOLS = {
 THREE_AUTHORS = r"^([\w-]+)(?:, [A-Z][\w-]+)+ and [A-Z][\w-]+"
 # name of the impulse-momentum solution in the paper
 REFERENCE = "Impulse-momentum"
+# a logarithmic axis that leaves this range has powers of ten
+MIN_PLAIN, MAX_PLAIN = 5e-3, 1e5
 # distances of ticks of angles [deg], of which the first with a suitable number of ticks is used
 ANGLE_STEPS, MIN_ANGLES, MAX_ANGLES = (5, 15, 30, 45, 90), 1, 8
 
@@ -218,10 +220,12 @@ def label_axis(
 
 def number_axis(axis: Axis, size: float = 1.0, *, log: bool = False) -> None:
     """Write the numbers of an axis, in multiples of `size`; logarithmic ones are few, and never between powers."""
+    low, high = sorted(axis.get_view_interval())
+    # one style for all numbers of an axis
+    powers = log and not (low >= MIN_PLAIN and high < MAX_PLAIN)
     # a function of a module, so that a figure can be pickled
-    axis.set_major_formatter(FuncFormatter(partial(_tick_text, size=size, log=log)))
+    axis.set_major_formatter(FuncFormatter(partial(_tick_text, size=size, powers=powers)))
     if log:
-        low, high = sorted(axis.get_view_interval())
         narrow = (1.0, 2.0, 5.0) if high < 1e2 * low else (1.0, 3.0)
         axis.set_major_locator(LogLocator(subs=narrow if high < 1e3 * low else (1.0,)))
         axis.set_minor_formatter(NullFormatter())
@@ -231,8 +235,24 @@ def number_axis(axis: Axis, size: float = 1.0, *, log: bool = False) -> None:
         axis.set_major_locator(MaxNLocator("auto", steps=[1, 2, 2.5, 5, 10], min_n_ticks=3))
 
 
-def _tick_text(value: float, position: int, *, size: float, log: bool) -> str:
-    return typographic(value / size, powers=log)
+def _tick_text(value: float, position: int, *, size: float, powers: bool) -> str:
+    return typographic(value / size, powers=powers)
+
+
+def with_comma(text: str) -> str:
+    r"""Write the numbers of a text with decimal commas; exponents in mathtext need no space after the comma.
+
+    >>> with_comma("e = 0.5, n = 1.5"), with_comma("N/m$^{1.5}$")
+    ('e = 0,5, n = 1,5', 'N/m$^{1{,}5}$')
+    """
+    parts = text.split("$")
+    commas = (",", "{,}")
+    return "$".join(re.sub(r"(?<=\d)\.(?=\d)", commas[index % 2], part) for index, part in enumerate(parts))
+
+
+def tick_with_comma(formatter: Formatter, value: float, position: int) -> str:
+    """Write the number of a tick with a decimal comma."""
+    return with_comma(formatter(value, position))
 
 
 class DegreeLocator(MaxNLocator):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import matplotlib
@@ -32,8 +32,8 @@ MAX_LAYOUT_PASSES = 4
 LABEL_SHARE_OF_AXIS = 0.93
 # largest fraction of a picture of fixed height that its legend takes
 LEGEND_SHARE = 0.5
-# a legend with more entries has smaller letters
-MANY_ENTRIES = 16
+# a legend with more entries, or of a larger part of the height of a picture, has smaller letters
+MANY_ENTRIES, LEGEND_PART = 16, 0.2
 
 
 class Picture(Figure):
@@ -49,7 +49,11 @@ class Picture(Figure):
         texts = zip((title, conditions), styles, strict=True)
         self.header = [self.text(0.0, 1.0, text, va="top", **style) for text, style in texts if text]
         self.entries: list[tuple[Artist, str]] = []
+        self.has_small_legend = False
         self.shared: tuple[Text, ...] = ()
+        # of an animation, which can show each frame
+        self.show_frame: Callable[[int], None] | None = None
+        self.frame_count = 0
         # a later change of the size makes the legend again, in the present style
         self.style = {
             key: value for key, value in matplotlib.rcParams.items() if key.startswith(("legend", "font"))
@@ -72,6 +76,9 @@ class Picture(Figure):
         """Add the legend, and choose the height [in] for panels of the height `body` if the user chose none."""
         width, shown = self.get_figwidth(), list(entries)
         legend = self.place_legend(shown)
+        if legend > LEGEND_PART * (height or GAP_INCHES + self.place_header() + body + legend):
+            self.has_small_legend = True
+            legend = self.place_legend(shown)
         if height is None:
             most = min(legend, MAX_HEIGHT_INCHES / 2.0)
             height = GAP_INCHES + self.place_header() + max(body, most) + most
@@ -87,6 +94,7 @@ class Picture(Figure):
         for legend in list(self.legends):
             legend.remove()
         self.entries = list(entries)
+        self.has_small_legend |= len(entries) > MANY_ENTRIES
         if entries:
             with matplotlib.rc_context(self.style):
                 self._place_legend()
@@ -115,7 +123,7 @@ class Picture(Figure):
 
     def _legend(self, columns: int) -> Legend:
         """Add the legend in a number of columns; names wider than the figure are broken into lines."""
-        style: dict[str, Any] = {"fontsize": "x-small"} if len(self.entries) > MANY_ENTRIES else {}
+        style: dict[str, Any] = {"fontsize": "x-small"} if self.has_small_legend else {}
         handles, names = zip(*self.entries, strict=True)
         legend = self.legend(
             handles, names, loc="lower center", ncols=columns, borderaxespad=0.3, columnspacing=1.2, **style

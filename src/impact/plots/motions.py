@@ -79,8 +79,8 @@ def _impulse_marks(histories: Sequence[xr.Dataset]) -> tuple[Mark, ...]:
     tau = _series(first, "tau")
     if not np.isfinite(tau).all():
         return ()
-    m1 = float(_impact_inputs(first)["m1"])
-    tau_c = _effective_mass(_impact_inputs(first)) * float(first["v"][0])
+    m1 = float(impact_inputs(first)["m1"])
+    tau_c = _effective_mass(impact_inputs(first)) * float(first["v"][0])
     marks = [Mark("tau_c", tau_c, float(first["v1"][0]) - tau_c / m1, "x")]
     if len(histories) == 1:
         marks.append(Mark("tau_f", float(tau[-1]), float(first["v2"][-1]), "x"))
@@ -89,7 +89,7 @@ def _impulse_marks(histories: Sequence[xr.Dataset]) -> tuple[Mark, ...]:
 
 def _reference_curve(history: xr.Dataset, name: str, label: str) -> list[Curve]:
     """Draw the impulse-momentum solution, from contact to the impulse τ_c (1 + e); nothing without an e."""
-    inputs = _impact_inputs(history)
+    inputs = impact_inputs(history)
     e, mass = inputs.get("e"), _effective_mass(inputs)
     if not isinstance(e, float | int) or not np.isfinite(mass):
         return []
@@ -138,7 +138,7 @@ def _series(history: xr.Dataset, name: str) -> Array:
     """Read a variable of a history, or compute the impulse "tau" that reduced the closing speed to v."""
     v = np.asarray(history["v"].values, float)
     is_impulse = name == "tau"
-    return _effective_mass(_impact_inputs(history)) * (v[0] - v) if is_impulse else history[name].values
+    return _effective_mass(impact_inputs(history)) * (v[0] - v) if is_impulse else history[name].values
 
 
 def _axis_label_and_unit(history: xr.Dataset, name: str) -> tuple[str, str]:
@@ -150,7 +150,7 @@ def _axis_label_and_unit(history: xr.Dataset, name: str) -> tuple[str, str]:
 
 def _pair_label(history: xr.Dataset, is_single: bool) -> str:
     """Write the names of both laws; a single model is not named beside every friction law."""
-    inputs = _impact_inputs(history)
+    inputs = impact_inputs(history)
     friction = friction_text(str(history["friction"].item()), inputs, _units_of(inputs))
     return friction if is_single else f"{_model_label(history, numbered=False)} with {friction}"
 
@@ -158,14 +158,14 @@ def _pair_label(history: xr.Dataset, is_single: bool) -> str:
 def _model_label(history: xr.Dataset, numbered: bool) -> str:
     """Write the name of a law, which may be a plug-in that is not installed."""
     key = str(history["model"].item())
-    inputs = _impact_inputs(history)
+    inputs = impact_inputs(history)
     model, parameters = catalogue().get(key), parameter_text(key, inputs, _units_of(inputs))
     if model is None:
         return ", ".join(filter(None, (safe_text(key, 80), parameters)))
     return law_text(model.title, model.year, model.equation, parameters, numbered=numbered)
 
 
-def _impact_inputs(history: xr.Dataset) -> Mapping[str, float | str]:
+def impact_inputs(history: xr.Dataset) -> Mapping[str, float | str]:
     """Read the inputs of the impact, stored in its time history."""
     inputs: Mapping[str, float | str] = read_attribute(history.attrs, "inputs")
     return inputs
@@ -181,8 +181,8 @@ def _effective_mass(inputs: Mapping[str, float | str]) -> float:
 
 def _conditions_text(histories: Sequence[xr.Dataset]) -> str:
     """Write the inputs of the impact."""
-    inputs = _impact_inputs(histories[0])
-    by_model = {str(history["model"].item()): _impact_inputs(history).get("n") for history in histories}
+    inputs = impact_inputs(histories[0])
+    by_model = {str(history["model"].item()): impact_inputs(history).get("n") for history in histories}
     exponents = {key: n for key, n in by_model.items() if isinstance(n, float)}
     text = exponent_text(exponents) if len(exponents) == len(by_model) else None
     return described_inputs(inputs, _units_of(inputs), text)

@@ -6,6 +6,7 @@ import contextlib
 import io
 import re
 import shutil
+import tempfile
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence, Set
 from importlib.resources import files
@@ -40,7 +41,9 @@ METADATA: dict[str, dict[str, None]] = {
     "pdf": {"CreationDate": None},
     "eps": {},
     "pgf": {},
+    "gif": {},
 }
+FRAMES_PER_SECOND = 20
 
 
 @contextlib.contextmanager
@@ -139,6 +142,8 @@ def check_picture(path: Path) -> str:
 
 def encoded(figure: Figure, kind: str, style: str | Path | None = None) -> bytes:
     """Encode a figure in a format of METADATA; the bytes are the same each time."""
+    if kind == "gif":
+        return _encoded_frames(figure, style)
     buffer = io.BytesIO()
     # some formats have no metadata, and do not accept the argument
     options: dict[str, Any] = {"metadata": METADATA[kind]} if METADATA[kind] else {}
@@ -152,6 +157,27 @@ def encoded(figure: Figure, kind: str, style: str | Path | None = None) -> bytes
     if kind == "eps":
         return re.sub(rb"(?m)^%%CreationDate:.*\n", b"", buffer.getvalue())
     return buffer.getvalue()
+
+
+def _encoded_frames(figure: Figure, style: str | Path | None) -> bytes:
+    """Encode the frames of an animation as a GIF."""
+    from matplotlib.animation import PillowWriter
+
+    show_frame = getattr(figure, "show_frame", None)
+    if show_frame is None:
+        raise UsageError(f"a .gif is an animation, expected {argument('kind', 'animation')}")
+    writer = PillowWriter(fps=FRAMES_PER_SECOND)
+    # the writer needs the name of a file
+    with styled(style), tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "frames.gif"
+        # the layout of the last frame is that of all
+        figure.canvas.draw()
+        figure.set_layout_engine("none")
+        with writer.saving(figure, str(path), figure.dpi):
+            for index in range(figure.frame_count):  # type: ignore[attr-defined]
+                show_frame(index)
+                writer.grab_frame()
+        return path.read_bytes()
 
 
 def save_figure(

@@ -46,12 +46,12 @@ from ..contact.rigid import ObliqueImpacts
 from ..contact.status import FIRST_FAILURE, FrictionStatus, Status
 from ..contact.units import with_numbers
 from ..contact.variables import CENTRAL_OUTPUTS, HISTORY, OUTPUTS, SLIP_HISTORY
-from ..display import Block, Displayed, Table
+from ..display import Block, Displayed, Styled, Table
 from ..engine.build_impacts import build_impacts, build_oblique, fixed_steps_at
 from ..engine.plan import Plan
 from ..engine.plugins import Plugins, read_plugins
 from ..errors import ConfigError, UsageError, did_you_mean, warn
-from ..formatting import argument, number, quantity, safe_text
+from ..formatting import argument, number, prefixed, safe_text
 from .calibration import fitted_config, position_of_law
 from .kinds import is_calibration, require_sweep
 from .plausibility import input_notes
@@ -65,13 +65,15 @@ STARTER_E = "sweep.e=0.5"
 ConfigSource = str | Path | Mapping[str, object] | xr.Dataset | None
 # dimensions of laws
 LAW_DIMS = ("model", "friction")
-# name, unit and meaning of the quantities that are derived from the inputs and the history of one impact
-DERIVED_QUANTITIES = (
+# name, unit and meaning of the quantities that are derived from the inputs of one impact, and from its motion
+INPUT_QUANTITIES = (
     ("m1", "kg", "mass of ball 1"),
     ("m2", "kg", "mass of ball 2"),
     ("R1", "m", "radius of ball 1"),
     ("R2", "m", "radius of ball 2"),
     ("m", "kg", "effective mass (17)"),
+)
+MOTION_QUANTITIES = (
     ("K_r", "N m-n", "unloading stiffness (42)"),
     ("tau_c", "N s", "impulse of the approach"),
     ("tau_r", "N s", "impulse of the restitution"),
@@ -79,13 +81,18 @@ DERIVED_QUANTITIES = (
     ("W_r", "J", "work of the restitution (39)"),
     ("rebound_speed_bound", "m s-1", "K/lambda, bound of the rebound speed (26)"),
 )
-# the same for oblique impacts
+DERIVED_QUANTITIES = (*INPUT_QUANTITIES, *MOTION_QUANTITIES)
+# derived from the inputs of an oblique impact
 OBLIQUE_QUANTITIES = (
     ("v1", "m/s", "velocity of ball 1 along the normal before the impact"),
     ("u1", "m/s", "tangential velocity of ball 1 before the impact"),
     ("slip", "m/s", "slip speed of the contact points before the impact"),
     ("m_t", "kg", "effective tangential mass"),
 )
+
+
+# digits that are printed; those of --json are all there are
+INPUT_DIGITS, OUTPUT_DIGITS, CHECK_DIGITS = 6, 4, 12
 
 
 @dataclass(frozen=True)
@@ -148,38 +155,69 @@ class Impact(Displayed):
             return no_motion(self.integrator)
         return self.status.meaning if self.status != Status.OK else self.friction_status.meaning
 
-    def rows(self) -> dict[str, str]:
-        """What `impact run` prints: the inputs, outputs, the three restitutions and estimated errors, by name."""
-        rows = {"model": self.model.key, "equation": self.model.equation}
-        if self.friction:
-            rows |= {"friction": self.friction.key, "friction equation": self.friction.equation}
+    def groups(self) -> dict[str, list[tuple[str, str, str]]]:
+        """What `impact run` prints under each heading: names, values with a suitable prefix, and meanings."""
+        friction = self.friction
+        inputs = [("model", self.model.key, self.model.equation)]
+        if friction:
+            inputs.append(("friction", friction.key, friction.equation))
         for name, value in self.point.items():
-            note = "  (first value of its axis)" if name in self.first else ""
-            rows[name] = _with_degrees(value, self._unit_of(name)) + note
-        for name, material in self.materials.items():
-            properties = {field: value for field, value in asdict(material).items() if value is not None}
-            rows[f"[materials.{name}]"] = ", ".join(
-                f"{field} = {quantity(value, MATERIAL_QUANTITIES[field].unit, 10)}"
-                for field, value in properties.items()
-            )
-        for name, unit, meaning in (*DERIVED_QUANTITIES, *(OBLIQUE_QUANTITIES if self.friction else ())):
-            if self.derived[name] == self.derived[name] and name not in self.point:
-                rows[name] = f"{quantity(self.derived[name], self._with_numbers(plain_unit(unit)), 10)}  {meaning}"
-        rows["status"] = f"{self.status.name.lower()}: {self.status.meaning}"
-        if self.friction:
-            rows["friction_status"] = f"{self.friction_status.name.lower()}: {self.friction_status.meaning}"
-            rows["contact_regime"] = _flag("contact_regime", self.values).replace("_", " ")
+            unit, meaning = self._unit_and_meaning(name)
+            note = "first value of its axis" if name in self.first else ""
+            inputs.append((name, prefixed(value, unit, INPUT_DIGITS), "; ".join(filter(None, (meaning, note)))))
+        for material, properties in self.materials.items():
+            for name, value in asdict(properties).items():
+                if value is not None:
+                    rule = MATERIAL_QUANTITIES[name]
+                    shown = prefixed(value, rule.unit, INPUT_DIGITS)
+                    inputs.append((f"materials.{material}.{name}", shown, rule.meaning))
+        inputs += self._derived_rows(INPUT_QUANTITIES, INPUT_DIGITS)
+        outputs = [("status", self.status.name.lower(), self.status.meaning)]
+        if friction:
+            inputs += self._derived_rows(OBLIQUE_QUANTITIES, INPUT_DIGITS)
+            regime = OUTPUTS["contact_regime"]
+            outputs += [
+                ("friction_status", self.friction_status.name.lower(), self.friction_status.meaning),
+                ("contact_regime", _flag("contact_regime", self.values).replace("_", " "), regime.meaning),
+            ]
+        checks = [
+            ("e_kinematic", number(self.e_kinematic, CHECK_DIGITS), "(1), from the velocities"),
+            ("e_kinetic", number(self.e_kinetic, CHECK_DIGITS), "(2), tau_r/tau_c"),
+            ("e_energetic", number(self.e_energetic, CHECK_DIGITS), "(3), the root of -W_r/W_c"),
+        ]
         for name, variable in OUTPUTS.items():
-            if name in self.values and variable.dtype == "f8" and name not in ("e_kinetic", "e_energetic"):
-                rows[name] = _with_degrees(self.values[name], self._with_numbers(variable.unit))
-        rows["e_kinematic"] = quantity(self.e_kinematic, "1", 12) + "  (1), from the velocities"
-        rows["e_kinetic"] = quantity(self.e_kinetic, "1", 12) + "  (2), tau_r/tau_c"
-        rows["e_energetic"] = quantity(self.e_energetic, "1", 12) + "  (3), the root of -W_r/W_c"
-        rows["in the stated domain"] = "yes" if self.values["in_domain"] else f"no: {self.model.domain_text}"
-        rows["steps"] = number(self.values["steps"])
+            value = self.values.get(name, math.nan)
+            is_left_out = variable.dtype != "f8" or (variable.may_be_nan and value != value)
+            if name not in self.values or is_left_out or name in ("e_kinetic", "e_energetic"):
+                continue
+            meaning = variable.meaning.partition(";")[0]
+            if variable.scale == "bounded by 10 rtol":
+                checks.append((name, number(value, OUTPUT_DIGITS), meaning))
+            else:
+                # a number without a unit is often compared with an input
+                digits = INPUT_DIGITS if variable.unit == "1" else OUTPUT_DIGITS
+                outputs.append((name, prefixed(value, self._with_numbers(variable.unit), digits), meaning))
+        outputs += self._derived_rows(MOTION_QUANTITIES, OUTPUT_DIGITS)
+        in_domain = "yes" if self.values["in_domain"] else "no"
+        domain = ": ".join(filter(None, ("in the stated domain of the law", self.model.domain_text)))
+        checks.append(("in_domain", in_domain, domain))
+        checks.append(("steps", number(self.values["steps"]), OUTPUTS["steps"].meaning))
         if self.integrator != EXACT:
-            rows["integrator"] = self.integrator
-        return rows
+            checks.append(("integrator", self.integrator, "scheme with a fixed step"))
+        return {"Inputs": inputs, "Outputs": outputs, "Checks": checks}
+
+    def rows(self) -> dict[str, str]:
+        """The lines of all groups, by name."""
+        groups = self.groups().values()
+        return {name: "  ".join(filter(None, words)) for group in groups for name, *words in group}
+
+    def _derived_rows(self, quantities: Iterable[tuple[str, str, str]], digits: int) -> list[tuple[str, str, str]]:
+        """Write the derived quantities that apply and are not inputs."""
+        return [
+            (name, prefixed(self.derived[name], self._with_numbers(plain_unit(unit)), digits), meaning)
+            for name, unit, meaning in quantities
+            if self.derived[name] == self.derived[name] and name not in self.point
+        ]
 
     def as_dict(self) -> dict[str, Any]:
         """The impact as plain data."""
@@ -210,16 +248,20 @@ class Impact(Displayed):
         return [{**keys, **data["inputs"], **data["outputs"]}]
 
     def sections(self, width: int) -> Iterable[Block]:
-        """The inputs, outputs, the three restitutions and estimated errors, one per line."""
-        return [Table(list(self.rows().items()))]
+        """The inputs, outputs and checks, one per line."""
+        rows: list[tuple[object, ...]] = []
+        # one table, so that the columns of the groups are aligned
+        for heading, group in self.groups().items():
+            rows += [*([("",)] if rows else []), (Styled(heading, "bold"),), *group]
+        return [Table(rows, no_wrap=(0, 1))]
 
-    def _unit_of(self, name: str) -> str:
-        """The unit of an input, which may be a parameter of the model, or a property of a material."""
+    def _unit_and_meaning(self, name: str) -> tuple[str, str]:
+        """Find the unit and meaning of an input, which may be a parameter of a law or a property of a material."""
         try:
-            quantity = InputName.parse(name).quantity({self.model.key: self.model})
+            rule = InputName.parse(name).quantity({self.model.key: self.model})
         except KeyError:
-            quantity = None
-        return self._with_numbers("1" if quantity is None else quantity.unit)
+            rule = None
+        return ("1", "") if rule is None else (self._with_numbers(rule.unit), rule.meaning)
 
     def _with_numbers(self, unit: str) -> str:
         """A unit with the values of n and of the parameters that its exponents have."""
@@ -227,12 +269,6 @@ class Impact(Displayed):
             InputName.parse(name).key: value for name, value in self.point.items() if isinstance(value, float)
         }
         return with_numbers(unit, {**values, "n": self.exponent})
-
-
-def _with_degrees(value: float | str, unit: str) -> str:
-    """Write a value of a point; an angle also in degrees."""
-    degrees = f"  ({number(math.degrees(value), 6)} deg)" if unit == "rad" and isinstance(value, float) else ""
-    return quantity(value, unit, 10) + degrees
 
 
 def _flag(name: str, values: Mapping[str, float]) -> str:

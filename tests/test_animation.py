@@ -1,0 +1,80 @@
+"""An animation shows where both balls are, and how far the force has come, in each frame."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.patches import Circle
+from PIL import Image
+
+import impact
+from impact.plots.animation import FRAMES, animation_data
+from impact.plots.kinds import Choice
+from impact.plots.layout import Picture
+
+from .conftest import Run
+
+
+@pytest.fixture(scope="module")
+def single() -> impact.Impact:
+    return impact.run(model="gharib-hurmuzlu-2012", at={"e": 0.5, "m2": 8.0})
+
+
+def test_a_frame_shows_the_surfaces_and_the_force_of_its_time(single: impact.Impact) -> None:
+    history = single.history
+    assert history is not None
+    data = animation_data([history], Choice())
+    figure = impact.plot(single, kind="animation")
+    assert isinstance(figure, Picture)
+    assert figure.show_frame is not None
+    scene, force, loop = figure.axes
+    balls = [patch for patch in scene.patches if isinstance(patch, Circle)]
+    # equal densities
+    assert balls[1].radius == pytest.approx(2.0 * balls[0].radius)
+    contact_time = float(history["t"][-1])
+    for index in (0, FRAMES // 2, FRAMES - 1):
+        figure.show_frame(index)
+        time = data.frames[index]
+        surfaces = balls[0].center[0] + balls[0].radius, balls[1].center[0] - balls[1].radius
+        if time < 0.0:
+            # ball 1 comes with 1 m/s to the place of contact, ball 2 rests
+            assert surfaces == pytest.approx((time, 0.0), abs=1e-12)
+        elif time < contact_time:
+            # surfaces overlap by the indentation
+            assert surfaces[0] - surfaces[1] == pytest.approx(np.interp(time, history["t"], history["delta"]))
+        else:
+            # they separate with the relative velocity of the rebound
+            gap = surfaces[1] - surfaces[0] + float(history["delta"][-1])
+            assert gap == pytest.approx(single.values["e_out"] * (time - contact_time), rel=1e-6)
+        drawn = history["t"].values[history["t"].values <= max(time, 0.0)]
+        np.testing.assert_array_equal(force.lines[0].get_xdata(), drawn)
+        assert len(loop.lines[0].get_xdata()) == len(drawn)
+
+
+def test_a_wall_is_nearly_plane() -> None:
+    figure = impact.plot(impact.run(at={"e": 0.5, "m2": float("inf")}), kind="animation")
+    ball, wall = (patch for patch in figure.axes[0].patches if isinstance(patch, Circle))
+    assert wall.radius >= 50.0 * ball.radius
+
+
+@pytest.mark.parametrize("suffix", ["gif", "png"])
+def test_the_command_writes_an_animation_of_a_history(
+    single: impact.Impact, cli: Run, tmp_path: Path, suffix: str
+) -> None:
+    assert single.history is not None
+    impact.save(single.history, tmp_path / "h.h5")
+    done = cli("plot", "h.h5", "--kind", "animation", "-o", f"a.{suffix}", "--width", "40mm", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    with Image.open(tmp_path / f"a.{suffix}") as picture:
+        assert getattr(picture, "n_frames", 1) == (FRAMES if suffix == "gif" else 1)
+
+
+def test_only_an_animation_is_a_gif(single: impact.Impact, cli: Run, tmp_path: Path) -> None:
+    assert single.history is not None
+    impact.save(single.history, tmp_path / "h.h5")
+    done = cli("plot", "h.h5", "--kind", "loop", "-o", "a.gif", cwd=tmp_path)
+    message = "a.gif: a .gif is an animation, expected --kind animation\n"
+    assert (done.returncode, done.stderr) == (2, message)
+    assert not (tmp_path / "a.gif").exists()

@@ -1,0 +1,111 @@
+"""Tables in files: siunitx columns in .tex, chosen rows and digits, decimal commas, of pictures and of results."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import pandas as pd
+import pytest
+
+import impact
+from impact.display import TableForm, encode_frame
+from impact.plots.data import read_points
+
+from .conftest import ROOT, Run
+
+FORCES = [1.0, -22.5, 3.25e-12, float("nan"), float("inf")]
+FRAME = pd.DataFrame({"x": [0.0, 0.5, 1.0, 1.5, 2.0], "F_m [N/m^1.5]": FORCES})
+
+
+@pytest.fixture(scope="module")
+def stored(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("tables") / "r.h5"
+    impact.save(impact.sweep(ROOT / "configs" / "figure6.toml", overrides=["solver.rtol=1e-4"]), path)
+    return path
+
+
+def test_a_latex_table_has_s_columns_that_fit_their_widest_number() -> None:
+    lines = encode_frame(FRAME, ".tex").decode().splitlines()
+    assert lines[0] == r"\begin{tabular}{S[table-format=1.1]S[table-format=-2.2e-2]}"
+    # a heading is in braces, so that siunitx does not read it as a number
+    assert lines[2] == r"{x} & {F\_m [\unit{N/m^{1.5}}]} \\"
+    assert lines[4:9] == [
+        r"0 & 1 \\",
+        r"0.5 & -22.5 \\",
+        r"1 & 3.25e-12 \\",
+        r"1.5 &  \\",
+        r"2 & {$\infty$} \\",
+    ]
+
+
+def test_rows_are_spread_evenly_and_include_both_ends() -> None:
+    lines = encode_frame(FRAME, ".csv", TableForm(rows=3)).decode().splitlines()
+    assert [line.partition(",")[0] for line in lines] == ["x", "0.0", "1.0", "2.0"]
+    assert len(encode_frame(FRAME, ".csv", TableForm(rows=9)).splitlines()) == 6
+
+
+def test_digits_are_significant_and_all_without_a_choice() -> None:
+    frame = pd.DataFrame({"x": [1.0 / 3.0]})
+    assert encode_frame(frame, ".csv").decode() == f"x\n{1.0 / 3.0!r}\n"
+    assert encode_frame(frame, ".csv", TableForm(digits=3)).decode() == "x\n0.333\n"
+    assert "\n0.333333 \\\\" in encode_frame(frame, ".tex").decode()
+
+
+def test_a_table_with_decimal_commas_is_read_again(stored: Path, cli: Run, tmp_path: Path) -> None:
+    words = ["--model", "gharib-hurmuzlu-2012", "--kind", "restitution", "-o", "a.png", "--data", "a.csv"]
+    done = cli("plot", stored, *words, "--decimal", "comma", "--rows", "11", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    text = (tmp_path / "a.csv").read_text(encoding="utf-8")
+    assert text.splitlines()[0].startswith("e;")
+    # the column of the law, under the name that measured points have
+    law = text.splitlines()[0].split(";").index("e_out gharib-hurmuzlu-2012")
+    cells = [line.split(";") for line in text.splitlines()[1:]]
+    lines = ["e;e_out", *(f"{row[0]};{row[law]}" for row in cells)]
+    (tmp_path / "b.csv").write_text("\n".join(lines), encoding="utf-8")
+    points = read_points(tmp_path / "b.csv")
+    assert points.columns["e"] == pytest.approx([0.1 * row for row in range(11)])
+    assert 0.0 < points.columns["e_out"][5] < 0.5
+
+
+def test_all_numbers_of_a_picture_have_the_comma(stored: Path) -> None:
+    result = impact.load(stored)
+    figure = impact.plot(result, kind="error", decimal="comma")
+    figure.draw_without_rendering()
+    texts = [text.get_text() for text in figure.findobj(plt.Text) if text.get_visible()]
+    assert not [text for text in texts if re.search(r"\d\.\d", text)]
+    assert {"0,05", "0,01"} <= set(texts)
+    assert any("1,5" in text for text in texts)
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--decimal", "dot"], "--decimal: got dot, expected point or comma"),
+        (["--rows", "1"], "--rows: got 1, expected a whole number >= 2"),
+        (["-o", "a.txt"], "--output a.txt: expected a name that ends in .csv, .tex or .parquet"),
+    ],
+)
+def test_a_wrong_form_of_a_table_is_one_line_and_writes_nothing(
+    stored: Path, cli: Run, tmp_path: Path, words: list[str], message: str
+) -> None:
+    done = cli("recommend", stored, *words, cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (2, f"{message}\n")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_ranking_and_steps_are_tables_of_latex_and_csv(stored: Path, cli: Run, tmp_path: Path) -> None:
+    done = cli("recommend", stored, "-o", "r.tex", cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "r.tex: written\n")
+    lines = (tmp_path / "r.tex").read_text(encoding="utf-8").splitlines()
+    assert lines[2].startswith("{model} & {points} & {within}")
+    assert lines[4].startswith("lankarani-nikravesh-1994 & 101 & 101 & 0 & ")
+    assert "0 to 1" in lines[4]
+    words = ["timestep", "--model", "tsuji-1992", "--at", "e=0.5", "--phases", "20"]
+    assert cli(*words, "-o", "t.csv", cwd=tmp_path).returncode == 0
+    again = cli(*words, "-o", "t.csv", cwd=tmp_path)
+    assert (again.returncode, again.stderr.count("\n")) == (2, 1)
+    table = pd.read_csv(tmp_path / "t.csv")
+    assert table["steps_per_contact"].tolist() == [10.0, 20.0, 50.0, 100.0]
+    assert table["e_mean"].between(0.45, 0.55).all()
