@@ -15,6 +15,7 @@ from impact.contact.formula_calls import Formula, call_by_name
 from impact.contact.friction import FrictionLaw
 from impact.contact.model import ForceModel
 from impact.contact.models import catalogue
+from impact.contact.powers import power
 from impact.exporters.code import Code
 from impact.exporters.registry import CODES
 from models_restitution import (
@@ -53,6 +54,7 @@ def speed_dependent() -> frozenset[str]:
     return frozenset(key for key, e_out in over_speed.items() if np.ptp(e_out) > SOLVER_ERROR)
 
 
+@np.errstate(all="ignore")
 def is_adhesive(model: ForceModel) -> bool:
     """Whether the force of a law can pull at rest, so that it is not damping that pulls."""
     impacts = sample(model)
@@ -65,9 +67,8 @@ def is_adhesive(model: ForceModel) -> bool:
     peak = np.full(count, (0.5 * (n + 1)) ** (1 / (n + 1)))
 
     def call(formula: Formula, x: Array, **others: Array) -> Array:
-        return np.broadcast_to(
-            call_by_name(formula, {**values, "x": x, "v": np.zeros(count), "elastic": x**n, **others}), count
-        )
+        motion = {"x": x, "v": np.zeros(count), "elastic": power(np.maximum(x, 0.0), n)}
+        return np.broadcast_to(call_by_name(formula, {**values, **motion, **others}), count)
 
     at_peak = {"peak": peak, "force_at_peak": call(model.force, peak)}
     residual = np.zeros(count)

@@ -203,13 +203,12 @@ def equation_cell(model: ForceModel) -> str:
 
 
 def validity_lines(model: ForceModel) -> list[str]:
-    """The error of a model over e and its stated domain, or its restitution over the closing speed."""
+    """The error of a model over e, or its restitution over the closing speed."""
     if restitution_curves()[model.key].over == "v0":
         return ["–", restitution_over_speed(model)]
     errors = error(model)
     inside = (f"below {bound:g}: {formula(within(errors, bound))}" for bound in BOUNDS)
-    domain = [f"stated: {formula(model.domain_text)}"] if model.domain_text else []
-    return [largest(errors).replace("none", "0"), *inside, *domain]
+    return [largest(errors).replace("none", "0"), *inside]
 
 
 def row(model: ForceModel) -> list[str]:
@@ -217,7 +216,8 @@ def row(model: ForceModel) -> list[str]:
     law = original(model)
     others = [law_link(other.key) for other in catalogue().values() if other.same_as == model.key]
     if law is model:
-        parts = [equation_cell(law), "<br>".join(validity_lines(law))]
+        domain = [f"stated: {cell(model.domain_text)}"] if model.domain_text else []
+        parts = [equation_cell(law), "<br>".join([*validity_lines(law), *domain])]
         first = law_cell(law, *([f"also {', '.join(others)}"] if others else []), picture=curve_picture(law))
     else:
         parts = [f"the same law as {law_link(law.key)}", validity_lines(law)[0]]
@@ -240,12 +240,13 @@ def parameter_text(parameter: Parameter) -> str:
     limits = [f"{word} {x:g}" for word, x in (("from", parameter.least), ("to", parameter.most)) if np.isfinite(x)]
     default = "no default" if parameter.default is None else f"default {parameter.default:g}"
     unit = "" if parameter.unit == "1" else f" [{parameter.unit}]"
-    return f"`{parameter.name}`{unit}, {parameter.meaning}; {' '.join(limits) or 'any value'}, {default}"
+    meaning = cell(f"{unit}, {parameter.meaning}; {' '.join(limits) or 'any value'}, {default}")
+    return f"`{parameter.name}`{meaning}"
 
 
 def parameters_cell(law: ForceModel | FrictionLaw) -> str:
     """The parameters of a law."""
-    return "<br>".join(cell(parameter_text(parameter)) for parameter in law.parameters) or "–"
+    return "<br>".join(map(parameter_text, law.parameters)) or "–"
 
 
 def restitution_over_speed(model: ForceModel) -> str:
