@@ -24,7 +24,7 @@ from impact.contact.models import catalogue
 from impact.display import Table
 from impact.formatting import with_year
 from law_properties import is_adhesive, names_in_codes, original, speed_dependent
-from models_page import validity_lines, yes
+from models_page import restitution_over_speed, validity_lines, yes
 from models_pictures import labelled_picture
 from models_restitution import BALLS, MATERIAL, curve_params, restitution_curves
 from models_tables import cell, short, table
@@ -118,11 +118,13 @@ def properties(law: ForceModel | FrictionLaw) -> list[list[str]]:
         rows["doi"] = f"[{cell(law.doi)}](https://doi.org/{law.doi})"
     if isinstance(law, ForceModel):
         model = original(law)
+        is_over_e = restitution_curves()[model.key].over == "e"
         rows |= {
             "takes e": yes("e" in model.quantities),
             "depends on speed": yes(model.key in speed_dependent()),
             "adhesive": yes(is_adhesive(model)),
-            "largest error": "<br>".join(validity_lines(model)),
+            "largest error": "<br>".join(validity_lines(model)) if is_over_e else "",
+            "restitution": "" if is_over_e else restitution_over_speed(model),
             "closed form": closed_form(model.oracle),
         }
     return [[name, text] for name, text in rows.items() if text]

@@ -98,11 +98,12 @@ function enhance(catalogue) {
   controls.addEventListener("input", filter);
   order.addEventListener("input", () => sort(order.selectedIndex, false));
   controls.addEventListener("reset", () => setTimeout(() => (sort(0, false), filter())));
-  // a link to a row shows it, also if it is filtered out or has moved
+  // a link to a row shows it, also if it is filtered out; what is below the table has moved
   function show() {
-    const row = document.getElementById(decodeURIComponent(location.hash.slice(1)))?.closest("tr");
+    const target = document.getElementById(decodeURIComponent(location.hash.slice(1)));
+    const row = target?.closest("tr");
     if (row?.hidden) controls.reset();
-    setTimeout(() => row?.scrollIntoView({ behavior: "instant" }));
+    setTimeout(() => (row ?? target)?.scrollIntoView({ behavior: "instant" }));
   }
   window.addEventListener("hashchange", show);
   // the pictures above it have their heights then
