@@ -200,7 +200,7 @@ def test_a_link_shows_the_row_of_a_law_as_a_whole(page: Page, site: Path, width:
 
 def test_a_law_opens_and_its_example_is_copied_and_runs(table: Page) -> None:
     # a law with a parameter without a default
-    link = "document.getElementById('kuwabara-kono-1987').closest('tr').querySelector('a code').parentElement"
+    link = "document.getElementById('kuwabara-kono-1987').closest('tr').querySelector('a code').closest('a')"
     open_page(table, table.evaluate(f"{link}.href"))
     table.wait_for("document.querySelector('h1')?.textContent.startsWith('kuwabara-kono-1987')")
     assert table.evaluate("!!document.querySelector('svg.curve polyline')")
