@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import json
 import re
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,12 @@ from impact.config.tables import (
     Sweep,
     quantities_of,
 )
+from impact.contact.frictions import frictions
+from impact.contact.models import catalogue
+
+# the pages of laws are text of the same functions as the catalogue
+sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
+from law_pages import law_pages
 
 project = "impact"
 author = "impact contributors"
@@ -33,6 +40,7 @@ html_title = "impact"
 html_show_copyright = False
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
+html_js_files = [("catalogue.js", {"defer": "defer"})]
 # headings are targets of links, as on GitHub
 myst_heading_anchors = 4
 # it is a part of the page of the package
@@ -138,7 +146,9 @@ def module_page() -> str:
 
 def write_reference(app: Any) -> None:
     """Write the pages that are generated from the code."""
-    REFERENCE.mkdir(exist_ok=True)
+    (REFERENCE / "laws").mkdir(parents=True, exist_ok=True)
+    for key, text in law_pages().items():
+        (REFERENCE / "laws" / f"{key}.md").write_text(text, encoding="utf-8")
     pages = {"commands": command_page, "config": config_page, "python": api_page, "modules": module_page}
     for name, page in pages.items():
         (REFERENCE / f"{name}.md").write_text(page(), encoding="utf-8")
@@ -153,8 +163,16 @@ def move_links(app: Any, document: str, source: list[str]) -> None:
     """Replace links to pages that have another path in the site."""
     for old, new in MOVED.items():
         source[0] = source[0].replace(old, new)
+    # a law is a row of the catalogue on GitHub, and has a page in the site
+    if document in ("models", "frictions"):
+        source[0] = re.sub(r"\]\(#([a-z0-9-]+)\)", _law_link, source[0])
     # files of the repository are not part of the site
     source[0] = re.sub(r"\[([^\]]*)\]\(\.\./((?:configs|tests|src)/[^)]*)\)", r"`\2`", source[0])
+
+
+def _law_link(link: re.Match[str]) -> str:
+    is_law = link[1] in catalogue() or link[1] in frictions()
+    return f"](reference/laws/{link[1]}.md)" if is_law else link[0]
 
 
 def escape_docstring(app: Any, what: str, name: str, thing: Any, options: Any, lines: list[str]) -> None:

@@ -51,6 +51,22 @@ def picture(model: ForceModel) -> str:
     )
 
 
+def labelled_picture(model: ForceModel) -> str:
+    """The picture of a model with labels at its axes, as an element of a page."""
+    x, low, high = ("e", "0", "1") if restitution_curves()[model.key].over == "e" else ("v₀ [m/s]", "0.01", "10")
+    (left, bottom), (right, top) = (svg_point(*corner).split(",") for corner in ((0, 0), (1, 1)))
+    middle, below = WIDTH / 2, HEIGHT + 4
+    labels = "\n".join(
+        f'<text x="{across}" y="{down}" text-anchor="{anchor}">{text}</text>'
+        for across, down, anchor, text in (
+            *((left, below, "start", low), (middle, below, "middle", x), (right, below, "end", high)),
+            *((0, bottom, "end", "0"), (0, HEIGHT / 2, "end", "e_out"), (0, float(top) + 4, "end", "1")),
+        )
+    )
+    curve = picture(model).partition("\n")[2]
+    return f'<svg class="curve" viewBox="-20 0 {WIDTH + 24} {HEIGHT + 8}" role="img">\n{labels}\n{curve}'
+
+
 def pictures() -> dict[str, str]:
     """All pictures as SVG, by file name."""
     return {f"{model.key}.svg": picture(model) for model in distinct_models()}

@@ -305,7 +305,7 @@ OTHER_RESULTS = ("timestep", "calibration", "uncertainty", "sensitivity")
 def test_a_picture_reads_only_what_it_draws(small: xr.Dataset, big: tuple[xr.Dataset, Reads], kind: str) -> None:
     dataset, reads = big
     reads.clear()
-    sel = {"v2": 0.0, **({"e": 0.5} if kind in ("loop", "history", "impulse") else {})}
+    sel = {"v2": 0.0, **({"e": 0.5} if kind in ("loop", "history", "impulse", "animation") else {})}
     plane = kind in ("map", "validity")
     choice = Choice(sel=sel, models=MODELS[:3], x="e", y="K" if plane else None)
     numbers = get_plot_data(dataset, kind, choice, [BROKEN])

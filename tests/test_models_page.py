@@ -12,12 +12,16 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+import impact
 from impact.config.tables import expand_models
+from impact.contact.frictions import frictions
 from impact.contact.models import catalogue
 
-from .conftest import ROOT
+from .conftest import ROOT, code_blocks
 
 sys.path.insert(0, str(ROOT / "scripts"))
+import law_pages
+import law_properties
 import models_deviations
 import models_page
 import models_pictures
@@ -48,22 +52,28 @@ def test_rows_and_pictures_of_laws_with_a_closed_form_are_up_to_date(monkeypatch
     assert len(curves) > 30
     for module in (models_restitution, models_page, models_pictures):
         monkeypatch.setattr(module, "restitution_curves", lambda: curves)
+    # those with a closed form of e alone do not depend on the speed
+    monkeypatch.setattr(models_page, "speed_dependent", frozenset)
     for key in curves:
         model = catalogue()[key]
-        row = " | ".join(models_page.row_over_e(model))
+        row = " | ".join(models_page.row(model))
         assert f"| {row} |" in PAGE, f"{key} in docs/models.md is out of date: run `make docs`"
         assert models_pictures.picture(model) == PICTURES[f"{key}.svg"], (
             f"{key}.svg is out of date: run `make docs`"
         )
 
 
-def test_the_reference_of_every_law_is_up_to_date() -> None:
-    lines = {key: models_page.reference_line(model) for key, model in catalogue().items()}
-    assert [key for key, line in lines.items() if line not in PAGE] == []
+def test_the_source_and_the_parameters_of_every_law_are_up_to_date() -> None:
+    cells = {
+        key: (models_page.source_cell(model), models_page.parameters_cell(model))
+        for key, model in catalogue().items()
+    }
+    rows = {row.partition('"')[2].partition('"')[0]: row for row in PAGE.splitlines() if row.startswith("| <a id")}
+    assert rows.keys() == catalogue().keys()
+    assert [key for key, texts in cells.items() if not all(f"| {text} |" in rows[key] for text in texts)] == []
 
 
 def test_every_law_is_listed_and_has_a_picture() -> None:
-    assert [key for key in catalogue() if f"- `{key}`, " not in PAGE] == []
     keys = [model.key for model in models_restitution.distinct_models()]
     assert [key for key in keys if f"](models/{key}.svg)" not in PAGE] == []
     assert {f"{key}.svg" for key in keys} == PICTURES.keys()
@@ -138,3 +148,39 @@ def test_the_integrated_restitution_agrees_with_the_closed_form() -> None:
 
 def test_the_examples_of_docstrings() -> None:
     assert all(doctest.testmod(module).failed == 0 for module in (models_page, models_tables))
+
+
+def test_what_the_catalogue_is_filtered_by_follows_from_the_laws() -> None:
+    adhesive = {model.key for model in models_restitution.distinct_models() if law_properties.is_adhesive(model)}
+    assert adhesive == {"luding-2008", "jkr-1971", "liggghts-edinburgh"}
+    # of the laws that other names are used for, under each of them
+    codes = [
+        {(code.name, key) for code, _, key in law_properties.names_in_codes(catalogue()[name])}
+        for name in ("flores-2011", "opensees-hertzdamp")
+    ]
+    assert codes == [{("opensees", "opensees-hertzdamp")}] * 2
+
+
+@pytest.mark.slow
+def test_the_restitution_depends_on_the_speed_where_a_parameter_has_a_scale() -> None:
+    dependent = law_properties.speed_dependent()
+    laws = catalogue()
+    # a linear dashpot with a constant in SI does not, one with a spring of Hertz does
+    assert {"lammps-velocity-hertz", "kuwabara-kono-1987", "jkr-1971", "thornton-1997"} <= dependent
+    assert not {"lammps-mass-velocity-hooke", "kelvin-voigt", "flores-2011", "bilinear"} & dependent
+    plastic = {key for key, law in laws.items() if law.family in ("elastic-plastic", "adhesive")}
+    assert plastic <= dependent | {key for key in plastic if laws[key].same_as}
+
+
+@pytest.mark.slow
+def test_the_example_of_every_page_of_a_law_runs() -> None:
+    pages = law_pages.law_pages()
+    assert pages.keys() == {*catalogue(), *frictions()}
+    for key, page in pages.items():
+        assert page.count(f"{{{key},\n") == 1, key
+        (example,) = code_blocks(page, "toml")
+        result = impact.sweep(tomllib.loads(example))
+        laws = {*result["model"].values.flat, *(result["friction"].values.flat if "friction" in result else ())}
+        assert key in laws
+        outputs = [result[name].values for name in ("e_out", "beta") if name in result]
+        assert all(np.isfinite(values).all() for values in outputs), key

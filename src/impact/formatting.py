@@ -6,7 +6,6 @@ import json
 import math
 import re
 import shlex
-from collections.abc import Callable
 from pathlib import Path
 from unicodedata import category
 
@@ -137,14 +136,18 @@ def quantity(value: object, unit: str = "1", digits: int = 6) -> str:
     return text if unit in ("", "1") or text == "–" else f"{text} {unit}"
 
 
-def prefixed(value: object, unit: str = "1", write: Callable[[object], str] = label) -> str:
-    """Format a value with its unit and the prefix that suits it, in print notation.
+def prefixed(value: object, unit: str = "1", digits: int | None = None) -> str:
+    """Format a value with its unit and the prefix that suits it, in print notation, by default with all digits.
 
     >>> prefixed(1e-6, "s"), prefixed(2.1e11, "Pa"), prefixed(7850.0, "kg/m^3"), prefixed(math.inf, "kg")
     ('1 µs', '210 GPa', '7850 kg/m³', 'inf kg')
-    >>> prefixed(math.pi / 6.0, "rad"), prefixed("steel"), prefixed(0.3)
-    ('30°', 'steel', '0.3')
+    >>> prefixed(math.pi / 6.0, "rad"), prefixed("steel"), prefixed(0.3), prefixed(1.008542975e-4, "m", 4)
+    ('30°', 'steel', '0.3', '100.9 µm')
     """
+
+    def write(value: object) -> str:
+        return label(value) if digits is None else number(value, digits)
+
     if not isinstance(value, float) or unit in ("", "1") or value != value:
         return write(value)
     size, shown = scaled_unit(unit, abs(value))
@@ -207,20 +210,6 @@ def scaled_unit(unit: str, largest: float) -> tuple[float, str]:
         return 1.0, unit
     power, text = _prefixed(largest)
     return 10.0**power, text + unit
-
-
-def prefixed(value: object, unit: str = "1", digits: int = 6) -> str:
-    """Format a value in the prefix of its unit that suits it; angles are in degrees.
-
-    >>> prefixed(1.008542975e-4, "m", 4), prefixed(56e9, "Pa"), prefixed(0.0, "m/s"), prefixed("steel")
-    ('100.9 µm', '56 GPa', '0 m/s', 'steel')
-    >>> prefixed(math.pi / 6.0, "rad"), prefixed(math.inf, "kg"), prefixed(-1.5e-3, "J")
-    ('30°', 'inf kg', '-1.5 mJ')
-    """
-    if not isinstance(value, float):
-        return str(value)
-    size, shown = scaled_unit(unit, abs(value))
-    return quantity(value / size, shown, digits).replace(" °", "°")
 
 
 def _prefixed(largest: float) -> tuple[int, str]:

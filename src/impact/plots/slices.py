@@ -12,7 +12,7 @@ from ..config.input_names import InputName, is_input
 from ..config.tables import OBLIQUE_DEFAULTS
 from ..contact.units import names_in, with_numbers
 from ..errors import UsageError, did_you_mean
-from ..formatting import NO_BREAK, argument, degrees, number, prefixed, quantity, safe_text
+from ..formatting import NO_BREAK, argument, degrees, prefixed, quantity, safe_text
 from ..results.schema import exponents_of, plain_unit
 from ..results.selection import law_positions, select
 from .kinds import Choice
@@ -287,5 +287,5 @@ def parameter_text(key: str, inputs: Mapping[str, object], units: Mapping[str, s
     for name, value in own.items():
         unit = units.get(f"{key}.{name}", "1")
         unit = with_numbers(unit, numbers) if names_in(unit) <= numbers.keys() else "1"
-        parts.append(safe_text(f"{name} = {prefixed(value, unit, number)}", 60).replace(" ", NO_BREAK))
+        parts.append(safe_text(f"{name} = {prefixed(value, unit, 6)}", 60).replace(" ", NO_BREAK))
     return ", ".join(parts)

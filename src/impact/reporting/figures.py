@@ -20,7 +20,7 @@ from ..contact.model import ForceModel
 from ..contact.status import FIRST_FAILURE, NO_IMPACT
 from ..contact.units import names_in, with_numbers
 from ..errors import ImpactError
-from ..formatting import number, prefixed
+from ..formatting import prefixed
 from ..plots.data import PlotData
 from ..plots.draw import draw, get_plot_data
 from ..plots.kinds import STUDIES, Choice, Kind, Look, kinds_of
@@ -354,7 +354,7 @@ def _first_answered_of_model(model_data: xr.Dataset, axes: Sequence[Hashable]) -
 def coordinate_text(coordinate: xr.DataArray) -> str:
     """Write the value of a scalar coordinate with its unit."""
     value = InputName.parse(str(coordinate.name)).word(coordinate.values.item())
-    return prefixed(value, numbered_unit(coordinate), number)
+    return prefixed(value, numbered_unit(coordinate), 6)
 
 
 def numbered_unit(coordinate: xr.DataArray) -> str:
