@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 import impact
+from codes_page import codes_page
 from frictions_page import frictions_page
 from gallery import gallery_page, write_gallery
 from impact.contact.status import FrictionStatus, Status
@@ -199,6 +200,7 @@ PAGES = {
     "frictions.md": frictions_page,
     "gallery.md": gallery_page,
     "types.md": types_page,
+    "codes.md": codes_page,
 }
 
 

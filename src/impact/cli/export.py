@@ -36,8 +36,8 @@ def export(
             "--model",
             metavar="KEY",
             autocompletion=complete_model,
-            help="Key of a law that the code implements. \\[default: the first in the source, or in --list, that its "
-            "release has]",
+            help="Key of a law that the code implements. "
+            "\\[default: the first of the source or of --list that its release has]",
         ),
     ] = None,
     at: AtOption = None,

@@ -30,7 +30,7 @@ def solve(
             "--for",
             metavar="PARAMETER",
             autocompletion=complete_unknown,
-            help="What to solve for: a parameter of the model or of the friction law, e (the value to enter), K, or mu.",
+            help="What to solve for: a parameter of the model or of the friction law, e (to enter), K, or mu.",
         ),
     ],
     target: Annotated[
