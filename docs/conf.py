@@ -128,10 +128,10 @@ def _values(field: dict[str, Any], schemas: dict[str, Any]) -> str:
     if choices:
         return " or ".join(dict.fromkeys(_values(choice, schemas) for choice in choices))
     if field["type"] == "array":
-        return f"a list, each {_values(field['items'], schemas)}"
+        return "a list of " + re.sub(r"\ba (text|number|list)\b", r"\1s", _values(field["items"], schemas))
     if field["type"] == "object":
         keys = ", ".join(field.get("properties", ()))
-        return f"a table of {keys}" if keys else "a table"
+        return f"`{{ {keys} }}`" if keys else "a table"
     limits = [f"{sign} {field[limit]:g}" for limit, sign in LIMITS.items() if limit in field]
     return " ".join([WORDS[field["type"]], " and ".join(limits)]).strip()
 
@@ -177,10 +177,11 @@ def api_page() -> str:
 
 
 def _members(result: type) -> list[str]:
-    """The public methods and properties of a class that have a docstring, but for those of every result."""
+    """The public methods and properties of a class."""
     kinds = (FunctionType, property)
     members = {name: getattr(result, name) for name in dir(result) if not name.startswith("_")}
-    return [name for name, value in members.items() if isinstance(value, kinds) and inspect.getdoc(value)]
+    # `sections` is what `str` and notebooks show
+    return [name for name, value in members.items() if isinstance(value, kinds) and name != "sections"]
 
 
 def module_page() -> str:
