@@ -118,6 +118,10 @@ def config_page() -> str:
     return "\n".join(lines) + "\n"
 
 
+def _number(value: float) -> str:
+    return f"{value:,}" if isinstance(value, int) else f"{value:g}"
+
+
 def _values(field: dict[str, Any], schemas: dict[str, Any]) -> str:
     """What a key accepts, in words, from its JSON schema."""
     if "enum" in field:
@@ -128,11 +132,11 @@ def _values(field: dict[str, Any], schemas: dict[str, Any]) -> str:
     if choices:
         return " or ".join(dict.fromkeys(_values(choice, schemas) for choice in choices))
     if field["type"] == "array":
-        return "a list of " + re.sub(r"\ba (text|number|list)\b", r"\1s", _values(field["items"], schemas))
+        return "a list of " + re.sub(r"\ba (text|number|whole number|list)\b", r"\1s", _values(field["items"], schemas))
     if field["type"] == "object":
         keys = ", ".join(field.get("properties", ()))
         return f"`{{ {keys} }}`" if keys else "a table"
-    limits = [f"{sign} {field[limit]:g}" for limit, sign in LIMITS.items() if limit in field]
+    limits = [f"{sign} {_number(field[limit])}" for limit, sign in LIMITS.items() if limit in field]
     return " ".join([WORDS[field["type"]], " and ".join(limits)]).strip()
 
 
