@@ -132,7 +132,8 @@ def _values(field: dict[str, Any], schemas: dict[str, Any]) -> str:
     if choices:
         return " or ".join(dict.fromkeys(_values(choice, schemas) for choice in choices))
     if field["type"] == "array":
-        return "a list of " + re.sub(r"\ba (text|number|whole number|list)\b", r"\1s", _values(field["items"], schemas))
+        items = _values(field["items"], schemas)
+        return "a list of " + re.sub(r"\ba (text|number|whole number|list)\b", r"\1s", items)
     if field["type"] == "object":
         keys = ", ".join(field.get("properties", ()))
         return f"`{{ {keys} }}`" if keys else "a table"
