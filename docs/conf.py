@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import ast
+import inspect
 import json
 import re
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from types import FunctionType
 from typing import Any
 
 import impact
@@ -50,9 +52,20 @@ default_role = "literal"
 autodoc_typehints = "none"
 autodoc_member_order = "bysource"
 copybutton_prompt_text = "$ "
+# a command over several lines
+copybutton_line_continuation_character = "\\"
 # outputs of commands are no shell language
 suppress_warnings = ["misc.highlighting_failure"]
 
+# types and limits of JSON Schema in words
+WORDS = {
+    "boolean": "`true` or `false`",
+    "integer": "a whole number",
+    "null": "nothing",
+    "number": "a number",
+    "string": "a text",
+}
+LIMITS = {"minimum": ">=", "exclusiveMinimum": ">", "maximum": "<=", "exclusiveMaximum": "<"}
 REFERENCE = Path(__file__).parent / "reference"
 # pages of the repository that are part of the site, and links to them and from them
 COPIED = {"CHANGELOG.md": "changelog.md", "SECURITY.md": "security.md"}
@@ -96,40 +109,92 @@ def config_page() -> str:
         "([uncertain inputs](../uncertainty.md)).",
     ]
     tables = {"sweep": Sweep, "materials.NAME": MaterialTable, "design": Design, "data": Data}
-    for name, table in tables.items():
+    schemas = impact.schema()["$defs"]
+    for name, table in {**tables, "solver": None, "output": None}.items():
         lines += ["", f"## [{name}]", "", "| key | meaning | values |", "|---|---|---|"]
-        quantities = quantities_of(table)
-        for key, field in table.model_fields.items():
+        quantities = quantities_of(table) if table else {}
+        fields = schemas[table.__name__ if table else name.title()]["properties"]
+        defaults = {**SWEEP_DEFAULTS, **FIXED_STEP_DEFAULTS, **OBLIQUE_DEFAULTS} if table is Sweep else {}
+        for key, field in fields.items():
             quantity = quantities.get(key)
-            meaning = quantity.description if quantity else field.description or ""
-            default = (
-                {**SWEEP_DEFAULTS, **FIXED_STEP_DEFAULTS, **OBLIQUE_DEFAULTS}.get(key) if name == "sweep" else None
-            )
-            values = (quantity.expected if quantity else "") + (
-                f"; default {default:g}" if default is not None else ""
-            )
+            meaning = quantity.description if quantity else field["description"]
+            values = quantity.expected if quantity else _values(field, schemas)
+            default = defaults.get(key, field.get("default"))
+            if default not in (None, []):
+                values += f"; default `{json.dumps(default)}`"
             lines.append(f"| `{key}` | {meaning} | {values} |")
-    for name, table in (("solver", "Solver"), ("output", "Output")):
-        lines += ["", f"## [{name}]", "", "| key | meaning | values |", "|---|---|---|"]
-        for key, field in impact.schema()["$defs"][table]["properties"].items():
-            values = [json.dumps(value) for value in field.get("enum", ())]
-            if "default" in field:
-                values.append(f"default {json.dumps(field['default'])}")
-            lines.append(f"| `{key}` | {field['description']} | {', '.join(values)} |")
     return "\n".join(lines) + "\n"
+
+
+def _number(value: float) -> str:
+    return f"{value:,}" if isinstance(value, int) else f"{value:g}"
+
+
+def _values(field: dict[str, Any], schemas: dict[str, Any]) -> str:
+    """What a key accepts, in words, from its JSON schema."""
+    if "enum" in field:
+        return ", ".join(f"`{json.dumps(value)}`" for value in field["enum"])
+    if "$ref" in field:
+        field = schemas[field["$ref"].rpartition("/")[2]]
+    choices = field.get("oneOf", field.get("anyOf")) if "type" not in field else None
+    if choices:
+        return " or ".join(dict.fromkeys(_values(choice, schemas) for choice in choices))
+    if field["type"] == "array":
+        items = _values(field["items"], schemas)
+        return "a list of " + re.sub(r"\ba (text|number|whole number|list)\b", r"\1s", items)
+    if field["type"] == "object":
+        keys = ", ".join(field.get("properties", ()))
+        return f"`{{ {keys} }}`" if keys else "a table"
+    limits = [f"{sign} {_number(field[limit])}" for limit, sign in LIMITS.items() if limit in field]
+    return " ".join([WORDS[field["type"]], " and ".join(limits)]).strip()
+
+
+# pages to read for the functions of a purpose of the docstring of the package
+GUIDES = {
+    "Run sweeps and single impacts": "start sweeps cluster",
+    "See results and choose a law": "gallery sweeps",
+    "Find inputs": "solve calibrate uncertainty",
+    "Simulation codes and their time steps": "codes export timestep conform",
+    "Store results and guard them": "storage ci",
+    "Laws and what they need": "models frictions extending",
+    "Classes of laws": "extending",
+    "Classes of results": "schema",
+    "Errors and warnings": "troubleshooting",
+}
 
 
 def api_page() -> str:
     """The functions and classes of the package, by the purposes of its docstring."""
-    lines = ["# Python", "", "```python", "import impact", "```"]
+    lines = ["# Python", "", "```python", "import impact", "```", "", "`help(impact)` lists the names by purpose."]
+    sections: list[str] = []
     for purpose, names in re.findall(r"^([A-Z][\w ]+): ((?:\w+,?\s)+)$", impact.__doc__ or "", re.MULTILINE):
-        lines += ["", f"## {purpose}"]
+        guides = ", ".join(f"[](../{page}.md)" for page in GUIDES[purpose].split())
+        lines += ["", f"**{purpose}** ({guides})", "", "| name | what it does |", "|---|---|"]
+        sections += ["", f"## {purpose}", "", f"Guides: {guides}."]
         for name in names.replace(",", " ").split():
-            kind = "autoclass" if isinstance(getattr(impact, name), type) else "autofunction"
-            lines += ["", f"### {name}", "", "```{eval-rst}", f".. {kind}:: impact.{name}", "```"]
+            thing = getattr(impact, name)
+            summary = (inspect.getdoc(thing) or "").splitlines()[0].replace("|", "\\|")
+            lines.append(f"| [`{name}`](#{name.lower()}) | {summary} |")
+            kind = "autoclass" if isinstance(thing, type) else "autofunction"
+            sections += ["", f"### {name}", "", "```{eval-rst}", f".. {kind}:: impact.{name}"]
+            # what a user calls and reads; parameters are in the docstring
+            if purpose == "Classes of results":
+                sections.append("   :members: " + ", ".join(_members(thing)))
+            sections.append("```")
+            command = name.replace("_", "-")
+            if command in COMMANDS:
+                sections += ["", f"At the command line: [impact {command}](commands.md#impact-{command})."]
     # the page of types, one level lower
     types = (Path(__file__).parent / "types.md").read_text(encoding="utf-8")
-    return "\n".join(lines) + "\n\n" + re.sub("^#", "##", types, flags=re.MULTILINE)
+    return "\n".join([*lines, *sections]) + "\n\n" + re.sub("^#", "##", types, flags=re.MULTILINE)
+
+
+def _members(result: type) -> list[str]:
+    """The public methods and properties of a class."""
+    kinds = (FunctionType, property)
+    members = {name: getattr(result, name) for name in dir(result) if not name.startswith("_")}
+    # `sections` is what `str` and notebooks show
+    return [name for name, value in members.items() if isinstance(value, kinds) and name != "sections"]
 
 
 def module_page() -> str:

@@ -8,7 +8,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
+import numpy as np
+from PIL import Image
+
 import impact
+from codes_page import codes_page
 from frictions_page import frictions_page
 from gallery import gallery_page, write_gallery
 from impact.contact.status import FrictionStatus, Status
@@ -199,6 +203,7 @@ PAGES = {
     "frictions.md": frictions_page,
     "gallery.md": gallery_page,
     "types.md": types_page,
+    "codes.md": codes_page,
 }
 
 
@@ -236,6 +241,16 @@ def write_oblique_figures(folder: Path) -> None:
     save_figure(impact.plot(impact.sweep(folder / "psi.toml"), kind="psi"), folder / "psi.svg")
 
 
+def write_dark(path: Path) -> None:
+    """Write the picture of the README for dark pages, NAME-dark.png, as site.css shows pictures there."""
+    rgb = np.asarray(Image.open(path).convert("RGB")) / 255.0
+    # of CSS: invert(0.92) hue-rotate(180deg)
+    hue = np.array([[-0.574, 1.43, 0.144], [0.426, 0.43, 0.144], [0.426, 1.43, -0.856]])
+    dark = np.clip((0.92 - 0.84 * rgb) @ hue.T, 0.0, 1.0)
+    picture = Image.fromarray(np.round(255.0 * dark).astype(np.uint8))
+    picture.quantize(64, dither=Image.Dither.NONE).save(path.with_name(f"{path.stem}-dark.png"), optimize=True)
+
+
 def main() -> None:
     for name, page in PAGES.items():
         (ROOT / "docs" / name).write_text(page(), encoding="utf-8")
@@ -246,6 +261,7 @@ def main() -> None:
     write_paper_figures(ROOT / "docs" / "paper")
     result = impact.sweep(ROOT / "configs" / "figure6.toml")
     save_figure(impact.plot(result, equations=True), ROOT / "docs" / "figure6.png")
+    write_dark(ROOT / "docs" / "figure6.png")
 
 
 if __name__ == "__main__":

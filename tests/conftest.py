@@ -118,8 +118,9 @@ def full_disk() -> Iterator[None]:
 
 
 def examples_of(page: str) -> list[tuple[str, str]]:
-    """Return the commands of a page of this project, and what they print there."""
-    return re.findall(r"\$ impact (.*)\n((?:.*\n)+?)```", (ROOT / page).read_text(encoding="utf-8"))
+    """Return the commands of a page of this project, which may have several lines, and what they print there."""
+    found = re.findall(r"\$ impact ((?:.*\\\n)*.*)\n((?:.*\n)+?)```", (ROOT / page).read_text(encoding="utf-8"))
+    return [(re.sub(r"\\\n\s*", "", command), printed) for command, printed in found]
 
 
 def code_blocks(page: str, language: str) -> list[str]:

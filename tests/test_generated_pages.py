@@ -11,8 +11,8 @@ from .conftest import ROOT
 sys.path.insert(0, str(ROOT / "scripts"))
 from make_docs import PAGES
 
-# these pages integrate laws without a closed form, and slips, or call all functions, which takes seconds
-SLOW = {"models.md", "frictions.md", "types.md"}
+# these pages integrate laws without a closed form, and slips, or call all functions, which takes a while
+SLOW = {"models.md", "frictions.md", "types.md", "codes.md"}
 
 
 @pytest.mark.parametrize(

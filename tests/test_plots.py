@@ -624,7 +624,10 @@ def test_a_picture_without_legend_and_foreign_axes_without_title(coarse: xr.Data
 
 def test_a_notebook_shows_the_picture(coarse: xr.Dataset) -> None:
     figure = impact.plot(coarse, width="single")
-    assert figure._repr_png_().startswith(b"\x89PNG")  # type: ignore[attr-defined]
+    png, metadata = figure._repr_png_()  # type: ignore[attr-defined]
+    assert png.startswith(b"\x89PNG")
+    # what a screen reader reads
+    assert "Coefficient of restitution" in metadata["alt"]
 
 
 # measured points

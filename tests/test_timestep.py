@@ -162,7 +162,7 @@ def test_a_step_that_is_too_long_is_no_restitution_and_ends_with_exit_code_3(cli
     words = ("timestep", "--model", LINEAR, "--at", "e=0.5", "--steps-per-contact", "1", "--tol", "1%")
     table, printed = cli(*words), cli(*words, "--json")
     assert (table.returncode, printed.returncode) == (3, 3)
-    assert "unstable        –          –         –" in table.stdout
+    assert "unstable        –          –           –" in table.stdout
     assert "unstable at 338 of 400 phases, the step is too long" in table.stderr
     result = json.loads(printed.stdout)
     (row,) = result["rows"]

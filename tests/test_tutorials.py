@@ -23,6 +23,7 @@ PAGES = [
     "README.md",
     "docs/calibrate.md",
     "docs/uncertainty.md",
+    "docs/start.md",
 ]
 
 

@@ -36,7 +36,8 @@ def export(
             "--model",
             metavar="KEY",
             autocompletion=complete_model,
-            help="A law that the code has. \\[default: the first of the source or of --list that its release has]",
+            help="Key of a law that the code implements. "
+            "\\[default: the first of the source or of --list that its release has]",
         ),
     ] = None,
     at: AtOption = None,
@@ -76,7 +77,7 @@ def export(
     sets: SetOption = None,
     as_json: JsonOption = False,
 ) -> int:
-    """Write a law as a code takes it, with the restitution that the code delivers at its time step.
+    """Write the input lines of a simulation code for a law, and what the code delivers at its time step.
 
     An e for a law that takes none is reached by its damping parameter.
 

@@ -36,7 +36,11 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
         "--model mujoco-solref --for dampratio --target e_out=0.6",
     ),
     "timestep": ("timestep", "Show what a fixed time step delivers.", "--model tsuji-1992 --at e=0.5 --tol 1%"),
-    "export": ("export", "Write a law as a code takes it.", "--to lammps --at e=0.6 --at v1=1 --verify"),
+    "export": (
+        "export",
+        "Write the input lines of a simulation code for a law.",
+        "--to lammps --at e=0.6 --at v1=1 --verify",
+    ),
     "conform": ("conform", "Judge what an engine delivers.", "pymunk -o page.html"),
     "calibrate": ("calibrate", "Fit laws to measurements.", "fit.toml -o fit.h5 --best best.toml"),
     "sensitivity": (

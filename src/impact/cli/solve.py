@@ -30,7 +30,7 @@ def solve(
             "--for",
             metavar="PARAMETER",
             autocompletion=complete_unknown,
-            help="What to solve for: a parameter of the model or of the friction law, e to ask for, K, or mu.",
+            help="What to solve for: a parameter of the model or of the friction law, e (to enter), K, or mu.",
         ),
     ],
     target: Annotated[
@@ -60,7 +60,7 @@ def solve(
     plugins: PluginOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Find the value of a parameter, of K, of mu, or of the e to ask for, that gives a wanted output.
+    """Find the parameter, K, mu, or requested e that produces a target output.
 
     All values that give the target are printed, or the range that can be attained.
 

@@ -44,7 +44,7 @@ def sweep(
         typer.Option(
             "--scheduler",
             metavar="ADDRESS",
-            help="Dask's workers integrate: tcp://host:8786, or local (127.0.0.1, ports without authentication).",
+            help="Integrate on dask workers: tcp://host:8786, or local (127.0.0.1, ports without authentication).",
         ),
     ] = None,
     scheduler_file: Annotated[

@@ -91,7 +91,7 @@ def timestep(
     overwrite: OverwriteOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Show which restitution a code delivers at a fixed time step, and which e to ask it for.
+    """Show which restitution a code delivers at a fixed time step, and which e to enter.
 
     The restitution depends on the phase, the part of a step in which the contact begins.
 

@@ -163,7 +163,7 @@ def notes(collision: Collision) -> list[str]:
             "ChSystemSMC has no Flores; it takes Hooke instead",
         ]
     remarks += [
-        "the force may pull before the contact ends; ChSystemSMC cuts that off, which is another law"
+        "the force may become attractive before separation; ChSystemSMC removes this and changes the law"
         if multicore
         else "the force is never negative, but for adhesion, by default 0; ChSystemMulticoreSMC lets it pull",
         "no speed switches the restitution off; SetMinBounceSpeed is of the other contact method, NSC",

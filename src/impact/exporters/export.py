@@ -1,4 +1,4 @@
-"""Write a law as a code takes it, with what the code delivers at its time step."""
+"""Write the input lines of a simulation code for a law, with what the code delivers at its time step."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ MAX_COMMENT = 1000
 
 @dataclass(frozen=True)
 class Export(Displayed):
-    """A law as a code takes it.
+    """The input lines of a simulation code for a law, and what the code delivers.
 
     Parameters
     ----------
@@ -165,7 +165,7 @@ def export(
     overwrite: bool = False,
     overrides: Sequence[str] | Mapping[str, object] = (),
 ) -> Export:
-    """Write a law as a code takes it, with the restitution that the code delivers at its time step.
+    """Write the input lines of a simulation code for a law, and what the code delivers at its time step.
 
     Parameters
     ----------
@@ -305,7 +305,7 @@ def _warnings(problem: ExportProblem, collision: Collision, row: TimestepRow) ->
         key, requested = problem.model.key, number(problem.requested_e)
         warnings.append(
             f"{key} delivers {number(problem.e_continuous)} where e = {requested} is asked for; impact solve "
-            f"--model {key} --for e --target e_out={requested} finds the e to ask for"
+            f"--model {key} --for e --target e_out={requested} finds the e to enter"
         )
     if problem.left_out:
         laws = ", ".join(problem.left_out)
@@ -375,11 +375,11 @@ def _header(
             )
         if row.e_to_ask == row.e_to_ask:
             header.append(
-                f"a mean of {number(problem.requested_e)} at this dt: ask for e = {decimals(row.e_to_ask)}"
+                f"a mean of {number(problem.requested_e)} at this dt: enter e = {decimals(row.e_to_ask)}"
             )
         if advised is not None:
             within = f"within {number(100.0 * ADVISED_TOL)} % of {number(problem.requested_e)}"
-            header.append(f"advised: dt <= {quantity(advised.dt, 's', 3)}, where every phase is {within}")
+            header.append(f"recommended: dt <= {quantity(advised.dt, 's', 3)} keeps e {within} whatever the phase")
         if needed is not None:
             header.append(str(needed))
     return [*header, *code.notes(collision), code.tested]

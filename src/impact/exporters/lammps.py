@@ -254,7 +254,7 @@ def notes(collision: Collision) -> list[str]:
     remarks.append(
         "limit_damping: the force is never negative"
         if limit
-        else "the force pulls before the contact ends; limit_damping would cut that off, which is another law"
+        else "the force becomes attractive before separation; limit_damping removes this and changes the law"
     )
     if not collision.friction:
         remarks.append(

@@ -148,7 +148,7 @@ def notes(collision: Collision) -> list[str]:
         remarks.append(
             "limitForce on: the force is never negative"
             if options
-            else "the force pulls before the contact ends; limitForce on cuts that off, which is another law"
+            else "the force becomes attractive before separation; limitForce on removes this and changes the law"
         )
     if not collision.friction:
         remarks.append("no friction: replace tangential no_history and coefficientFriction by yours")

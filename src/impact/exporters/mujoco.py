@@ -63,7 +63,7 @@ def notes(collision: Collision) -> list[str]:
         *(["timeconst >= 2 dt: MuJoCo raises a smaller one to 2 dt (flag refsafe)"] if is_standard else []),
         "solref is per effective mass: the restitution does not depend on the masses, nor on the speed",
         "unset, solref is 0.02 1, critical damping: e is 0.135 at any speed; a timeconst below 2 dt is raised",
-        "solimp is constant here; with the default one, 0.9 0.95 0.001 0.5 2, the restitution is another",
+        "these lines assume constant solimp; the default, 0.9 0.95 0.001 0.5 2, gives a different restitution",
         "two geoms: their solref and solimp are averaged by solmix, or those of the higher priority are taken",
         "the force is never negative; a geom margin above 0 begins the contact earlier",
     ]

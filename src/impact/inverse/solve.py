@@ -224,7 +224,7 @@ def unknown_of(model: ForceModel, name: str, friction: FrictionLaw | None = None
                 full = replace(parameter, name=f"friction.{friction.key}.{parameter.name}")
                 unknowns |= {full.name: full, **({} if parameter.name in unknowns else {parameter.name: full})}
     if "e" in model.quantities or (friction is not None and friction.may_use_e):
-        unknowns["e"] = Parameter("e", "1", "restitution to ask for", default=0.5, least=0.0, most=1.0)
+        unknowns["e"] = Parameter("e", "1", "restitution to enter", default=0.5, least=0.0, most=1.0)
     if name not in unknowns:
         laws = _laws(model.key, friction.key if friction else "")
         raise UsageError(

@@ -252,7 +252,7 @@ class TimestepResult(Displayed):
         yield f"{laws}: {e}e_out = {number(self.e_continuous)}{beta} in a contact time of {contact_time}"
         yield f"scheme: {self.scheme}"
         yield ""
-        headings = ["steps per contact", "dt [s]", "e mean", "e least", "e largest", "e to ask"]
+        headings = ["steps per contact", "dt [s]", "e mean", "e least", "e largest", "e to enter"]
         cells = [[*row.cells] for row in self.rows]
         if self.rayleigh_time == self.rayleigh_time:
             headings.insert(2, "dt / T_R")

@@ -61,9 +61,11 @@ class Picture(Figure):
         # texts that were broken into lines: original text and present text
         self.fitted: dict[Text, tuple[str, str]] = {}
 
-    def _repr_png_(self) -> bytes:
-        # a notebook shows it even if no backend of matplotlib is selected
-        return encoded(self, "png")
+    def _repr_png_(self) -> tuple[bytes, dict[str, str]]:
+        # a notebook shows it even if no backend of matplotlib is selected; `alt` is the text for screen readers
+        panels = [f"{axes.get_ylabel()} over {axes.get_xlabel()}" for axes in self.axes if axes.get_ylabel()]
+        words = [*(text.get_text() for text in self.header), *panels]
+        return encoded(self, "png"), {"alt": " ".join("; ".join(words).split())}
 
     def set_size_inches(self, w: Any, h: Any = None, forward: bool = True) -> None:
         before = self.get_figwidth()
