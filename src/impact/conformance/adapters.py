@@ -11,7 +11,6 @@ import os
 import re
 import select
 import shlex
-import signal
 import subprocess
 import sys
 import tempfile
@@ -25,7 +24,7 @@ from typing import Any, SupportsFloat
 from ..contact.frictions import frictions
 from ..contact.models import catalogue
 from ..errors import UsageError, did_you_mean
-from ..exporters.programs import KEPT_OUTPUT_BYTES, MAX_OUTPUT_BYTES, POLL_INTERVAL_S, find_program
+from ..exporters.programs import KEPT_OUTPUT_BYTES, MAX_OUTPUT_BYTES, POLL_INTERVAL_S, find_program, kill
 from ..formatting import argument, number, safe_text
 from .checks import KIND_TOLERANCES, Answer, Kind, balls_of
 from .suite import Question
@@ -109,10 +108,7 @@ def open_adapter(adapter: object, timeout_s: float, folder: str | None = None) -
                 assert pipe is not None
                 with suppress(BrokenPipeError):
                     pipe.close()
-            with suppress(ProcessLookupError):
-                # also what a wrapper has started
-                os.killpg(process.pid, signal.SIGKILL)
-            process.wait()
+            kill(process)
 
 
 def _command(adapter: object) -> list[str]:
@@ -180,7 +176,8 @@ class _Conversation:
                 raise adapter_error(f"{name}: a line of more than {MAX_LINE_BYTES >> 10} KiB")
             if os.fstat(self.errors).st_size > MAX_OUTPUT_BYTES:
                 raise adapter_error(f"{name}: more than {MAX_OUTPUT_BYTES >> 20} MiB on stderr")
-            if select.select([descriptor], [], [], POLL_INTERVAL_S)[0]:
+            # Windows cannot wait for a pipe, so that a silent adapter is not stopped there
+            if sys.platform == "win32" or select.select([descriptor], [], [], POLL_INTERVAL_S)[0]:
                 content = os.read(descriptor, MAX_LINE_BYTES)
                 if not content:
                     raise self._ended(name)
@@ -195,7 +192,8 @@ class _Conversation:
         except subprocess.TimeoutExpired:
             code = "its stdout closed"
         size = os.fstat(self.errors).st_size
-        kept = os.pread(self.errors, KEPT_OUTPUT_BYTES, max(0, size - KEPT_OUTPUT_BYTES))
+        os.lseek(self.errors, max(0, size - KEPT_OUTPUT_BYTES), os.SEEK_SET)
+        kept = os.read(self.errors, KEPT_OUTPUT_BYTES)
         lines = kept.decode(errors="replace").strip().splitlines()
         last = f": {safe_text(lines[-1])}" if lines else ""
         return adapter_error(f"{name}: the adapter ended with {code}{last}")

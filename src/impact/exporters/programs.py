@@ -87,11 +87,19 @@ def run_program(command: Sequence[str], folder: str, timeout_s: float) -> subpro
                 with contextlib.suppress(subprocess.TimeoutExpired):
                     process.wait(POLL_INTERVAL_S)
         except BaseException:
-            # also what a wrapper has started
-            os.killpg(process.pid, signal.SIGKILL)
-            process.wait()
+            kill(process)
             raise
         return subprocess.CompletedProcess(command, process.returncode, _end_of(out), _end_of(err))
+
+
+def kill(process: subprocess.Popen[bytes]) -> None:
+    """Kill a process that was started in a session of its own, and what it has started; only itself on Windows."""
+    with contextlib.suppress(ProcessLookupError):
+        if sys.platform == "win32":
+            process.kill()
+        else:
+            os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
 
 
 def _end_of(file: IO[bytes]) -> str:
