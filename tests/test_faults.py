@@ -60,8 +60,11 @@ def test_all_file_operations_of_a_sweep_are_recorded(sweeps: SweepServer) -> Non
     [
         (CONFIG_TEXT, 3),
         pytest.param(FACTORED_CONFIG, 4, marks=pytest.mark.slow),
-        pytest.param(CONFIG_TEXT, None, marks=pytest.mark.faults),
-        pytest.param(FACTORED_CONFIG, None, marks=pytest.mark.faults),
+        pytest.param(CONFIG_TEXT, 120, marks=pytest.mark.faults),
+        pytest.param(FACTORED_CONFIG, 120, marks=pytest.mark.faults),
+        # all of them
+        pytest.param(CONFIG_TEXT, None, marks=pytest.mark.long),
+        pytest.param(FACTORED_CONFIG, None, marks=pytest.mark.long),
     ],
 )
 def test_a_sweep_killed_at_any_file_operation_is_resumed(

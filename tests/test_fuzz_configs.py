@@ -21,7 +21,7 @@ from fuzz_configs import Outcomes, fuzz, judge, write_files
 def test_every_mutated_config_ends_as_documented(
     tmp_path: Path, forked: ForkServer, count: int, n_fits: int
 ) -> None:
-    outcomes = fuzz(1, range(count), n_fits, tmp_path, forked)
+    outcomes = fuzz(2, range(count), n_fits, tmp_path, forked)
     assert not outcomes.failures
     assert outcomes.counts["calibrated"] == n_fits
     assert outcomes.counts["command line: exit code 2"] + outcomes.counts["command line: exit code 0"] == -(

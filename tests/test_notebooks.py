@@ -49,7 +49,7 @@ def test_a_notebook_calls_the_controls_and_shows_a_picture_of_them() -> None:
 def test_the_notebook_of_figure_6_describes_the_lines_of_its_picture(figure6: xr.Dataset) -> None:
     text = (NOTEBOOKS / "figure6.ipynb").read_text(encoding="utf-8")
     assert (
-        "thick black lines are the solution by impulse and momentum; a line with markers is that of a law" in text
+        "thick solid lines are the solution by impulse and momentum; a line with markers is that of a law" in text
     )
     (axes,) = impact.plot(figure6).axes
     for line in axes.lines:

@@ -117,7 +117,7 @@ def config(**sweep: Any) -> Config:
           'frictions = ["coulomb-1785"]']),
         (HEAD.replace('"coulomb-1785"', "[]") + "v1 = 2\nu1 = 2\nmu = 0.3",
          ['x.toml:2: frictions: got an empty list, expected a friction law, or a list of friction laws; "all" are '
-          "all"]),
+          "all but those of one scheme"]),
         (HEAD + 'v1 = 2\nu1 = 2\nmu = 0.3\nomega1 = "10 Hz"',
          ['x.toml:12: sweep.omega1: got "10 Hz", expected a unit of rad/s, such as "1 rad/s"; 1/s may be turns or '
           "radians per second"]),

@@ -311,7 +311,9 @@ def kinds_to_offer(dataset: xr.Dataset) -> list[str]:
     """
     # a kind may apply to one model alone, such as a map over one of its parameters
     one_key = [str(key) for key in dataset["model"].values[:1]]
-    return [kind.name for kind in kinds_of(dataset) if kind.default(dataset, one_key) is not None]
+    kinds = [kind.name for kind in kinds_of(dataset) if kind.default(dataset, one_key) is not None]
+    # a picture of an animation is one frame of it, which shows less than a loop
+    return [name for name in kinds if name != "animation"]
 
 
 def axes_of(dataset: xr.Dataset) -> list[str]:
