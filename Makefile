@@ -84,7 +84,7 @@ docs: $(VENV)/dev  ## regenerate the generated pages and pictures of the documen
 
 # its tools have an environment of their own; a broken link, or a word that codespell knows as misspelt, is an error
 site: $(SITE)/site  ## build the documentation site in build/site, and check its links and its spelling
-	$(SITE)/bin/codespell
+	git ls-files -z | xargs -0 $(SITE)/bin/codespell
 	$(SITE)/bin/sphinx-build -q -W --keep-going -b html docs build/site
 	@echo "the site is build/site/index.html"
 
