@@ -211,9 +211,10 @@ def module_page() -> str:
 
 def write_reference(app: Any) -> None:
     """Write the pages that are generated from the code."""
-    (REFERENCE / "laws").mkdir(parents=True, exist_ok=True)
-    for key, text in law_pages().items():
-        (REFERENCE / "laws" / f"{key}.md").write_text(text, encoding="utf-8")
+    for name, text in law_pages().items():
+        path = REFERENCE / f"{name}.md"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
     pages = {"commands": command_page, "config": config_page, "python": api_page, "modules": module_page}
     for name, page in pages.items():
         (REFERENCE / f"{name}.md").write_text(page(), encoding="utf-8")
@@ -229,15 +230,11 @@ def move_links(app: Any, document: str, source: list[str]) -> None:
     for old, new in MOVED.items():
         source[0] = source[0].replace(old, new)
     # a law is a row of the catalogue on GitHub, and has a page in the site
-    if document in ("models", "frictions"):
-        source[0] = re.sub(r"\]\(#([a-z0-9-]+)\)", _law_link, source[0])
+    laws = {"models": catalogue(), "frictions": frictions()}.get(document, {})
+    for key in laws:
+        source[0] = source[0].replace(f"](#{key})", f"](reference/{document}/{key}.md)")
     # files of the repository are not part of the site
     source[0] = re.sub(r"\[([^\]]*)\]\(\.\./((?:configs|tests|src)/[^)]*)\)", r"`\2`", source[0])
-
-
-def _law_link(link: re.Match[str]) -> str:
-    is_law = link[1] in catalogue() or link[1] in frictions()
-    return f"](reference/laws/{link[1]}.md)" if is_law else link[0]
 
 
 def escape_docstring(app: Any, what: str, name: str, thing: Any, options: Any, lines: list[str]) -> None:

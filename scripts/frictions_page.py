@@ -82,7 +82,7 @@ KINDS = {
 # the impacts of the columns: solid balls against a wall
 E_IMPACT, MU, NU, CREEP = 0.9, 0.3, 0.3, 0.01
 KAPPA = 2.0 * (1.0 - NU) / (2.0 - NU)
-HERTZ, LINEAR = "tsuji-1992", "anagnostopoulos-1988"
+HERTZ, LINEAR, MUJOCO = "tsuji-1992", "anagnostopoulos-1988", "mujoco-solref"
 GAMMAS = (0.25, 0.5, 0.75, 1.5)
 SOLID = 3.5
 E_LINEAR, ZETA = 0.7, -math.log(0.7) / math.hypot(math.pi, math.log(0.7))
@@ -177,6 +177,8 @@ def delivered(law: FrictionLaw) -> list[float]:
 
 def partner(law: FrictionLaw) -> str:
     """Choose the contact force that a law is combined with."""
+    if law.kind == "cone":
+        return MUJOCO
     return HERTZ if law.stiffness in ("mindlin", "liggghts") else LINEAR
 
 

@@ -72,11 +72,14 @@ orphan: true
 ```
 """
 WIDTH = 100
+# of the laws of schemes: steps per contact, and a tangential stiffness per radius of the contact [N/m^2]
+STEPS, CLASSIC_STIFFNESS = 50.0, 1e9
 
 
 def law_pages() -> dict[str, str]:
-    """The pages of all laws as text, by key."""
-    return {law.key: law_page(law) for law in (*catalogue().values(), *frictions().values())}
+    """The pages of all laws as text, by the name of the catalogue and the key: a code's name may be in both."""
+    laws = {"models": catalogue(), "frictions": frictions()}
+    return {f"{name}/{key}": law_page(law) for name, of_kind in laws.items() for key, law in of_kind.items()}
 
 
 def law_page(law: ForceModel | FrictionLaw) -> str:
@@ -203,10 +206,10 @@ def example(law: ForceModel | FrictionLaw) -> str:
     is_model = isinstance(law, ForceModel)
     config = model_example(law) if isinstance(law, ForceModel) else friction_example(law)
     axis = next(name for name, value in config["sweep"].items() if isinstance(value, dict))
-    commands = [
-        "impact run law.toml" + ("" if is_model else " --at angle=45deg"),
-        "impact sweep law.toml -o law.h5",
-    ]
+    commands = ["impact sweep law.toml -o law.h5"]
+    # a single impact has no step
+    if "solver" not in config:
+        commands.insert(0, "impact run law.toml" + ("" if is_model else " --at angle=45deg"))
     return f"""\
 A sweep over {axis}, `law.toml`:
 
@@ -237,13 +240,18 @@ def friction_example(law: FrictionLaw) -> dict[str, Any]:
     config: dict[str, Any] = {"models": [partner(law)], "frictions": [law.key], "sweep": sweep}
     config["materials"] = {"aluminium": MATERIAL}
     parameters = column_parameters(law)
+    if law.stiffness == "classic":
+        parameters["k_t"] = CLASSIC_STIFFNESS
+    if law.scheme:
+        sweep["steps_per_contact"] = STEPS
+        config["solver"] = {"integrator": law.scheme}
     return config | ({"friction": {law.key: parameters}} if parameters else {})
 
 
 def toml(config: Mapping[str, Any]) -> str:
     """Write a config with tables of one or two levels as TOML."""
     lines = [f"{name} = {toml_value(value)}" for name, value in config.items() if not isinstance(value, Mapping)]
-    tables = {"sweep": config["sweep"]}
+    tables = {name: config[name] for name in ("sweep", "solver") if name in config}
     for name in ("materials", "model", "friction"):
         tables |= {f"{name}.{key}": values for key, values in config.get(name, {}).items()}
     for name, values in tables.items():

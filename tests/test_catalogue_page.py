@@ -26,7 +26,7 @@ pytestmark = pytest.mark.slow
 
 SITE_VENV = Path(os.environ.get("SITE_VENV", ROOT / ".venv-site"))
 # all pages but these are left out
-PAGES = ("models.md", "frictions.md", "export.md", "reference/laws/*")
+PAGES = ("models.md", "frictions.md", "export.md", "reference/models/*", "reference/frictions/*")
 WIDTHS = {"phone": 400, "laptop": 1280}
 KEYS = "[...document.querySelectorAll('.catalogue tbody tr:not([hidden]) a[id]')].map(anchor => anchor.id)"
 # choose in the list or type in the field of a label

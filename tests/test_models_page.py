@@ -175,8 +175,9 @@ def test_the_restitution_depends_on_the_speed_where_a_parameter_has_a_scale() ->
 @pytest.mark.slow
 def test_the_example_of_every_page_of_a_law_runs() -> None:
     pages = law_pages.law_pages()
-    assert pages.keys() == {*catalogue(), *frictions()}
-    for key, page in pages.items():
+    assert pages.keys() == {f"models/{key}" for key in catalogue()} | {f"frictions/{key}" for key in frictions()}
+    for path, page in pages.items():
+        key = path.partition("/")[2]
         assert page.count(f"{{{key},\n") == 1, key
         (example,) = code_blocks(page, "toml")
         result = impact.sweep(tomllib.loads(example))
