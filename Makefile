@@ -36,7 +36,7 @@ test: $(VENV)/dev  ## run the tests
 test-faults: $(VENV)/dev  ## run the fault-injection tests and the slow tests, and print their summaries
 	$(BIN)/python -m pytest -n auto --dist worksteal -m 'faults or slow' -rP tests
 
-test-long: $(VENV)/dev  ## compare thousands of slips with the slow reference, and fit parameters of friction
+test-long: $(VENV)/dev  ## kill sweeps at every file operation, compare thousands of slips with the slow reference, fit friction
 	$(BIN)/python -m pytest -n auto --dist worksteal -m long tests
 
 test-fast: $(VENV)/dev  ## test the compiled core; installs the extra "fast"

@@ -62,6 +62,7 @@ def test_a_table_with_decimal_commas_is_read_again(stored: Path, cli: Run, tmp_p
     # the column of the law, under the name that measured points have
     law = text.splitlines()[0].split(";").index("e_out gharib-hurmuzlu-2012")
     cells = [line.split(";") for line in text.splitlines()[1:]]
+    assert [row[0] for row in cells[:3]] == ["0,0", "0,1", "0,2"]
     lines = ["e;e_out", *(f"{row[0]};{row[law]}" for row in cells)]
     (tmp_path / "b.csv").write_text("\n".join(lines), encoding="utf-8")
     points = read_points(tmp_path / "b.csv")
