@@ -354,17 +354,19 @@ def test_bands_of_uncertain_friction_are_of_pairs() -> None:
 @pytest.mark.slow
 def test_a_report_has_a_section_on_friction(beads: xr.Dataset, central: xr.Dataset) -> None:
     text = impact.report(beads)
-    section = text.partition("<h2>Friction</h2>")[2].partition("</section>")[0]
+    section = text.partition(">Friction</h2>")[2].partition("</section>")[0]
     captions = [find_kind(kind).caption for kind in (*SHOWN, "friction-loop")]
-    assert all(section.count(caption) == 2 for caption in captions)
-    assert text.count("<figure>") > section.count("<figure>") == len(captions)
+    # each kind once, and some of them again at other values of the axes that it does not draw over
+    for caption in captions:
+        assert caption in section
+    assert text.count("<figure") > section.count("<figure") >= len(captions)
     for key in FRICTIONS:
         assert find_friction(key).title in section
     combined = int((beads["friction_status"] < 10).sum())
     assert f'class="number">{combined}</td>' in section
     assert "the contact force lacks what the friction law needs" in section
-    assert "over angle, mu, judged" in text
-    assert "<h2>Friction</h2>" not in impact.report(central)
+    assert "over angle, mu, compared with" in text
+    assert ">Friction</h2>" not in impact.report(central)
 
 
 def test_a_notebook_offers_the_kinds_of_friction_where_there_is_friction(

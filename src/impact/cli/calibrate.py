@@ -65,7 +65,7 @@ def calibrate(
         check_table_output(output, overwrite=overwrite)
     result = impact.calibrate(
         config,
-        output=None if is_table else output,
+        output=output,
         best=best,
         model=model,
         overwrite=overwrite,
@@ -74,8 +74,8 @@ def calibrate(
         jobs=jobs,
     )
     described = impact.describe(result)
-    if is_table and output is not None:
-        write_table(described, output, form, overwrite=overwrite)
+    if is_table and output is not None and form != TableForm():
+        write_table(described, output, form, overwrite=True)
     show(described, as_json=as_json)
     for path in (output, best):
         if path is not None:

@@ -26,6 +26,7 @@ from ..contact.interpolant import InterpolatedCollisions, motion_key
 from ..contact.model import ForceModel
 from ..contact.simulate import ComputeCollisions
 from ..contact.units import dimension
+from ..display import TABLE_SUFFIXES, TableForm, write_table
 from ..engine.execute import WorkerContext, context_of, models_of_context
 from ..engine.executors import choose_executor
 from ..engine.plan import Plan
@@ -34,6 +35,7 @@ from ..engine.trajectories import PlanLaw, model_of
 from ..errors import UsageError
 from ..formatting import argument
 from ..results.calibration import calibration_template, fitted_config, position_of_law
+from ..results.describe import describe
 from ..results.schema import FIT_STATUSES
 from ..results.xarray_backend import save
 from .batched_solvers import VectorFunction
@@ -85,7 +87,7 @@ def calibrate(
     Parameters
     ----------
     source : a TOML file, or a mapping with the same keys, with `[data]` and values `{ fit = [least, most] }`
-    output : result file to write
+    output : result file to write, or file of its table: .csv, .tex or .parquet
     best : TOML file to write, with the config of the best law and its parameters, for `sweep` and `export`
     model : key of the law whose config is written there, in place of the best one
     overwrite : replace files that exist
@@ -125,7 +127,9 @@ def calibrate(
     for note in config.notes:
         warnings.warn(note, stacklevel=2)
     result = calibrate_config(config, plugin_set.of(config.models), jobs)
-    if output is not None:
+    if output is not None and Path(output).suffix.lower() in TABLE_SUFFIXES:
+        write_table(describe(result), Path(output), TableForm(), overwrite=overwrite)
+    elif output is not None:
         save(result, output, overwrite=overwrite)
     if best is not None:
         position = (

@@ -4,10 +4,9 @@ The errors of measurements are normal. With noise "excess" those of one specimen
 model, whose covariance is V = diag(sigma^2) + tau^2 Z Z^T, where Z has a column of ones and zeros for each
 specimen. Laws are compared by the largest likelihood of the parameters and tau. Estimates and intervals have tau
 from the restricted likelihood, since the largest likelihood underestimates it, and quantiles of Student's t with
-Satterthwaite's degrees of freedom. The solver is `scipy.optimize.least_squares`, started at the best points of a
-Sobol sequence in the bounds: inside them the method of Levenberg and Marquardt, and where that ends at a bound or
-outside the trust region reflective method (Branch, Coleman and Li 1999, SIAM Journal on Scientific Computing 21,
-1-23). The formulas are derived here; tests compare them
+Satterthwaite's degrees of freedom. The solver is the trust region reflective method of
+`scipy.optimize.least_squares` (Branch, Coleman and Li 1999, SIAM Journal on Scientific Computing 21, 1-23),
+started at the best points of a Sobol sequence in the bounds. The formulas are derived here; tests compare them
 with closed forms of linear regression and with simulations.
 """
 
@@ -17,7 +16,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import Any, Literal, TypeAlias, TypeVar
+from typing import Literal, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -271,7 +270,7 @@ def minimize(
 
     def full(free_u: Array) -> Array:
         u = start.copy()
-        u[free] = np.clip(free_u, 0.0, 1.0)
+        u[free] = free_u
         return u
 
     if not free.size:
@@ -291,32 +290,21 @@ def minimize(
             residuals(free_u)
         return known[free_u.tobytes()]
 
-    def solve(**method: Any) -> Any:
-        return least_squares(
-            residuals,
-            start[free],
-            jac=slopes,
-            xtol=tolerance,
-            ftol=tolerance,
-            gtol=tolerance,
-            max_nfev=MAX_EVALUATIONS,
-            **method,
-        )
-
-    # MINPACK is faster, and knows neither bounds nor another loss, nor fewer points than parameters
-    is_simple = problem.data.loss == "linear" and problem.data.values.size >= free.size
-    result = solve(method="lm") if is_simple and _is_inside(start[free]) else None
-    if result is None or not (result.success and _is_inside(result.x)):
-        result = solve(bounds=(0.0, 1.0), loss=problem.data.loss)
+    result = least_squares(
+        residuals,
+        start[free],
+        jac=slopes,
+        bounds=(0.0, 1.0),
+        xtol=tolerance,
+        ftol=tolerance,
+        gtol=tolerance,
+        loss=problem.data.loss,
+        max_nfev=MAX_EVALUATIONS,
+    )
     # the solver stays inside the bounds, and a parameter at a bound is on it
     nearest = np.round(result.x)
     free_u = np.where(np.abs(result.x - nearest) <= AT_BOUND, nearest, result.x)
     return Estimate(full(free_u), 2.0 * float(result.cost), excess, bool(result.success))
-
-
-def _is_inside(u: Array) -> bool:
-    """Return whether all u are away from the bounds."""
-    return bool(np.all((u > AT_BOUND) & (u < 1.0 - AT_BOUND)))
 
 
 def _minimize_with_excess(
