@@ -519,20 +519,24 @@ def run_code(code: Code, key: str, runs: list[Values], folder: Path) -> tuple[st
     """Run collisions in a code; its version, and the velocities after each; skips where it is not installed."""
     (folder / "in.json").write_text(json.dumps(runs), encoding="utf-8")
     command = [*code.program, str(RUNNERS / code.runner), "in.json", "out.json"]
-    process = subprocess.run(
-        command,
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        timeout=TIMEOUT_S,
-        stdin=subprocess.DEVNULL,
-        check=False,
-    )
-    if not (folder / "out.json").exists():
+    for is_last in (False, True):
+        process = subprocess.run(
+            command,
+            cwd=folder,
+            capture_output=True,
+            text=True,
+            timeout=TIMEOUT_S,
+            stdin=subprocess.DEVNULL,
+            check=False,
+        )
+        if (folder / "out.json").exists():
+            break
         last = (process.stderr.strip().splitlines() or ["no message"])[-1]
         if last.startswith(("ModuleNotFoundError", "ImportError")):
             pytest.skip(f"{key}: {last} ({code.install})")
-        pytest.fail(f"{' '.join(command)}: exit {process.returncode}\n{process.stdout}\n{process.stderr}")
+        # LIGGGHTS was seen to crash in one of hundreds of runs, and not when it was run again
+        if is_last:
+            pytest.fail(f"{' '.join(command)}: exit {process.returncode}\n{process.stdout}\n{process.stderr}")
     answer = json.loads((folder / "out.json").read_text(encoding="utf-8"))
     return answer["version"], answer["answers"]
 
