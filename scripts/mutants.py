@@ -368,10 +368,10 @@ class Judge:
     def covering_tests(self, mutant: Mutant) -> list[str]:
         """The tests that execute a mutant, the doctests of its module first, the tests of commands last."""
         costs = {test: [False, 0.0] for test in self.items if test.startswith(f"{mutant.path}::")}
-        for found in self.records:
-            rows = found["lines"].get(mutant.path, {})
+        for record in self.records:
+            rows = record["lines"].get(mutant.path, {})
             for line in map(str, mutant.lines) if mutant.lines else rows:
-                costs |= {found["tests"][index]: found["costs"][index] for index in rows.get(line, ())}
+                costs |= {record["tests"][index]: record["costs"][index] for index in rows.get(line, ())}
         return sorted(costs.keys() & self.items.keys(), key=lambda test: (costs[test], test))
 
     def run(self, mutant: Mutant | None, tests: list[str]) -> tuple[str, str, int]:

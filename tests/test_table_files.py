@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import pytest
 
 import impact
 from impact.display import TableForm, encode_frame
+from impact.errors import UsageError
 from impact.plots.data import read_points
 
 from .conftest import ROOT, Run
@@ -86,6 +88,9 @@ def test_all_numbers_of_a_picture_have_the_comma(stored: Path) -> None:
         (["--decimal", "dot"], "--decimal: got dot, expected point or comma"),
         (["--rows", "1"], "--rows: got 1, expected a whole number >= 2"),
         (["-o", "a.txt"], "--output a.txt: expected a name that ends in .csv, .tex or .parquet"),
+        # not ignored in silence
+        (["--digits", "3"], "--digits: set without a table, expected --output FILE.csv"),
+        (["--decimal", "comma"], "--decimal: set without a table, expected --output FILE.csv"),
     ],
 )
 def test_a_wrong_form_of_a_table_is_one_line_and_writes_nothing(
@@ -94,6 +99,18 @@ def test_a_wrong_form_of_a_table_is_one_line_and_writes_nothing(
     done = cli("recommend", stored, *words, cwd=tmp_path)
     assert (done.returncode, done.stderr) == (2, f"{message}\n")
     assert not list(tmp_path.iterdir())
+
+
+def test_rows_of_a_picture_without_numbers_are_refused(stored: Path, tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="rows: set without a table, expected data="):
+        impact.plot_to_files(stored, output=tmp_path / "a.png", rows=5)
+    # the separator is that of the picture
+    assert impact.plot_to_files(stored, output=tmp_path / "a.png", decimal="comma").pictures
+
+
+def test_a_column_without_numbers_is_text() -> None:
+    frame = pd.DataFrame({"p": [math.nan, math.inf], "x": [-1.0, math.nan]})
+    assert encode_frame(frame, ".tex").decode().startswith("\\begin{tabular}{lS[table-format=-1.0]}\n")
 
 
 def test_a_ranking_and_steps_are_tables_of_latex_and_csv(stored: Path, cli: Run, tmp_path: Path) -> None:

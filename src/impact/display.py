@@ -11,7 +11,7 @@ import re
 import sys
 from abc import abstractmethod
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TextIO, TypeAlias
@@ -129,6 +129,15 @@ class TableForm:
                 raise UsageError(f"{argument(name)}: got {value}, expected a whole number >= {least}")
         check_decimal(self.decimal)
 
+    def check_used(self, path: Path | None, name: str) -> None:
+        """Refuse what is set where the argument of a name writes no table."""
+        if path is not None and path.suffix.lower() in TABLE_SUFFIXES:
+            return
+        for field in fields(self):
+            if getattr(self, field.name) != field.default:
+                table = argument(name, f"FILE{TABLE_SUFFIXES[0]}")
+                raise UsageError(f"{argument(field.name)}: set without a table, expected {table}")
+
 
 def check_decimal(decimal: str) -> None:
     """Raise a UsageError unless a decimal separator is known."""
@@ -181,8 +190,9 @@ def encode_frame(frame: pd.DataFrame, suffix: str, form: TableForm | None = None
     return str(text).encode()
 
 
-def check_table_output(path: Path | None, *, overwrite: bool) -> None:
-    """Check, before any work, the file of the option for a table."""
+def check_table_output(path: Path | None, form: TableForm, *, overwrite: bool) -> None:
+    """Check, before any work, the file of the option for a table, and its form."""
+    form.check_used(path, "output")
     if path is not None:
         check_table(path, "output")
         check_output(path, overwrite=overwrite)
@@ -216,7 +226,7 @@ def _latex(frame: pd.DataFrame, form: TableForm) -> str:
         is_numeric = all(isinstance(cell, int | float) and not isinstance(cell, bool) for cell in cells)
         texts = [_latex_cell(cell, form.digits or 6) for cell in cells]
         columns.append(texts)
-        formats += f"S[{_siunitx_format(texts, form.decimal)}]" if is_numeric else "l"
+        formats += _siunitx_column(texts, form.decimal) if is_numeric else "l"
     rows = [[_latex_heading(str(name)) for name in frame.columns], *zip(*columns, strict=True)]
     head, *body = (f"{' & '.join(row)} \\\\" for row in rows)
     lines = [f"\\begin{{tabular}}{{{formats}}}", r"\toprule", head, r"\midrule", *body, r"\bottomrule"]
@@ -240,16 +250,16 @@ def _latex_cell(cell: object, digits: int) -> str:
     return str(cell).translate(LATEX_CHARACTERS)
 
 
-def _siunitx_format(texts: Sequence[str], decimal: str) -> str:
-    """Describe the widest number of a column, so that siunitx aligns it at the decimal separator."""
+def _siunitx_column(texts: Sequence[str], decimal: str) -> str:
+    """Describe a column by its widest number, so that siunitx aligns it at the decimal separator."""
     parts = [re.fullmatch(r"(-?)(\d+)(?:\.(\d+))?(?:e(-?)(\d+))?", text) for text in texts]
-    found = [part for part in parts if part]
-    signs, whole, fraction, power_signs, powers = (
-        zip(*(part.groups("") for part in found), strict=True) if found else [[""]] * 5
-    )
+    numbers = [part.groups("") for part in parts if part]
+    if not numbers:
+        return "l"
+    signs, whole, fraction, power_signs, powers = zip(*numbers, strict=True)
     exponent = f"e{max(power_signs)}{max(map(len, powers))}" if any(powers) else ""
     size = f"{max(signs)}{max(map(len, whole))}.{max(map(len, fraction))}{exponent}"
-    return f"table-format={size}" + (", output-decimal-marker={,}" if decimal == "comma" else "")
+    return f"S[table-format={size}" + (", output-decimal-marker={,}]" if decimal == "comma" else "]")
 
 
 class Wrapped(str):

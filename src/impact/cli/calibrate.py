@@ -9,7 +9,7 @@ import typer
 
 import impact
 
-from ..display import TABLE_SUFFIXES, TableForm, check_table_output, show, write_table
+from ..display import TableForm, show, write_table
 from . import exits
 from .completion import complete_model
 from .options import (
@@ -58,11 +58,8 @@ def calibrate(
 
     Intervals are those of 95 % by profile likelihood. A parameter that the data do not determine has none.
     """
-
     form = TableForm(rows, digits, decimal)
-    is_table = output is not None and output.suffix.lower() in TABLE_SUFFIXES
-    if is_table:
-        check_table_output(output, overwrite=overwrite)
+    form.check_used(output, "output")
     result = impact.calibrate(
         config,
         output=output,
@@ -74,7 +71,8 @@ def calibrate(
         jobs=jobs,
     )
     described = impact.describe(result)
-    if is_table and output is not None and form != TableForm():
+    # in another form than that of the function
+    if output is not None and form != TableForm():
         write_table(described, output, form, overwrite=True)
     show(described, as_json=as_json)
     for path in (output, best):

@@ -63,7 +63,7 @@ def recommend(
     """
 
     form = TableForm(rows, digits, decimal)
-    check_table_output(output, overwrite=overwrite)
+    check_table_output(output, form, overwrite=overwrite)
     ranking = impact.recommend(
         impact.load(result),
         tol=tol,

@@ -101,7 +101,7 @@ def timestep(
     """
 
     form = TableForm(rows, digits, decimal)
-    check_table_output(output, overwrite=overwrite)
+    check_table_output(output, form, overwrite=overwrite)
     result = impact.timestep(
         model,
         source=source,

@@ -56,7 +56,7 @@ FRICTIONS = {
     "yade-mindlin": "Law2_ScGeom_MindlinPhys_Mindlin, betas",
     "yade-viscoelastic": "Law2_ScGeom_ViscElPhys_Basic, ks and cs",
 }
-# the laws that a friction law is combined with; beside en, betas is not heeded
+# the laws that a friction law is combined with; beside en, betas is ignored
 LAWS_WITH = {"yade-mindlin": "yade-betan", "yade-viscoelastic": "yade-viscoelastic"}
 
 
@@ -195,7 +195,7 @@ def notes(collision: Collision) -> list[str]:
         "the force is never negative (since September 2013)"
         + ("" if collision.friction else "; frictionAngle=0: replace it by yours"),
         *(
-            ["unset, betas is betan; beside en it is not heeded: betas=0 gave a beta of 0.097 where 0.279 was due"]
+            ["unset, betas is betan; beside en it is ignored: betas=0 gave a beta of 0.097 where 0.279 was due"]
             if collision.friction
             else []
         ),
@@ -226,7 +226,7 @@ CODE = Code(
         "v1, v2 = (ball.state.vel[0] for ball in O.bodies)": "v1, v2 = ball.state.vel[0], {v2}",
     },
     frictions=FRICTIONS,
-    # betas is not heeded beside en
+    # betas is ignored beside en
     has_friction=lambda key, friction: key.startswith(LAWS_WITH[friction]),
     shortens_arms=True,
     oblique=OBLIQUE,

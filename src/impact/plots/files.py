@@ -108,6 +108,8 @@ def plot_to_files(
     output = Path(output) if output is not None else result.with_suffix(".png")
     check_picture(output)
     table = Path(data) if data is not None else None
+    # the decimal separator is that of the picture too
+    replace(table_form, decimal="point").check_used(table, "data")
     if table is not None:
         check_table(table, "data")
         check_data_form(data_form)

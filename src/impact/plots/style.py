@@ -163,7 +163,8 @@ def _encoded_frames(figure: Figure, style: str | Path | None) -> bytes:
     """Encode the frames of an animation as a GIF."""
     from matplotlib.animation import PillowWriter
 
-    show_frame = getattr(figure, "show_frame", None)
+    # only an animation has them, see `Picture`
+    show_frame, frame_count = getattr(figure, "show_frame", None), int(getattr(figure, "frame_count", 0))
     if show_frame is None:
         raise UsageError(f"a .gif is an animation, expected {argument('kind', 'animation')}")
     writer = PillowWriter(fps=FRAMES_PER_SECOND)
@@ -174,7 +175,7 @@ def _encoded_frames(figure: Figure, style: str | Path | None) -> bytes:
         figure.canvas.draw()
         figure.set_layout_engine("none")
         with writer.saving(figure, str(path), figure.dpi):
-            for index in range(figure.frame_count):  # type: ignore[attr-defined]
+            for index in range(frame_count):
                 show_frame(index)
                 writer.grab_frame()
         return path.read_bytes()
