@@ -355,7 +355,7 @@ PLANTED_FRICTION = (
     ("liggghts-hooke", "liggghts-no-history", "0.3 0.3 0.3", "0.3 0.2 0.2", "ball"),
     ("yade-betan", "yade-mindlin", "-0.3, material1", "0.3, material1", "wall"),
     ("yade-betan", "yade-mindlin", "0.5, material1)", "-0.5, material1)", "ball"),
-    ("yade-betan", "yade-mindlin", "betas=", "es=0.9, betas=", "wall"),
+    ("yade-betan", "yade-mindlin", "betas=", "betas=0.5 + ", "wall"),
     ("yade-betan", "yade-mindlin", "0.4 * mass", "0.6 * mass", "ball"),
     ("drake-point-contact", "coulomb-1785", "(-0.3,)", "(0.3,)", "wall"),
     ("drake-point-contact", "coulomb-1785", "(-0.3, 0.5)", "(-0.3, -0.5)", "ball"),
