@@ -124,7 +124,7 @@ def warnings(collision: Collision) -> list[str]:
         return []
     return [
         "solreffriction is unset, and thus that of solref, whose damping is small where e is large: with e = 0.8, "
-        "mu = 0.3, 40 degrees, 31 steps a ball kept 0.62 of its slip, where rigid friction leaves none; with a b_t "
+        "mu = 0.3, 40 degrees, 31 steps a ball kept 0.62 of its slip, and with rigid friction none; with a b_t "
         "of 1/dt it kept none, and its e was 0.35 to 0.39"
     ]
 

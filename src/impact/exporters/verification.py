@@ -205,10 +205,10 @@ def _with_friction(
     is_turning = problem.code.shortens_arms or not problem.has_wall
     return replace(
         verification,
-        uncertainty=exact if problem.has_wall and not problem.law.is_coupled else turning * speed / v0,
+        uncertainty=exact if problem.has_wall and not problem.law.is_coupled else max(exact, turning * speed / v0),
         beta_measured=tuple(run.get("beta", math.nan) for row in runs for run in row),
         beta_predicted=tuple(predicted.ravel().tolist()),
-        beta_uncertainty=turning * max(1.0, speed / abs(slip)) if is_turning else exact,
+        beta_uncertainty=max(exact, turning * max(1.0, speed / abs(slip))) if is_turning else exact,
     )
 
 
