@@ -791,6 +791,35 @@ def test_drake_takes_coulomb_friction_with_tamsi() -> None:
     assert not any("stiction" in line for line in central.lines)
 
 
+@pytest.mark.parametrize(("key", "solref"), [("mujoco-solref", "0.02 0.07"), ("mujoco-solref-direct", "-1e6 -80")])
+def test_mujoco_takes_the_cone_of_a_pair_of_geoms(key: str, solref: str) -> None:
+    law, version = "mujoco-elliptic", "4.0.0"
+    numbers = [abs(float(word)) for word in solref.split()]
+    own = dict(zip(("timeconst", "dampratio") if key == "mujoco-solref" else ("k", "b"), numbers, strict=True))
+    at = {name: value for name, value in OBLIQUE.items() if name != "e"} | own
+    cone = at | {"b_t": 4000.0, "impratio": 4.0, "impedance": 0.8}
+    export = impact.export("mujoco", key, at=cone, friction=law, code_version=version)
+    assert export.parameters["solreffriction"] == "-1 -4000.0"
+    assert export.parameters["solimp"] == "0.8 0.8 0.001 0.5 2"
+    assert 'cone="elliptic" impratio="4.0"/>' in export.lines[0]
+    assert 'friction="0.3 0.3 0 0 0"' in export.lines[2]
+    # friction changes the restitution, and no step delivers that of the continuous law
+    assert export.scheme == "mujoco-cone"
+    assert abs(export.at_dt.e_mean - export.e_continuous) > 0.05
+    assert not any("recommended" in remark for remark in export.header)
+    assert math.isnan(export.beta_continuous)
+    assert export.warnings == ()
+    # unset, solreffriction is that of solref
+    unset = impact.export("mujoco", key, at=at, friction=law, code_version=version)
+    assert unset.parameters["solreffriction"] == "0 0"
+    assert any("kept 0.62 of its slip" in text for text in unset.warnings)
+    central = impact.export("mujoco", key, at={**own, "v1": 1.0}, code_version=version)
+    assert (central.scheme, central.warnings) == ("kick-drift", ())
+    assert not any("pair" in line for line in central.lines)
+    with pytest.raises(UsageError, match='MuJoCo has no "coulomb-1785"; known: mujoco-elliptic'):
+        impact.export("mujoco", key, at=at, friction="coulomb-1785", code_version=version)
+
+
 def test_scripts_have_solid_balls() -> None:
     config = source("soft", "soft", mu=0.3, angle="40 deg", inertia_factor2=0.6)
     with pytest.raises(UsageError, match=r"inertia_factor2: got 0\.6, expected 0\.4: balls of scripts are solid"):

@@ -1,14 +1,14 @@
 """Codes deliver at an oblique impact what the map of their scheme predicts: velocities and spins.
 
-A sphere meets a plane at angles from 10 to 80 degrees, with and without a spin, at 12 and 31 steps per contact and
-two phases of a step.
+A sphere meets a plane, or a sphere, at angles from 10 to 80 degrees, with and without a spin, at 12 and 31 steps
+per contact and two phases of a step.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -56,10 +56,12 @@ class Pairing:
     shortens_arms: bool = False
     # whether the code alternates between slip and stick: a shorter arm may change one of those steps
     alternates: bool = False
+    # the mass and radius of a second ball at rest; empty for a plane
+    second: Values = field(default_factory=dict)
 
     @property
     def name(self) -> str:
-        values = ", ".join(f"{name}={value}" for name, value in self.values.items())
+        values = ", ".join(f"{name}={value}" for name, value in (self.values | self.second).items())
         return f"{self.friction}-{self.model}-{values}"
 
 
@@ -204,12 +206,14 @@ PAIRINGS = (
             mujoco,
             scheme="mujoco-cone",
             shortens_arms=True,
+            second=second,
         )
-        for values in (
-            {},
-            {"impratio": 5.0},
-            {"b_t": 0.02 * STIFF, "impratio": 0.2},
-            {"b_t": STIFF, "impedance": 0.5},
+        for values, second in (
+            ({}, {}),
+            ({"impratio": 5.0}, {}),
+            ({"b_t": 0.02 * STIFF, "impratio": 0.2}, {}),
+            ({"b_t": STIFF, "impedance": 0.5}, {}),
+            ({"b_t": 0.2 * STIFF, "impratio": 3.0}, {"m2": 0.03, "R2": 0.08}),
         )
     ),
     *(
@@ -266,14 +270,14 @@ PAIRINGS += (
 
 def config_of(pairing: Pairing, sweep: Values, solver: Values) -> Values:
     """The config of a pairing."""
-    wall = {"m2": math.inf, "R2": math.inf}
+    second = pairing.second or {"m2": math.inf, "R2": math.inf}
     own = {name.split(".")[1]: value for name, value in pairing.sweep.items() if "." in name}
     inputs = {name: value for name, value in pairing.sweep.items() if "." not in name}
     return {
         "models": pairing.model,
         "frictions": pairing.friction,
         "model": {pairing.model: own},
-        "sweep": {**BALL, **wall, **inputs, "mu": [*MUS], **sweep},
+        "sweep": {**BALL, **second, **inputs, "mu": [*MUS], **sweep},
         **MATERIALS,
         "friction": {pairing.friction: pairing.values},
         "solver": solver,
@@ -310,6 +314,7 @@ def runs_of(pairing: Pairing, contact_time: float) -> list[Values]:
     """The runs of a code in the order of `predicted`."""
     return [
         BALL
+        | pairing.second
         | pairing.parameters(pairing.values, mu)
         | {
             "u1": BALL["v1"] * math.tan(math.radians(angle)),
@@ -331,14 +336,15 @@ def test_a_code_delivers_velocities_and_spins_of_the_map_of_its_scheme(
     pairing: Pairing, tmp_path: Path, record_property: Callable[[str, object], None]
 ) -> None:
     contact_time, indentation, ours = predicted(pairing)
-    tolerance = 4.0 * indentation / BALL["R1"] if pairing.shortens_arms else TOLERANCE
+    radius = 1.0 / (1.0 / BALL["R1"] + 1.0 / pairing.second.get("R2", math.inf))
+    tolerance = 4.0 * indentation / radius if pairing.shortens_arms else TOLERANCE
     version, answers = run_code(pairing.code, pairing.name, runs_of(pairing, contact_time), tmp_path)
     theirs = np.array(answers).reshape(ours.shape) * (1.0, 1.0, BALL["R1"])
     speed = BALL["v1"] / np.cos(np.radians(ANGLES)).reshape(1, -1, 1, 1, 1, 1)
     differences = (np.abs(theirs - ours) / speed).max(axis=-1)
     rare = differences > tolerance
     difference = float(differences.max())
-    variant = ", ".join(f"{name} {value}" for name, value in pairing.values.items())
+    variant = ", ".join(f"{name} {value}" for name, value in (pairing.values | pairing.second).items())
     key = f"{pairing.model} with {pairing.friction}"
     record_property("peer", (pairing.code.name, version, key, variant, ours[..., 0].size, difference, tolerance))
     if pairing.alternates:

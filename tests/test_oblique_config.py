@@ -129,9 +129,10 @@ def config(**sweep: Any) -> Config:
          ['x.toml:12: friction.coulmb-1785: unknown key; did you mean "coulomb-1785"?']),
         (HEAD + "v1 = 2\nu1 = 2\nmu = 0.3\ninertia_factor1 = 0",
          ["x.toml:12: sweep.inertia_factor1: got 0, expected a number > 0, or inf"]),
-        (HEAD + 'v1 = 2\nu1 = 2\nmu = 0.3\nsteps_per_contact = 12\n[solver]\nintegrator = "kick-drift"',
-         ['x.toml:14: solver.integrator: scheme "kick-drift" does not take the friction law coulomb-1785, '
-          "expected one with a spring or a dashpot, such as cundall-strack-1979"]),
+        (HEAD.replace("coulomb-1785", "drake-regularized") + "v1 = 2\nu1 = 2\nmu = 0.3\nsteps_per_contact = 12\n"
+         '[solver]\nintegrator = "kick-drift"',
+         ['x.toml:14: solver.integrator: scheme "kick-drift" does not take the friction law drake-regularized, '
+          "expected coulomb-1785 or one with a spring or a dashpot, such as cundall-strack-1979"]),
         (HEAD.replace('frictions = "coulomb-1785"\n', "") + "v1 = 2\nu1 = 2\nmu = 0.3",
          [f"x.toml:{line}: sweep.{name}: set without a friction law, expected frictions as well, such as "
           'frictions = ["coulomb-1785"]' for line, name in ((9, "u1"), (10, "mu"))]),

@@ -587,7 +587,7 @@ COARSE_STEPS = (12.0, 31.0)
 # has no setting for that; those of TAMSI come to rounding, as does SAP, whose equation is linear
 MAP_TOLERANCES = {"lagged": 2e-9, "similar": 2e-9}
 # the scheme of codes whose scheme has no variants; "kick-drift" for the others
-SCHEMES = {"PyBullet": "drake-sap"}
+SCHEMES = {"PyBullet": "pybullet"}
 WRONG_FORCE = 1e-6
 
 

@@ -76,7 +76,8 @@ def timestep(
         typer.Option(
             "--scheme",
             metavar="NAME",
-            help="How a step is computed: kick-drift, drake-tamsi (also LAGGED and SIMILAR) or drake-sap. "
+            help="How a step is computed: kick-drift, drake-tamsi (also LAGGED and SIMILAR), drake-sap "
+            "or pybullet. "
             "\\[default: drake-tamsi for laws of Drake, else kick-drift]",
             autocompletion=complete_scheme,
         ),

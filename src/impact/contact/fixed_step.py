@@ -1,8 +1,9 @@
 """Collisions as codes with a fixed time step integrate them, with one evaluation of the force per step.
 
 A step first changes the velocity, then the position with the new velocity, see `SCHEMES`: "kick-drift" takes the
-force at the start of the step, Drake's schemes the force at its end, whose root is known in closed form for the
-laws that they take. The restitution depends on the phase, the part of a step at which the contact begins.
+force at the start of the step, the schemes of Drake and PyBullet the force at its end, whose root is known in
+closed form for the laws that they take. The restitution depends on the phase, the part of a step at which the
+contact begins.
 """
 
 from __future__ import annotations
@@ -30,6 +31,9 @@ from .velocity_coordinates import force_form
 EXACT = "exact"
 # the update of one step, by the name of the scheme
 KICK_DRIFT, DRAKE_TAMSI, DRAKE_SAP, MUJOCO_CONE = "kick-drift", "drake-tamsi", "drake-sap", "mujoco-cone"
+PYBULLET = "pybullet"
+# those that take the force at the end of the step
+END_OF_STEP = (DRAKE_TAMSI, DRAKE_SAP, PYBULLET)
 SCHEMES = {
     KICK_DRIFT: "u <- u - h F(x, u)/m, then x <- x + h u; the force is evaluated at the position and velocity "
     "before the step",
@@ -37,6 +41,7 @@ SCHEMES = {
     "x <- x + h u'; the force is that at the end of the step",
     DRAKE_SAP: "u <- u', the root of u' = u - (h/m) max(0, K (x + h u') + C u'), then x <- x + h u'; the force is "
     "that at the end of the step",
+    PYBULLET: "as drake-sap; friction, up to μ times the impulse of the step, leaves the restitution as it is",
     MUJOCO_CONE: "u <- u - h f_n/m, then x <- x + h u; the force before the step is that of a friction cone, "
     "f_n = F while friction is in it, else max(0, F + μ f)/(1 + μ² D), where f is the friction that would stop "
     "the slip as asked, and D that of a unit of it; without friction it is kick-drift",
@@ -44,14 +49,20 @@ SCHEMES = {
 # the laws of the schemes that take only some
 LAWS_OF_SCHEME = {
     DRAKE_TAMSI: "F = K δ (1 + χ δ̇/v₀), n = 1, in both phases, such as drake-point-contact",
-    DRAKE_SAP: "F = K δ + C δ̇ to F = 0, in both phases, such as kelvin-voigt-no-tension",
+    **dict.fromkeys(
+        (DRAKE_SAP, PYBULLET), "F = K δ + C δ̇ to F = 0, in both phases, such as kelvin-voigt-no-tension"
+    ),
     MUJOCO_CONE: "of MuJoCo, such as mujoco-solref",
 }
 # the kinds of friction laws with which codes of a scheme were run, and in words which it takes
 FRICTION_OF_SCHEME: Mapping[str, tuple[tuple[str, ...], str]] = {
-    KICK_DRIFT: (("spring", "dashpot"), "one with a spring or a dashpot, such as cundall-strack-1979"),
+    KICK_DRIFT: (
+        ("coulomb", "spring", "dashpot"),
+        "coulomb-1785 or one with a spring or a dashpot, such as cundall-strack-1979",
+    ),
     DRAKE_TAMSI: (("coulomb",), "coulomb-1785"),
     DRAKE_SAP: ((), "none: friction changes the restitution that it delivers"),
+    PYBULLET: (("coulomb",), "coulomb-1785"),
     MUJOCO_CONE: (("cone",), "mujoco-elliptic"),
 }
 # a contact that takes more steps, in units of its steps at the continuous contact time, never ends
@@ -156,8 +167,8 @@ def collide_at_fixed_step(
 
     The contact begins with the overlap `phase * step * v0` at the first step that sees it. The contact ends with
     the first step after which the surfaces do not overlap. The force of a law that ends at zero force is never
-    negative, nor is that of a scheme of Drake. A law with an unloading branch follows it from the first step after
-    which the velocity is not positive.
+    negative, nor is that of a scheme of Drake or PyBullet. A law with an unloading branch follows it from the
+    first step after which the velocity is not positive.
 
     Parameters
     ----------
@@ -266,8 +277,7 @@ class _Contacts:
             force = self.slip.normal_force(force)
         velocity = self.next_velocity(force)
         if self.slip is not None:
-            # the schemes of Drake take the force at the end of the step
-            acting = (self.u - velocity) / self.step if self.scheme in (DRAKE_TAMSI, DRAKE_SAP) else force
+            acting = (self.u - velocity) / self.step if self.scheme in END_OF_STEP else force
             self.slip.advance(self.x, acting, self.step)
         self.u = velocity
         displacement = self.step * self.u
@@ -282,10 +292,11 @@ class _Contacts:
     def next_velocity(self, force: Array) -> Array:
         """Compute the velocity at the end of the step; `force` is that before it.
 
-        The schemes of Drake take the force at the end of the step. Both forces grow with u', so that the force is
-        zero at the end if and only if it is zero with u' = u. Where it is not, u' is for TAMSI the larger root of
+        The schemes of Drake and PyBullet take the force at the end of the step. The forces grow with u', so that
+        the force is zero at the end if and only if it is zero with u' = u. Where it is not, u' is for TAMSI the
+        larger root of
         h² χ u'² + (1 + h² + h χ x) u' + h x - u = 0, with which both factors of the force are positive, and
-        for SAP that of a linear equation.
+        for the other two that of a linear equation.
         """
         h, x, u, names = self.step, self.x, self.u, self.law.names
         if self.scheme == DRAKE_TAMSI:
@@ -294,7 +305,7 @@ class _Contacts:
             implicit = (u - h * x) / (half + np.sqrt(half * half + h * h * chi * (u - h * x)))
             # in this order, so that a NaN is not taken for a contact without force
             return np.where((x + h * u <= 0.0) | (1.0 + chi * u <= 0.0), u, implicit)
-        if self.scheme == DRAKE_SAP:
+        if self.scheme in (DRAKE_SAP, PYBULLET):
             reach = h + self.params[names.index("c")]
             return np.where(x + reach * u <= 0.0, u, (u - h * x) / (1.0 + h * reach))
         return u - h * force

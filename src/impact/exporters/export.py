@@ -222,7 +222,8 @@ def export(
     parameters = code.parameters(collision)
     at_dt = _row(problem, dt)
     advised = None
-    if code.scheme is not None and problem.requested_e > 0.0:
+    # with friction that changes e, no step delivers the e that is asked for
+    if code.scheme is not None and problem.requested_e > 0.0 and not problem.law.is_coupled:
         advised = needed_steps(problem.law, ADVISED_TOL, problem.e_continuous)
     needed = None
     if parameter is None and given and advised is not None and advised.dt < dt:
@@ -248,7 +249,7 @@ def export(
         code=code.name,
         version=problem.version,
         model=problem.model.key,
-        scheme=code.scheme,
+        scheme=code.scheme and problem.law.scheme,
         e=problem.law.e,
         e_continuous=problem.e_continuous,
         contact_time=contact_time,
@@ -367,7 +368,7 @@ def _header(
     else:
         spread = f"{decimals(row.e_least)} to {decimals(row.e_largest)} by the phase in the step"
         delivered = row.failure(law.phases) if row.failed else f"mean e {decimals(row.e_mean)}, {spread}"
-        header.append(f"{steps}: {delivered} ({code.scheme})")
+        header.append(f"{steps}: {delivered} ({law.scheme})")
         if law.oblique is not None and not row.failed:
             beta = f"{decimals(row.beta_least)} to {decimals(row.beta_largest)}"
             header.append(

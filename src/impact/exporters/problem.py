@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ..config.draft import Overrides
 from ..config.load import Config
 from ..config.tables import SWEEP_QUANTITIES
+from ..contact.frictions import find_friction
 from ..contact.impacts import INPUTS, Impacts
 from ..contact.model import ForceModel
 from ..contact.models import find
@@ -132,7 +133,9 @@ def prepare_export(
     friction: str | None = None,
 ) -> ExportProblem:
     """Choose the law, and reduce the source to one impact; the damping of a law without e is solved for."""
-    missing, point_source = "", open_source(source, overrides, Plugins(()))
+    opened = open_source(source, overrides, Plugins(()))
+    point_source = replace(opened, config_draft=replace(opened.config_draft, has_own_scheme=True))
+    missing = ""
     if model is not None:
         key = law_of_code(code, model, version)
     elif models := point_source.models:
@@ -146,7 +149,8 @@ def prepare_export(
     )
     if chosen:
         Plan(point.config).pair_notes("frictions")
-    fixed, outputs = fixed_step_law(point.config, PHASES, code.scheme, of_friction=chosen is not None)
+    scheme = (find_friction(chosen).scheme if chosen else "") or code.scheme
+    fixed, outputs = fixed_step_law(point.config, PHASES, scheme, of_friction=chosen is not None)
     if fixed.oblique is not None:
         _check_limit(code, fixed.oblique)
     calibration = point_source.calibration
@@ -182,8 +186,10 @@ def _choose_friction(
 def _check_limit(code: Code, oblique: ObliqueLaw) -> None:
     """Refuse the other normal force that limits friction; that of `coulomb-1785` is taken of any code."""
     law, limit = oblique.pair.friction, oblique.impact.parameters.get("limit")
+    if law.kind == "coulomb" or limit is None:
+        return
     words = next(parameter.choices for parameter in law.parameters if parameter.name == "limit")
-    if law.kind != "coulomb" and limit is not None and words[int(limit.item())] != law.default_limit:
+    if words[int(limit.item())] != law.default_limit:
         raise UsageError(f"friction.{law.key}.limit: {code.title} has only {law.default_limit}")
 
 

@@ -199,14 +199,16 @@ def _with_friction(
     exact, impact = verification.uncertainty, problem.law.impact
     v0, slip = float(impact.v0[0]), float(oblique.impact.slip.item())
     speed = math.hypot(v0, float((oblique.impact.u1 - oblique.impact.u2).item()))
-    turning = TURNING * problem.outputs["peak_indentation"] / float(impact.R_eff[0])
+    # a law that needs no radius may have none in its impact
+    radius = problem.collision(float(steps[0]), 0.5).effective_radius
+    turning = TURNING * problem.outputs["peak_indentation"] / radius
     is_turning = problem.code.shortens_arms or not problem.has_wall
     return replace(
         verification,
-        uncertainty=exact if problem.has_wall else turning * speed / v0,
+        uncertainty=exact if problem.has_wall and not problem.law.is_coupled else max(exact, turning * speed / v0),
         beta_measured=tuple(run.get("beta", math.nan) for row in runs for run in row),
         beta_predicted=tuple(predicted.ravel().tolist()),
-        beta_uncertainty=turning * max(1.0, speed / abs(slip)) if is_turning else exact,
+        beta_uncertainty=max(exact, turning * max(1.0, speed / abs(slip))) if is_turning else exact,
     )
 
 
