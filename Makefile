@@ -34,7 +34,7 @@ test: $(VENV)/dev  ## run the tests
 	$(BIN)/python -m pytest -n auto --dist worksteal
 
 test-faults: $(VENV)/dev  ## run the fault-injection tests and the slow tests, and print their summaries
-	$(BIN)/python -m pytest -n auto --dist worksteal -m 'faults or slow' -rP tests
+	$(BIN)/python -m pytest -n auto --dist worksteal -m 'faults or slow' -rP --durations=40 tests
 
 test-long: $(VENV)/dev  ## kill sweeps at every file operation, compare thousands of slips with the slow reference, fit friction
 	$(BIN)/python -m pytest -n auto --dist worksteal -m long tests
@@ -53,7 +53,7 @@ peers: $(VENV)/dev
 	done
 
 test-peers: peers  ## compare entries of codes with LAMMPS, LIGGGHTS, YADE, MuJoCo, Drake, Simbody, OpenSees, Kratos, PyBullet, EXUDYN and Newton
-	PEERS_VENV=$(PEERS) $(BIN)/python -m pytest -n auto --dist worksteal -m peers tests/test_peers.py tests/test_friction_peers.py tests/test_exported_scripts.py tests/test_conform.py
+	PEERS_VENV=$(PEERS) $(BIN)/python -m pytest -n auto --dist worksteal --durations=20 -m peers tests/test_peers.py tests/test_friction_peers.py tests/test_exported_scripts.py tests/test_conform.py
 
 # with a release of LAMMPS from 2022 beside the newest one
 conform: peers  ## run the engines of impact conform, and write their board docs/conform/board.md

@@ -11,6 +11,7 @@ import os
 import subprocess
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -182,20 +183,26 @@ def replace_in_scripts(code: Code, old: str, new: str) -> Code:
     return Wrong(**vars(code))
 
 
+@cache
+def agreeing_problem(name: str, key: str, second: str) -> tuple[ExportProblem, str, float]:
+    """A problem whose unchanged script agrees with what is predicted, its program, and the step [s]."""
+    code, program, version = code_and_version(name, key)
+    entry = EXPORTED[name, key]
+    collision = entry.collisions[0] if second == "ball" else with_wall(entry.collisions[0])
+    problem = prepare_export(code, key, version, config_of(key, collision), {}, ())
+    # an extrapolation to a step of zero needs finer steps
+    dt = problem.law.contact_time / (12 if code.scheme is not None else entry.code.steps_per_contact)
+    assert verify_scripts(problem, program, dt).agrees
+    return problem, program, dt
+
+
 @pytest.mark.parametrize(
     ("name", "key", "old", "new", "second"),
     [(*words, "ball") for words in PLANTED] + [(*words, "wall") for words in PLANTED_WALLS],
 )
 def test_an_error_in_a_template_is_found(name: str, key: str, old: str, new: str, second: str) -> None:
-    code, program, version = code_and_version(name, key)
-    entry = EXPORTED[name, key]
-    collision = entry.collisions[0] if second == "ball" else with_wall(entry.collisions[0])
-    problem = prepare_export(code, key, version, config_of(key, collision), {}, ())
-
-    wrong = replace(problem, code=replace_in_scripts(code, old, new))
-    # an extrapolation to a step of zero needs finer steps
-    dt = problem.law.contact_time / (12 if code.scheme is not None else entry.code.steps_per_contact)
-    assert verify_scripts(problem, program, dt).agrees
+    problem, program, dt = agreeing_problem(name, key, second)
+    wrong = replace(problem, code=replace_in_scripts(problem.code, old, new))
     assert not verify_scripts(wrong, program, dt).agrees
 
 
@@ -404,15 +411,22 @@ PLANTED_FRICTION = (
 )
 
 
+@cache
+def agreeing_oblique_problem(key: str, friction: str, second: str) -> tuple[ExportProblem, str, float]:
+    """The same as `agreeing_problem`, of the first entry of `OBLIQUE` with both laws."""
+    words = next(words for words in OBLIQUE if words[1:3] == (key, friction))
+    problem, program = oblique_problem(*words, second)
+    dt = problem.law.contact_time / 31.0
+    assert verify_scripts(problem, program, dt).agrees
+    return problem, program, dt
+
+
 @pytest.mark.parametrize(("key", "friction", "old", "new", "second"), PLANTED_FRICTION)
 def test_an_error_of_friction_in_a_template_is_found(
     key: str, friction: str, old: str, new: str, second: str
 ) -> None:
-    words = next(words for words in OBLIQUE if words[1:3] == (key, friction))
-    problem, program = oblique_problem(*words, second)
+    problem, program, dt = agreeing_oblique_problem(key, friction, second)
     wrong = replace(problem, code=replace_in_scripts(problem.code, old, new))
-    dt = problem.law.contact_time / 31.0
-    assert verify_scripts(problem, program, dt).agrees
     assert not verify_scripts(wrong, program, dt).agrees
 
 
