@@ -266,6 +266,19 @@ PAIRINGS += (
         shortens_arms=True,
     ),
 )
+# its lever arm is the radius
+BULLET: Values = {"K": 1e6, "n": 1.0, "kelvin-voigt-no-tension.C": 30.0}
+PAIRINGS += (
+    Pairing(
+        "coulomb-1785",
+        "kelvin-voigt-no-tension",
+        Code("PyBullet", "run_pybullet_wall.py"),
+        BULLET,
+        {},
+        lambda values, mu: {"k": BULLET["K"], "c": BULLET["kelvin-voigt-no-tension.C"], "mu": mu},
+        scheme="pybullet",
+    ),
+)
 
 
 def config_of(pairing: Pairing, sweep: Values, solver: Values) -> Values:
