@@ -82,9 +82,9 @@ def notes(collision: Collision) -> list[str]:
         f"single precision: the indentation is resolved to {number(share, 2)} of its peak, and e about as well",
         *(
             (
-                "friction is min(kf g, mu N) with the slip g; kf = m_t/dt, where 1/m_t is the slip that an impulse takes, is",
-                "Coulomb's: at 40 degrees, mu = 0.3, 12 steps a 27th of it left 0.65 of the slip, and 1.8 times as",
-                "much reversed 0.014 of it; it depends on dt and the masses; unset, kf is 1000 N s/m",
+                "friction is min(kf g, mu N) with the slip g; with kf = m_t/dt, m_t 2/7 of the effective mass,",
+                "it is Coulomb's: at 40 degrees, mu = 0.3, 12 steps a 27th of it left 0.65 of the slip, 1.8 times",
+                "it reversed 0.014 of it; it depends on dt and the masses; unset, kf is 1000 N s/m",
             )
             if c.friction
             else ("no friction: replace mu by yours",)
