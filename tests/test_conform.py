@@ -401,6 +401,13 @@ BAD_COMMANDS = {
     ("--adapter", f"{EXAMPLES / 'rigid.py'}:collide", "--suite", "conformance-9"): 'no set "conformance-9"',
     ("--adapter", f"{EXAMPLES / 'rigid.py'}:collide", "-o", "page.pdf"): "expected a name that ends in .html",
     ("pymunk", "--program", "no_such_python"): 'no program "no_such_python"',
+    ("yade", "--program", "no_such_yade"): 'no program "no_such_yade"',
+    (
+        "yade",
+        "--program",
+        sys.executable,
+    ): f"YADE is not installed as {sys.executable}; on Debian: apt-get install",
+    ("liggghts", "--program", "no_such_liggghts"): 'no program "no_such_liggghts"',
     ("pymunk", "--timeout", "0"): "--timeout: got 0, expected a number of seconds > 0",
 }
 
@@ -490,7 +497,7 @@ def test_a_page_has_the_checks_of_each_engine_and_escapes_their_names(tmp_path: 
 def test_an_engine_answers_every_collision(name: str) -> None:
     """What it delivers is on the board; here, it answers, finite and the same again."""
     venv = os.environ.get("PEERS_VENV")
-    python = str(Path(venv, "bin", "python").absolute()) if venv else None
+    python = str(Path(venv, "bin", "python").absolute()) if venv and ENGINES[name].package else None
     try:
         board = impact.conform(name, program=python)
     except UsageError as error:

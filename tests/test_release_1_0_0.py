@@ -70,7 +70,9 @@ def test_a_file_of_the_release_has_the_values_of_a_new_result(name: str) -> None
 
 
 @pytest.mark.parametrize("name", [*LAYOUTS, "calibration", "sensitivity"])
-def test_a_new_result_has_the_attributes_of_the_release(name: str) -> None:
+def test_a_new_result_has_the_attributes_of_the_release(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    # the fingerprint of a work folder has the version
+    monkeypatch.setattr("impact.engine.plan.__version__", "1.0.0")
     stored, new = impact.load(FOLDER / f"{name}.h5").attrs, new_result(name).attrs
     assert list(new) == list(stored)
     of_the_version = ("impact_version", "packages")
@@ -97,7 +99,8 @@ def test_a_file_of_the_release_is_repeated(name: str) -> None:
 @pytest.mark.parametrize("layout", LAYOUTS)
 def test_a_file_of_the_release_is_extended(layout: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # a later version refuses to add to values that it did not compute
-    monkeypatch.setattr("impact.results.extend.__version__", "1.0.0")
+    for module in ("results.extend", "engine.plan"):
+        monkeypatch.setattr(f"impact.{module}.__version__", "1.0.0")
     old, new = FOLDER / f"{layout}.h5", tmp_path / "new.h5"
     outcome = impact.extend_to_file(old, ["sweep.e=[0.2, 0.4, 0.6]"], output=new)
     assert outcome.extended_layout == layout

@@ -52,7 +52,9 @@ def conform(
     ] = 60.0,
     program: Annotated[
         str | None,
-        typer.Option("--program", metavar="FILE", help="A Python that has the package of the engine."),
+        typer.Option(
+            "--program", metavar="FILE", help="A Python that has the package of the engine, or its program."
+        ),
     ] = None,
     output: Annotated[
         Path | None,

@@ -61,7 +61,8 @@ def conform(
     only : ids of collisions to judge; by default all. Those from which they follow are asked as well
     tol : tolerance of all checks, or by name, "all" for the others
     timeout : time that an adapter has for an answer [s]
-    program : the Python interpreter that has the packages of engines; by default this one
+    program : the Python interpreter that has the packages of the engines, by default this one; or the program
+        of an engine that has none (LIGGGHTS, YADE), by default that on the path
     output : file to write as well, a page (.html) or a sealed file (.h5)
     overwrite : replace the output if it exists
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,9 +10,11 @@ from typing import Any
 
 from ..display import Block, Displayed, Table
 from ..errors import UsageError, did_you_mean
+from ..exporters.code import Code
 from ..exporters.programs import find_program, python_package_version
+from ..exporters.registry import CODES
 from ..formatting import argument
-from .adapters import python_command
+from .adapters import SERVE, python_command
 
 FOLDER = Path(__file__).with_name("engines")
 
@@ -23,9 +26,11 @@ class Engine:
     Parameters
     ----------
     title : in words
-    package : of Python, that the interpreter has to have
+    package : of Python, that the interpreter has to have; "" for a program, that of the code of `impact export` of
+        the same name
     settings : what a careful user would choose, in a sentence
     file, function : of the adapter, where it is not the function `collide` of the file of the same name
+    is_interpreter : the program runs the adapter, as a script in Python; others are the last word of its command
     """
 
     name: str
@@ -34,26 +39,43 @@ class Engine:
     settings: str
     file: str = ""
     function: str = "collide"
+    is_interpreter: bool = False
+
+    @property
+    def code(self) -> Code | None:
+        return None if self.package else CODES[self.name]
 
     @property
     def install(self) -> str:
-        return f"pip install {self.package}"
+        return self.code.install if self.code else f"pip install {self.package}"
 
     @property
     def version_of(self) -> Callable[[str], str | None]:
-        """The version that an interpreter has."""
-        return python_package_version(self.package)
+        """The version that an interpreter or the program has."""
+        return self.code.version_of if self.code else python_package_version(self.package)
+
+    def find(self, program: str | None) -> str | None:
+        """Find the requested program, or that of the code, or this interpreter."""
+        return find_program(self.code.program if self.code else "python", program)
 
     def command(self, program: str | None) -> list[str]:
-        """Make the command of the adapter, in the requested interpreter or in this one."""
-        python = find_program("python", program)
-        if python is None:
+        """Make the command of the adapter, in the requested interpreter or in this one, or for its program."""
+        found = self.find(program)
+        if found is None and program is not None:
             raise UsageError(f'{argument("program")}: no program "{program}"')
-        if self.version_of(python) is None:
+        if found is None or self.version_of(found) is None:
+            place = "on the path" if found is None else f"in {found}" if self.package else f"as {found}"
             raise UsageError(
-                f"{self.name}: {self.title} is not installed in {python}; {self.install}, or {argument('program')}"
+                f"{self.name}: {self.title} is not installed {place}; {self.install}, or {argument('program')}"
             )
-        return python_command(python, FOLDER / f"{self.file or self.name}.py", self.function)
+        file = FOLDER / f"{self.file or self.name}.py"
+        if self.code is None:
+            return python_command(found, file, self.function)
+        if self.is_interpreter:
+            # it prints a greeting on stdout, where answers are expected
+            words = [*self.code.command(found, str(SERVE)), f"{file}:{self.function}", "3"]
+            return ["sh", "-c", 'exec "$@" 3>&1 >&2', "sh", *words]
+        return [*python_command(sys.executable, file, self.function), "1", found]
 
 
 ENGINES: Mapping[str, Engine] = {
@@ -97,6 +119,19 @@ ENGINES: Mapping[str, Engine] = {
             "pair style gran/hooke/history, fix wall/gran hooke/history, k_t = 2/7 k_n, gamma_n for e, no gamma_t",
             file="lammps",
             function="collide_hooke_history",
+        ),
+        Engine(
+            "liggghts",
+            "LIGGGHTS",
+            "",
+            "hooke with tangential history, ktToKnUser on for k_t = 2/7 k_n, tangential_damping off",
+        ),
+        Engine(
+            "yade",
+            "YADE",
+            "",
+            "ViscElMat, kn and cn for e and the contact time, ks = 2/7 kn, cs = 0, NewtonIntegrator(damping=0)",
+            is_interpreter=True,
         ),
         Engine(
             "drake",
@@ -154,17 +189,21 @@ class Engines(Displayed):
 
     def records(self) -> Sequence[Mapping[str, Any]]:
         """A row for each engine; its version is None where it is not installed."""
-        python = find_program("python", self.program)
         return [
             {
                 "engine": engine.name,
                 "title": engine.title,
-                "version": python and engine.version_of(python),
+                "version": self._version(engine),
                 "install": engine.install,
                 "settings": engine.settings,
             }
             for engine in ENGINES.values()
         ]
+
+    def _version(self, engine: Engine) -> str | None:
+        # an interpreter was asked, which is none of these programs
+        found = engine.find(self.program if engine.package else None)
+        return found and engine.version_of(found)
 
     def sections(self, width: int) -> Iterator[Block]:
         """A row for each engine."""

@@ -1,7 +1,7 @@
-"""Run a Python function as an adapter: `python serve.py FILE.py:FUNCTION`, one line of JSON for each on stdin.
+"""Run a Python function as an adapter: `python serve.py FILE.py:FUNCTION [DESCRIPTOR]`.
 
-It needs nothing but Python, so that the interpreter of an engine can run it. What the function or the engine
-prints goes to stderr.
+It answers each line of JSON on stdin by one on stdout, or on another descriptor. It needs nothing but Python, so
+that the interpreter of an engine can run it. What the function or the engine prints goes to stderr.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ def load_function(word: str) -> Callable[[dict[str, Any]], dict[str, Any]]:
     return function
 
 
-def main(word: str) -> None:
-    """Answer the lines on stdin until it ends."""
-    answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
+def main(word: str, descriptor: str = "1", *_: str) -> None:
+    """Answer the lines on stdin until it ends; further words are of the adapter."""
+    answers = os.fdopen(os.dup(int(descriptor)), "w", encoding="utf-8")
     # also what a library prints by itself
     os.dup2(2, 1)
     function = load_function(word)
@@ -40,4 +40,4 @@ def main(word: str) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    main(*sys.argv[1:])
