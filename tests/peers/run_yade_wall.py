@@ -1,9 +1,12 @@
-"""A sphere and a plane in YADE, whose own interpreter runs this; the plane is z = 0, the sphere above it."""
+"""A sphere and a plane in YADE, whose own interpreter runs this; the plane is z = 0, the sphere above it.
+
+A finite R2 replaces the plane by a second sphere at rest, below z = 0.
+"""
 
 from __future__ import annotations
 
 import sys
-from math import atan
+from math import atan, inf, isfinite
 from pathlib import Path
 
 from yade import (
@@ -11,6 +14,7 @@ from yade import (
     Bo1_Wall_Aabb,
     ForceResetter,
     FrictMat,
+    Ig2_Sphere_Sphere_ScGeom,
     Ig2_Wall_Sphere_ScGeom,
     InsertionSortCollider,
     InteractionLoop,
@@ -31,7 +35,7 @@ from runner import serve
 
 def collide(
     law: str, options: dict[str, float], mu: float, m1: float, R1: float, v1: float, u1: float, omega1: float,
-    gap: float, step: float, count: int,
+    gap: float, step: float, count: int, m2: float = inf, R2: float = inf,
 ) -> tuple[float, float, float]:  # fmt: skip
     O.reset()
     if law == "mindlin":
@@ -44,15 +48,19 @@ def collide(
         material = ViscElMat(frictionAngle=atan(mu), **options)
         physics, contact = Ip2_ViscElMat_ViscElMat_ViscElPhys(), Law2_ScGeom_ViscElPhys_Basic()
     O.materials.append(material)
-    ball = O.bodies[O.bodies.append(utils.sphere((0, 0, R1 + gap), R1, material=material))]
+    ball = O.bodies[O.bodies.append(utils.sphere((-u1 * gap / v1, 0, R1 + gap), R1, material=material))]
     # the normal points down to the plane, the tangent along x, so that spins are about -y
     ball.state.mass, ball.state.inertia = m1, (0.4 * m1 * R1**2,) * 3
     ball.state.vel, ball.state.angVel = (u1, 0, -v1), (0, -omega1, 0)
-    O.bodies.append(utils.wall(0, axis=2, material=material))
+    if isfinite(R2):
+        second = O.bodies[O.bodies.append(utils.sphere((0, 0, -R2), R2, material=material))]
+        second.state.mass, second.state.inertia = m2, (0.4 * m2 * R2**2,) * 3
+    else:
+        O.bodies.append(utils.wall(0, axis=2, material=material))
     O.engines = [
         ForceResetter(),
         InsertionSortCollider([Bo1_Sphere_Aabb(), Bo1_Wall_Aabb()]),
-        InteractionLoop([Ig2_Wall_Sphere_ScGeom(hertzian=True)], [physics], [contact]),
+        InteractionLoop([Ig2_Sphere_Sphere_ScGeom(), Ig2_Wall_Sphere_ScGeom(hertzian=True)], [physics], [contact]),
         NewtonIntegrator(damping=0, gravity=(0, 0, 0)),
     ]
     O.dt = step
