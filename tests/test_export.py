@@ -820,6 +820,29 @@ def test_mujoco_takes_the_cone_of_a_pair_of_geoms(key: str, solref: str) -> None
         impact.export("mujoco", key, at=at, friction="coulomb-1785", code_version=version)
 
 
+def test_pybullet_takes_the_root_of_a_coefficient_and_newton_a_friction_that_stops_the_slip_in_a_step() -> None:
+    at = {"K": 1e6, "mu": 0.3, "angle": "40 deg", "v1": 1.0, "m1": 1.0, "m2": 3.0, "R1": 0.05, "R2": 0.08}
+    law, friction = "kelvin-voigt-no-tension", "coulomb-1785"
+    export = impact.export("pybullet", law, at=at | {"C": 60.0}, friction=friction, code_version="3.2.7")
+    assert f"lateralFriction={math.sqrt(0.3)!r}" in export.lines[2]
+    assert (export.scheme, export.parameters["lateralFriction"]) == ("pybullet", math.sqrt(0.3))
+    central = impact.export("pybullet", law, at={"K": 1e6, "C": 60.0}, code_version="3.2.7")
+    assert "lateralFriction=0," in central.lines[3]
+    # the restitution is that without friction
+    without = impact.export("pybullet", law, at={**at, "C": 60.0, "mu": 0.0}, friction=friction,
+                            code_version="3.2.7")  # fmt: skip
+    assert export.at_dt.e_mean == without.at_dt.e_mean
+    assert without.at_dt.beta_mean == -1.0
+    export = impact.export("newton", at=at | {"kd": 60.0}, friction=friction, dt=1e-4, code_version="1.8.0")
+    # m_t of solid balls is 2/7 of the effective mass
+    assert export.parameters["kf"] == pytest.approx(2.0 / 7.0 * 0.75 / 1e-4, rel=1e-14)
+    assert export.lines[0].endswith(f"kf={export.parameters['kf']!r}, mu=0.3)")
+    assert "kf" not in impact.export("newton", at={"K": 1e6, "kd": 60.0}, code_version="1.8.0").parameters
+    for name in ("pybullet", "newton"):
+        with pytest.raises(UsageError, match='has no "drake-regularized"; known: coulomb-1785'):
+            impact.export(name, at=at, friction="drake-regularized", code_version=CODES[name].newest)
+
+
 def test_scripts_have_solid_balls() -> None:
     config = source("soft", "soft", mu=0.3, angle="40 deg", inertia_factor2=0.6)
     with pytest.raises(UsageError, match=r"inertia_factor2: got 0\.6, expected 0\.4: balls of scripts are solid"):
@@ -833,8 +856,13 @@ def test_friction_that_a_code_does_not_have_is_refused_or_left_out_with_a_warnin
         UsageError, match='LAMMPS, pair style granular has no "lammps-mindln"; did you mean "lammps-'
     ):
         impact.export("lammps", default_law("lammps"), at=at, friction="lammps-mindln", code_version="22Jul2025")
-    with pytest.raises(UsageError, match='EXUDYN has no "coulomb-1785"; no friction is written for it'):
-        impact.export("exudyn", at=OBLIQUE, friction="coulomb-1785", code_version=CODES["exudyn"].newest)
+    reasons = {"exudyn": "none of it was run", "kratos": "its tangential law is not in the catalogue; .* beta was"}
+    for name, reason in reasons.items():
+        code = CODES[name]
+        message = f'{code.title} has no "coulomb-1785"; no friction is written for it: {reason}'
+        with pytest.raises(UsageError, match=message) as refusal:
+            impact.export(name, at=OBLIQUE, friction="coulomb-1785", code_version=code.newest)
+        assert "\n" not in str(refusal.value)
     known = "known: liggghts-history, liggghts-no-history"
     with pytest.raises(UsageError, match=f'has no "coulomb-1785"; {known}'):
         impact.export("liggghts", at=OBLIQUE, friction="coulomb-1785", code_version="3.8.0")

@@ -363,8 +363,8 @@ def test_printed_spins_are_those_of_the_impulse_of_friction(name: str) -> None:
     assert oblique is not None
     impulse = (oblique.impact.m_t * oblique.impact.slip).item() * (1.0 + printed["beta"])
     for ball in ("1", "2"):
-        expected = collision[f"omega{ball}"] - 2.5 * impulse / (collision[f"m{ball}"] * collision[f"R{ball}"])
-        assert printed[f"omega{ball}"] == pytest.approx(expected, rel=0.02)
+        change = 2.5 * impulse / (collision[f"m{ball}"] * collision[f"R{ball}"])
+        assert collision[f"omega{ball}"] - printed[f"omega{ball}"] == pytest.approx(change, rel=0.02)
 
 
 # errors of friction that a template could have: of the first entry of `OBLIQUE` with a law and a friction law

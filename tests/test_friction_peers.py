@@ -273,6 +273,19 @@ PAIRINGS += (
         shortens_arms=True,
     ),
 )
+# its lever arm is the radius
+BULLET: Values = {"K": 1e6, "n": 1.0, "kelvin-voigt-no-tension.C": 30.0}
+PAIRINGS += (
+    Pairing(
+        "coulomb-1785",
+        "kelvin-voigt-no-tension",
+        Code("PyBullet", "run_pybullet_wall.py"),
+        BULLET,
+        {},
+        lambda values, mu: {"k": BULLET["K"], "c": BULLET["kelvin-voigt-no-tension.C"], "mu": mu},
+        scheme="pybullet",
+    ),
+)
 
 
 # the normal of two balls turns while they touch: no map agrees closer with a code than with a shorter arm

@@ -214,6 +214,8 @@ CODE = Code(
     lines=lines,
     notes=notes,
     template=TWO_BALLS,
+    without_friction="its tangential law is not in the catalogue; where rigid balls stick its spring reverses the "
+    "slip: with e = 0.8, mu = 0.3, 40 degrees, beta was 0.22 with kratos-hertz and 0.32 with kratos-linear",
     wall={
         "2 {x2} 0 0\n": "",
         "2 0 2\n": "",

@@ -298,7 +298,8 @@ def timestep(
 
     The phase is the part of a step in which the contact begins: a code sees an overlap at its first step after it.
     The scheme "kick-drift" is that of LAMMPS, LIGGGHTS, YADE and MuJoCo, "drake-tamsi" and "drake-sap" are those
-    of Drake's discrete solvers, "pybullet" is that of PyBullet; `impact.contact.fixed_step.SCHEMES` has what they do in a step.
+    of Drake's discrete solvers, "pybullet" is that of PyBullet; `impact.contact.fixed_step.SCHEMES` has what they
+    do in a step.
 
     Parameters
     ----------
