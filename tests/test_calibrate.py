@@ -13,7 +13,11 @@ import xarray as xr
 from scipy import stats
 
 import impact
+from impact.config.load import read_config
+from impact.contact.models import find
 from impact.errors import UsageError
+from impact.inverse.calibrate import determined_groups
+from impact.inverse.fit import Bounds, DataPoints, FitProblem, fit_all
 
 from .conftest import ROOT, Run
 
@@ -244,6 +248,27 @@ def test_the_json_has_the_names_of_the_contract(cli: Run) -> None:
     assert of_spring.keys() == {"estimate", "lower", "upper", "identifiable"}
     assert (of_spring["lower"], of_spring["upper"], of_spring["identifiable"]) == (None, None, False)
     assert law["determined"] == ["C/sqrt(m K)"]
+
+
+def test_what_is_determined_has_no_dimension_whether_or_not_its_units_have_a_mass() -> None:
+    """The law depends on A v0^(1/5) (K/m)^(2/5), a time times a power of a stiffness."""
+    key = "kuwabara-kono-1987"
+    config = read_config(
+        {
+            "models": key,
+            "sweep": {"v1": 1.0, "m1": 1.0, "m2": 1.0, "K": {"fit": [1e6, 1e8]}},
+            "model": {key: {"A": {"fit": [1e-7, 1e-3]}}},
+            "data": {"columns": {"e_out": [0.9, 0.9, 0.9]}},
+        },
+        purpose="calibrate",
+    )
+    assert list(config.fits) == ["K", f"{key}.A"]
+    bounds = Bounds(*np.transpose(list(config.fits.values())))
+    points = DataPoints(np.full(3, 1e-2), np.full(3, 1e-4), "given")
+    problem = FitProblem(key, bounds, points)
+    (fit,) = fit_all([problem], {key: lambda rows: np.repeat(rows[:, :1] ** 0.4 * rows[:, 1:], 3, axis=1)})
+    groups = determined_groups(config, find(key), list(config.fits), fit)
+    assert groups == ["(v0^(1/5) K^(2/5) A)/m^(2/5)"]
 
 
 @pytest.mark.slow

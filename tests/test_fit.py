@@ -57,7 +57,12 @@ def centred_line(rows: Array) -> Array:
     return result
 
 
+def pair(rows: Array) -> Array:
+    return np.repeat(rows[:, :1], 2, axis=1)
+
+
 FUNCTIONS = {
+    "pair": pair,
     "zeta": of_zeta,
     "K, C": of_spring_and_dashpot,
     "decay": decay,
@@ -244,6 +249,12 @@ def test_a_robust_loss_resists_an_outlier(loss: str) -> None:
     assert squares.estimate[0] - clean.estimate[0] == pytest.approx(0.025, rel=0.2)
     assert abs(robust.estimate[0] - clean.estimate[0]) < 0.005
     assert robust.lower[0] < 0.7 < robust.upper[0]
+
+
+def test_a_robust_loss_of_two_values_has_the_standard_error_of_their_mean() -> None:
+    """Half their difference, since neither is an outlier."""
+    result = fit("pair", [0.0], [2.0], np.array([0.69, 0.71]), 0.02, loss="huber")
+    np.testing.assert_allclose(np.sqrt(result.covariance), 0.01, rtol=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -219,6 +219,20 @@ def test_small_steps_come_to_the_continuous_law(friction: str, values: dict[str,
     assert errors[1] < min(errors[0], 1e-3)
 
 
+def test_psi1_does_not_depend_on_the_step_and_psi2_is_the_slip_in_its_unit() -> None:
+    config: dict[str, Any] = {
+        "models": HERTZ,
+        "frictions": "lammps-mindlin",
+        "sweep": WALL | INPUTS[HERTZ],
+        "materials": MATERIALS,
+        "output": {"variables": ["psi1", "psi2", "beta"]},
+    }
+    exact = impact.sweep(config)
+    at_step = impact.sweep(config | {"sweep": config["sweep"] | STEP, "solver": {"integrator": "kick-drift"}})
+    assert at_step.psi1.item() == pytest.approx(exact.psi1.item(), rel=1e-12)
+    assert at_step.psi2.item() == pytest.approx(-at_step.beta.item() * at_step.psi1.item(), rel=1e-12)
+
+
 def test_the_restitution_at_a_fixed_step_does_not_depend_on_friction() -> None:
     result = sweep(LINEAR, "cundall-strack-1979", {"k_t": 3e5}, HOOKE | STEP | {"mu": [0.1, 0.5]}, "kick-drift")
     central = impact.sweep(

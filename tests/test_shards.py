@@ -18,7 +18,7 @@ from filelock import FileLock
 
 import impact
 from impact import ImpactError
-from impact.errors import UsageError
+from impact.errors import UnfinishedError, UsageError
 
 from .clusters import content, start_sweep
 from .conftest import PLUGIN, Run, assert_refused
@@ -102,6 +102,22 @@ def test_a_shard_reports_its_blocks_and_the_merge_command_and_is_not_integrated_
         "failed": 0,
     }
     assert {path: path.stat().st_mtime_ns for path in folder.glob("*.work/*.npz")} == before
+
+
+def test_a_request_to_stop_that_comes_late_ends_a_complete_shard_and_a_merge(folder: Path) -> None:
+    shard, output, seen = folder / "results.h5.1-of-1.work", folder / "results.h5", [False]
+    with pytest.raises(UnfinishedError, match=rf"{re.escape(shard.name)} is complete"):
+        run_shards(
+            folder,
+            "1/1",
+            overrides=['models="hertz"', "sweep.e=1.0"],
+            on_progress=lambda progress: seen.append(progress.trajectories == progress.of_trajectories),
+            should_stop=lambda: seen[-1],
+        )
+    with pytest.raises(UnfinishedError):
+        impact.merge([shard], output, should_stop=lambda: seen[-1])
+    assert not output.exists()
+    assert impact.merge([shard], output).summary.points == 2
 
 
 def test_a_missing_shard_is_reported_with_the_command_that_integrates_it(cli: Run, folder: Path) -> None:

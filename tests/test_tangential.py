@@ -265,6 +265,26 @@ def test_works_balance(key: str, form: TangentialForm) -> None:
     np.testing.assert_allclose(result.slip[closed], result.exact[closed], rtol=50 * RTOL)
 
 
+@pytest.mark.parametrize("memory", [0.0, 0.5, 1.0])
+def test_the_energy_left_in_a_spring_that_sticks_to_the_end_is_finite(memory: float) -> None:
+    # the dashpot pulls at x = 0, where the stiffness vanishes and the limit does not
+    form, g0 = spring(0.5, memory=(memory, memory)), np.array([0.05, 0.2])
+    result = simulate("kelvin-voigt", form, g0, C=0.4, mu=5.0, k=1.0, n=1.0)
+    start = M_T * g0 / 5.0
+    loss = 0.5 * (start**2 - result.slip**2) / start**2
+    slip, memory_work, left = (
+        work / start**2 for work in (result.slip_work, result.memory_work, result.elastic_left)
+    )
+    np.testing.assert_allclose(slip + memory_work + left, loss, rtol=0.0, atol=50 * RTOL)
+    if memory == 0.5:
+        # the stiffness changes at a constant energy
+        np.testing.assert_allclose(memory_work, 0.0, rtol=0.0, atol=50 * RTOL)
+        assert (left > 1e-3).all()
+    else:
+        # an energy that vanishes, or grows without bound, with the stiffness is in the memory work
+        np.testing.assert_allclose(left, 0.0, rtol=0.0, atol=1e-6)
+
+
 @pytest.mark.parametrize(("key", "form"), LAWS)
 def test_values_do_not_depend_on_the_batch(key: str, form: TangentialForm) -> None:
     g0, inputs = random_inputs(key, 40, 3)

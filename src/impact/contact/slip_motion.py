@@ -771,9 +771,11 @@ class SlipPhase:
         k = self.rates(near[:N_COMPONENTS], params)
         force = self.local(near, k, params).spring_force
         self.track.force[index] = force
-        # an energy that grows without bound towards x = 0 counts as slip work
-        is_finite = 2.0 * self.track.order[index] > self.form.stiffness_power - ORDER_TOLERANCE
-        is_finite |= (np.abs(columns.mode) != 1.0) | (y[0] > END_S)
+        # an energy that grows without bound towards x = 0 counts as slip work, or as memory work while sticking
+        kept = self.memory * self.form.stiffness_power
+        order = np.where(columns.mode == 0.0, kept, self.track.order[index])
+        is_finite = 2.0 * order > self.form.stiffness_power - ORDER_TOLERANCE
+        is_finite |= (np.abs(columns.mode) == 2.0) | (y[0] > END_S)
         self.track.energy[index] = np.where(is_finite, self._energy(near[0], force, columns), 0.0)
         self.track.add_impulse(index, columns, k[0], y[SLIP_ROW])
 
