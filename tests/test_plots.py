@@ -327,6 +327,21 @@ def test_a_legend_without_room_names_the_number_of_missing_entries(many: xr.Data
     assert more == f"and {many.sizes['model'] + 1 - len(names)} more"
 
 
+@pytest.mark.parametrize(("count", "name"), [(3, "Hunt and Crossley (1975)"), (8, "hunt-crossley-1975")])
+def test_a_legend_takes_at_most_a_fifth_of_the_height_unless_names_are_chosen(
+    many: xr.Dataset, count: int, name: str
+) -> None:
+    options = {"kind": "restitution", "models": many["model"].values[:count].tolist()}
+    figure = impact.plot(many, width="84mm", **options)
+    assert figure.legends[0].get_window_extent().height <= 0.2 * figure.bbox.height
+    assert names_of(figure)[2] == name
+    full = impact.plot(many, width="84mm", legend="full", **options)
+    assert names_of(full)[2] == "Hunt and Crossley (1975)"
+    assert (full.legends[0].get_window_extent().height > 0.2 * full.bbox.height) == (count == 8)
+    # where full names have room, they are the default
+    assert names_of(impact.plot(many, **options))[2] == "Hunt and Crossley (1975)"
+
+
 @pytest.mark.parametrize("size", [(3.0, 3.5), (10.0, 8.0), (4.0, 6.0)])
 def test_a_figure_can_be_resized(plot_data_by_kind: dict[str, CurveData], size: tuple[float, float]) -> None:
     for kind in ("restitution", "history" if size[1] > 4.0 else "loop"):

@@ -36,8 +36,6 @@ BAND_COLOURS = ("#ebf3f8", "#cde2ef")
 PANEL_ASPECT, STACKED_PANEL_ASPECT = 0.56, 0.36
 # the part of a model's colour in a band, on white; and the least distance of labels, as a part of the axis
 BAND_SHADE, LABEL_DISTANCE = 0.22, 0.055
-# from this number of laws on the legend shows keys instead of titles
-MANY_LAWS = 16
 
 
 @dataclass(frozen=True)
@@ -197,8 +195,7 @@ class CurveData:
             axes.set(xscale="log" if panel.x_log else "linear", yscale="log" if panel.y_log else "linear")
             for curve in panel.curves:
                 chosen_name = labels.get(curve.law or "reference")
-                default_name = curve.law if curve.law and len(styles) >= MANY_LAWS else curve.label
-                name = chosen_name or pretty_conditions(default_name)
+                name = chosen_name or pretty_conditions(curve.label)
                 (line,) = axes.plot(curve.x, curve.y, label=f"_{name}", **_line_style(curve, panel, styles))
                 if name:
                     entries.setdefault(name, line)

@@ -50,7 +50,7 @@ def plot_to_files(
     height: float | str | None = None,
     style: str | Path | None = None,
     title: bool = True,
-    legend: str = "full",
+    legend: str | None = None,
     labels: Mapping[str, str] | None = None,
     equations: bool = False,
     frictions: Sequence[str] | None = None,

@@ -50,6 +50,8 @@ class Picture(Figure):
         self.header = [self.text(0.0, 1.0, text, va="top", **style) for text, style in texts if text]
         self.entries: list[tuple[Artist, str]] = []
         self.has_small_legend = False
+        # part of the height; each entry that is left out counts as another height
+        self.legend_share = 0.0
         self.shared: tuple[Text, ...] = ()
         # of an animation, which can show each frame
         self.show_frame: Callable[[int], None] | None = None
@@ -90,6 +92,7 @@ class Picture(Figure):
             more = (Line2D([], [], linestyle=""), f"and {len(entries) - len(shown)} more")
             legend = self.place_legend([*shown, more])
         self.set_size_inches(width, height)
+        self.legend_share = self.legend_height() / self.get_figheight() + len(entries) - len(shown)
 
     def place_legend(self, entries: Sequence[tuple[Artist, str]]) -> float:
         """Put the legend at the bottom in as many columns as fit; returns its height [in]."""
@@ -125,7 +128,7 @@ class Picture(Figure):
 
     def _legend(self, columns: int) -> Legend:
         """Add the legend in a number of columns; names wider than the figure are broken into lines."""
-        style: dict[str, Any] = {"fontsize": "x-small"} if self.has_small_legend else {}
+        style: dict[str, Any] = {"fontsize": "x-small", "labelspacing": 0.3} if self.has_small_legend else {}
         handles, names = zip(*self.entries, strict=True)
         legend = self.legend(
             handles, names, loc="lower center", ncols=columns, borderaxespad=0.3, columnspacing=1.2, **style

@@ -73,7 +73,7 @@ class _Drawing:
         It is narrow, so that its text is legible on a phone.
         """
         # the legend of the closest model depends on the values
-        legend = "full" if is_first or "y" in kind.along else "none"
+        legend = None if is_first or "y" in kind.along else "none"
         picture = draw(plot_data, Look(width="single", title=False, legend=legend))
         # transparent, because the page may be dark
         for background in (picture.patch, *(axes.patch for axes in picture.axes)):
@@ -83,7 +83,7 @@ class _Drawing:
         label = kind.caption if is_first else caption
         return Figure(label, f"Figure {number}. {caption}", source, kind.of_friction, is_first, command)
 
-    def command(self, number: int, kind: Kind, choice: Choice, legend: str) -> str:
+    def command(self, number: int, kind: Kind, choice: Choice, legend: str | None) -> str:
         """Write the command that draws a figure; empty if a model is a Python value."""
         options = {"x": choice.x, "y": choice.y, "variable": choice.variable}
         words = [f"--{name}={value}" for name, value in options.items() if value is not None]
