@@ -373,7 +373,7 @@ def test_a_model_keeps_its_look_where_it_is_free(coarse: xr.Dataset) -> None:
 
 
 def test_the_slice_is_chosen_and_named(wide: xr.Dataset) -> None:
-    assert "v1 = 1 m/s, m1 = 1 kg" in conditions_of(get_curve_data(wide))
+    assert "v1 = 1 m/s, m1 = m2 = 1 kg" in conditions_of(get_curve_data(wide))
     other = get_curve_data(wide, sel={"v1": 2.0, "material2": "hard", "m2": np.inf}, models=["hertz"])
     for part in ("v1 = 2 m/s", "m1 = 3 kg", "material2 = hard"):
         assert part in conditions_of(other)

@@ -155,15 +155,6 @@ def prefixed(value: object, unit: str = "1", digits: int | None = None) -> str:
     return write(value / size) + superscript if unit == "rad" else f"{write(value / size)} {superscript}"
 
 
-def degrees(angle: float) -> str:
-    """Write an angle, given in rad, in degrees.
-
-    >>> degrees(math.pi / 6.0)
-    '30°'
-    """
-    return f"{label(math.degrees(angle))}°"
-
-
 def heading(name: str, of: str = "", unit: str = "1") -> str:
     """Write the heading of a column: a name, the model or ball it belongs to, and its unit in brackets.
 

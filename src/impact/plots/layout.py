@@ -34,6 +34,8 @@ LABEL_SHARE_OF_AXIS = 0.93
 LEGEND_SHARE = 0.5
 # a legend with more entries, or of a larger part of the height of a picture, has smaller letters
 MANY_ENTRIES, LEGEND_PART = 16, 0.2
+# conditions of more lines have smaller letters
+MAX_CONDITION_LINES = 3
 
 
 class Picture(Figure):
@@ -151,6 +153,9 @@ class Picture(Figure):
         down = self.bbox.height - gap
         for text in self.header:
             self.fit(text, self.bbox.width - 2.0 * gap)
+            if text.get_text().count("\n") >= MAX_CONDITION_LINES:
+                text.set_fontsize("x-small")
+                self.fit(text, self.bbox.width - 2.0 * gap)
             text.set_position((gap / self.bbox.width, down / self.bbox.height))
             down -= text.get_window_extent(self.renderer).height + gap
         return float((self.bbox.height - down) / self.dpi)
