@@ -15,6 +15,7 @@ from matplotlib.lines import Line2D
 from ..comparison.verdict import VariableComparison, Verdict
 from ..errors import UsageError
 from ..formatting import number, safe_text
+from ..results.schema import SCHEMA
 from .labels import axis_text, escape_mathtext, number_axis, words_of
 from .layout import Picture
 from .slices import unit_of
@@ -108,9 +109,21 @@ def draw_differences(plot_data: DifferenceData) -> Figure:
         if plot_data.not_shown:
             entries[f"and {plot_data.not_shown} more"] = Line2D([], [], linestyle="")
         figure.add_legend(
-            PANEL_HEIGHT * len(rows), height, [(artist, escape_mathtext(name)) for name, artist in entries.items()]
+            PANEL_HEIGHT * len(rows), height, [(artist, _variable_text(name)) for name, artist in entries.items()]
         )
     return figure
+
+
+def _variable_text(name: str) -> str:
+    r"""Write the meaning and the symbol of a variable of any kind of result, as the axes of pictures do.
+
+    >>> _variable_text("e_out"), _variable_text("and 3 more")
+    ('Restitution that the model delivers $e_\\mathrm{out}$', 'and 3 more')
+    """
+    known = next((variables[name] for variables in SCHEMA.values() if name in variables), None)
+    return (
+        axis_text(words_of({"long_name": known.meaning}, name), name, "", {}) if known else escape_mathtext(name)
+    )
 
 
 def _arrange_panels(panels: Sequence[DifferencePanel]) -> list[tuple[DifferencePanel, ...]]:
