@@ -79,7 +79,7 @@ def plot(
     legend : name laws by title, year and parameters ("full"), by first author and year ("short"), or by key
         ("keys"); "none" for no legend; by default the first of these with which it takes at most a fifth of the
         height
-    decimal : "point" or "comma", in all numbers
+    decimal : "point" or "comma", in all numbers; "locale" for that of LC_NUMERIC
     labels : texts by the name of an axis, of a variable whose name is at the end of its curve, the key of a law,
         "reference" or "title"
     equations : name the laws with the numbers of their equations in the paper

@@ -13,7 +13,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..display import check_decimal
+from ..display import resolve_decimal
 from ..errors import UsageError, did_you_mean
 from ..formatting import argument
 
@@ -93,7 +93,7 @@ class Look:
         _ = self.size
         if self.legend not in (None, *LEGENDS):
             raise UsageError(f"{argument('legend')}: got {self.legend}, expected {', '.join(LEGENDS)}")
-        check_decimal(self.decimal)
+        object.__setattr__(self, "decimal", resolve_decimal(self.decimal))
 
     @property
     def size(self) -> tuple[float | None, float | None]:
