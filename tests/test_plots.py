@@ -19,6 +19,7 @@ import pandas as pd
 import pytest
 import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
@@ -558,6 +559,19 @@ def test_the_style_of_the_user_is_respected(coarse: xr.Dataset, tmp_path: Path) 
     sheet.write_bytes(b"font.size: \xff\n")
     with pytest.raises(UsageError, match="cannot be read"):
         impact.plot(coarse, style=sheet)
+
+
+@pytest.mark.parametrize("kind", ["final-velocities", "error", "impulse", "animation"])
+def test_every_line_and_text_follows_the_colours_of_a_style(coarse: xr.Dataset, kind: str) -> None:
+    """On black nothing is black, and what was white is: the inside of markers."""
+    figure = impact.plot(coarse, kind=kind, sel=selection_of(kind), style="dark_background")
+    figure.set_size_inches(8.0, 8.0)
+    lines = [line for axes in figure.axes for line in (*axes.lines, *axes.get_xgridlines())]
+    for artist in (*lines, *figure.findobj(Text)):
+        assert max(to_rgb(artist.get_color())) >= 0.099, artist
+    for line in (line for axes in figure.axes for line in axes.lines if line.get_marker() not in ("None", "o")):
+        assert to_rgb(line.get_markerfacecolor()) == (0.0, 0.0, 0.0)
+    assert max(to_rgb(figure.axes[-1].get_xgridlines()[0].get_color())) == pytest.approx(0.1)
 
 
 def test_labels_titles_and_sizes_are_chosen(coarse: xr.Dataset) -> None:

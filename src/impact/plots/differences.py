@@ -19,7 +19,7 @@ from ..results.schema import SCHEMA
 from .labels import axis_text, escape_mathtext, number_axis, words_of
 from .layout import Picture
 from .slices import unit_of
-from .style import COLOURS, MARKERS, default_size, is_geometric, styled
+from .style import COLOURS, MARKERS, SOFT, default_size, is_geometric, styled, tint
 
 # height of a row of panels [in]
 PANEL_HEIGHT = 2.3
@@ -148,7 +148,7 @@ def _draw_panel(
     axes: Axes, panel: DifferencePanel, names: list[str], ends: tuple[float, float]
 ) -> dict[str, Artist]:
     bottom, top = ends
-    axes.axhspan(1.0, top, color="#fbf1eb", linewidth=0, zorder=0.5)
+    axes.axhspan(1.0, top, color=tint(0.08, "#D55E00"), linewidth=0, zorder=0.5)
     _draw_limit(axes, 1.0, "tolerance", linewidth=1.0)
     x = np.asarray(panel.values, float)
     # symbols of equal differences beside each other, where there is room between names
@@ -160,7 +160,7 @@ def _draw_panel(
         style: dict[str, Any] = {
             "color": COLOURS[index % len(COLOURS)],
             "marker": MARKERS[index % len(MARKERS)],
-            "markerfacecolor": "white",
+            "markerfacecolor": tint(0.0),
             "markersize": 4.5 if len(x) <= MANY_POINTS else 2.5,
         }
         counted = np.where(np.isfinite(ratio) & (ratio > 0.0), np.maximum(ratio, bottom), np.nan)
@@ -191,7 +191,7 @@ def _draw_panel(
 
 
 def _draw_limit(axes: Axes, height: float, name: str, **style: Any) -> None:
-    axes.axhline(height, color="black", **style)
+    axes.axhline(height, color=tint(1.0), **style)
     axes.annotate(
         name,
         (1.0, height),
@@ -201,7 +201,7 @@ def _draw_limit(axes: Axes, height: float, name: str, **style: Any) -> None:
         ha="right",
         va="top",
         fontsize="x-small",
-        color="#555555",
+        color=tint(SOFT),
     )
 
 

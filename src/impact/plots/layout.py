@@ -17,7 +17,7 @@ from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
 
-from .style import encoded
+from .style import SOFT, encoded, tint
 
 # space between the parts of a picture, and at its edges
 GAP_INCHES = 0.05
@@ -46,7 +46,7 @@ class Picture(Figure):
         FigureCanvasAgg(self)
         styles: tuple[dict[str, Any], ...] = (
             {"fontweight": "bold", "fontsize": "large"},
-            {"fontsize": "small", "color": "#555555"},
+            {"fontsize": "small", "color": tint(SOFT)},
         )
         texts = zip((title, conditions), styles, strict=True)
         self.header = [self.text(0.0, 1.0, text, va="top", **style) for text, style in texts if text]
@@ -60,7 +60,9 @@ class Picture(Figure):
         self.frame_count = 0
         # a later change of the size makes the legend again, in the present style
         self.style = {
-            key: value for key, value in matplotlib.rcParams.items() if key.startswith(("legend", "font"))
+            key: value
+            for key, value in matplotlib.rcParams.items()
+            if key.startswith(("legend", "font", "text.color"))
         }
         # texts that were broken into lines: original text and present text
         self.fitted: dict[Text, tuple[str, str]] = {}
