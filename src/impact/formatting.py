@@ -29,6 +29,7 @@ OPTIONS = {
     "overrides": "set",
     "parameter": "for",
     "plugins": "plugin",
+    "sections": "section",
 }
 _is_command_line = False
 

@@ -64,6 +64,7 @@ class _Drawing:
     keys: Sequence[str]
     plugins: Sequence[ForceModel | str | Path]
     name: str
+    model_count: int  # of the result in the file
 
     def figure(
         self, number: int, kind: Kind, choice: Choice, caption: str, plot_data: PlotData, *, is_first: bool = False
@@ -91,7 +92,7 @@ class _Drawing:
             f"--sel={name}={value!r}" if isinstance(value, float) else f"--sel={name}={value}"
             for name, value in (choice.sel or {}).items()
         ]
-        if choice.models and len(choice.models) < self.dataset.sizes["model"]:
+        if choice.models and len(choice.models) < self.model_count:
             words += [f"--model={key}" for key in choice.models]
         words += [f"--friction={key}" for key in choice.frictions or ()]
         words += ["--legend=none"] if legend == "none" else []
@@ -121,10 +122,17 @@ class _Drawing:
 
 
 def figures_of(
-    dataset: xr.Dataset, keys: Sequence[str], plugins: Sequence[ForceModel | str | Path], name: str = ""
+    dataset: xr.Dataset,
+    keys: Sequence[str],
+    plugins: Sequence[ForceModel | str | Path],
+    name: str,
+    model_count: int,
 ) -> tuple[list[Figure], list[str]]:
-    """Draw the figures of a result, whose file has a name; also returns a sentence for each that is left out."""
-    drawing, figures, left_out = _Drawing(dataset, keys, plugins, name), list[Figure](), list[str]()
+    """Draw the figures of a result, or of some models of its `model_count`, whose file has a name.
+
+    Also returns a sentence for each that is left out.
+    """
+    drawing, figures, left_out = _Drawing(dataset, keys, plugins, name, model_count), list[Figure](), list[str]()
     choices = list(iterate_choices(dataset, keys))
     # numbered as they stand on the page: those of friction have a section of their own
     for of_friction in (False, True):
