@@ -26,6 +26,7 @@ import impact
 from impact.atomic import atomic_write
 from impact.cli.main import app
 from impact.errors import ResultError, StoreError, UsageError
+from impact.plots.differences import difference_data, draw_differences
 from impact.results.xarray_backend import write_sealed
 
 from .conftest import CHI, PLUGIN, ROOT, WIDE, full_disk
@@ -378,6 +379,16 @@ def test_malicious_strings_are_escaped_in_every_format(forked: ForkServer, tmp_p
 
 
 # pictures
+
+
+def test_a_picture_of_differences_names_variables_as_axes_do(wide: xr.Dataset) -> None:
+    moved = wide.assign(v1_post=wide["v1_post"] + 1e-6, e_out=wide["e_out"] + 1e-6)
+    figure = draw_differences(difference_data(impact.compare(moved, wide)))
+    names = {text.get_text() for text in figure.legends[0].get_texts()}
+    assert names == {
+        "Velocity of ball 1 after the impact $v_1^+$",
+        r"Restitution that the model delivers $e_\mathrm{out}$",
+    }
 
 
 @pytest.mark.slow

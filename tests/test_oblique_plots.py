@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -190,6 +192,28 @@ def test_angles_are_in_degrees_and_texts_do_not_overlap(beads: xr.Dataset, kind:
     assert [axes.xaxis.get_major_formatter()(tick) for tick in ticks] == ["0", "15", "30", "45", "60", "75"]
     # guides are not in the legend
     assert len(names_of(figure)) == 6
+
+
+@pytest.mark.parametrize("config", ["configs/oblique.toml", "docs/spin.toml"])
+def test_conditions_of_84_mm_have_three_lines(config: str) -> None:
+    result = impact.sweep(config, overrides=['sweep.angle={ linspace = ["20 deg", "85 deg", 3] }'])
+    shown = impact.plot(result, kind="beta", width="84mm")
+    _, conditions = shown.texts
+    shown.canvas.draw()
+    assert conditions.get_text().count("\n") == 2
+    # no input without a value, and ball 2 is named as a wall by its mass
+    assert "–" not in conditions.get_text()
+    assert {"$m_2$", "∞"} <= set(re.split(r"[\s,=]+", conditions.get_text()))
+
+
+def test_more_conditions_have_smaller_letters(beads: xr.Dataset) -> None:
+    plot_data = curves_of(beads, "beta")
+    texts = [
+        draw(replace(plot_data, conditions=conditions), Look(width="84mm")).texts[1]
+        for conditions in ("e = 0.5", ", ".join(["e = 0.5"] * 30))
+    ]
+    short, long = (text.get_fontsize() for text in texts)
+    assert long < short
 
 
 def test_friction_laws_are_selected_as_models_are(

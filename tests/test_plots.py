@@ -19,6 +19,7 @@ import pandas as pd
 import pytest
 import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
@@ -327,6 +328,21 @@ def test_a_legend_without_room_names_the_number_of_missing_entries(many: xr.Data
     assert more == f"and {many.sizes['model'] + 1 - len(names)} more"
 
 
+@pytest.mark.parametrize(("count", "name"), [(3, "Hunt and Crossley (1975)"), (8, "hunt-crossley-1975")])
+def test_a_legend_takes_at_most_a_fifth_of_the_height_unless_names_are_chosen(
+    many: xr.Dataset, count: int, name: str
+) -> None:
+    options = {"kind": "restitution", "models": many["model"].values[:count].tolist()}
+    figure = impact.plot(many, width="84mm", **options)
+    assert figure.legends[0].get_window_extent().height <= 0.2 * figure.bbox.height
+    assert names_of(figure)[2] == name
+    full = impact.plot(many, width="84mm", legend="full", **options)
+    assert names_of(full)[2] == "Hunt and Crossley (1975)"
+    assert (full.legends[0].get_window_extent().height > 0.2 * full.bbox.height) == (count == 8)
+    # where full names have room, they are the default
+    assert names_of(impact.plot(many, **options))[2] == "Hunt and Crossley (1975)"
+
+
 @pytest.mark.parametrize("size", [(3.0, 3.5), (10.0, 8.0), (4.0, 6.0)])
 def test_a_figure_can_be_resized(plot_data_by_kind: dict[str, CurveData], size: tuple[float, float]) -> None:
     for kind in ("restitution", "history" if size[1] > 4.0 else "loop"):
@@ -358,7 +374,7 @@ def test_a_model_keeps_its_look_where_it_is_free(coarse: xr.Dataset) -> None:
 
 
 def test_the_slice_is_chosen_and_named(wide: xr.Dataset) -> None:
-    assert "v1 = 1 m/s, m1 = 1 kg" in conditions_of(get_curve_data(wide))
+    assert "v1 = 1 m/s, m1 = m2 = 1 kg" in conditions_of(get_curve_data(wide))
     other = get_curve_data(wide, sel={"v1": 2.0, "material2": "hard", "m2": np.inf}, models=["hertz"])
     for part in ("v1 = 2 m/s", "m1 = 3 kg", "material2 = hard"):
         assert part in conditions_of(other)
@@ -543,6 +559,19 @@ def test_the_style_of_the_user_is_respected(coarse: xr.Dataset, tmp_path: Path) 
     sheet.write_bytes(b"font.size: \xff\n")
     with pytest.raises(UsageError, match="cannot be read"):
         impact.plot(coarse, style=sheet)
+
+
+@pytest.mark.parametrize("kind", ["final-velocities", "error", "impulse", "animation"])
+def test_every_line_and_text_follows_the_colours_of_a_style(coarse: xr.Dataset, kind: str) -> None:
+    """On black nothing is black, and what was white is: the inside of markers."""
+    figure = impact.plot(coarse, kind=kind, sel=selection_of(kind), style="dark_background")
+    figure.set_size_inches(8.0, 8.0)
+    lines = [line for axes in figure.axes for line in (*axes.lines, *axes.get_xgridlines())]
+    for artist in (*lines, *figure.findobj(Text)):
+        assert max(to_rgb(artist.get_color())) >= 0.099, artist
+    for line in (line for axes in figure.axes for line in axes.lines if line.get_marker() not in ("None", "o")):
+        assert to_rgb(line.get_markerfacecolor()) == (0.0, 0.0, 0.0)
+    assert max(to_rgb(figure.axes[-1].get_xgridlines()[0].get_color())) == pytest.approx(0.1)
 
 
 def test_labels_titles_and_sizes_are_chosen(coarse: xr.Dataset) -> None:

@@ -152,6 +152,29 @@ def test_every_page_is_well_formed_and_has_its_sections_in_order(pages: dict[str
         assert POLICY.startswith("default-src 'none'; style-src 'unsafe-inline'; img-src data:;")
 
 
+def test_models_and_sections_of_a_page_are_chosen(cli: Run, tmp_path: Path, figure6: xr.Dataset) -> None:
+    impact.save(figure6, tmp_path / "r.h5")
+    words = ["--model", "gharib-hurmuzlu-2012", "--section", "figures", "--section", "commands", "-o", "a.html"]
+    done = cli("report", "r.h5", *words, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    text = (tmp_path / "a.html").read_text(encoding="utf-8")
+    assert re.findall('<h2 id="(.*?)">', text) == ["figures", "commands"]
+    assert re.findall('<a href="#(.*?)">', text) == ["figures", "commands"]
+    assert "this page shows 1 of the 3 models of the result" in text
+    # the file has the other models too
+    commands = re.findall("<code>(impact plot .*?)</code>", text)
+    assert commands
+    assert all("--model=gharib-hurmuzlu-2012" in command for command in commands if "kind=loop" not in command)
+    for wrong, message in (
+        (["--section", "figurs"], '--section: no section "figurs"; did you mean "figures"?'),
+        (["--model", "gharib-hurmuzlu-2013"], 'no model "gharib-hurmuzlu-2013" in this result; did you mean'),
+    ):
+        done = cli("report", "r.h5", *wrong, "-o", "b.html", cwd=tmp_path)
+        assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+        assert message in done.stderr
+    assert not (tmp_path / "b.html").exists()
+
+
 def test_a_page_loads_nothing(pages: dict[str, str]) -> None:
     for text in pages.values():
         for name, attributes in ParsedPage(text).elements:

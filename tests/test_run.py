@@ -155,6 +155,19 @@ def test_limits_of_restitutions_impulses_and_works_at_e_0(key: str) -> None:
         assert collision.derived["rebound_speed_bound"] == 0.0
 
 
+def test_rounding_is_printed_as_zero_and_stored_as_it_is() -> None:
+    shot = impact.run(at={"e": 0.5})
+    rows = {name: text.partition("  ")[0] for name, text in shot.rows().items()}
+    for name, shown in (("v1_error", "0 m/s"), ("v2_error", "0 m/s"), ("e_error", "0")):
+        assert 0.0 < abs(shot.as_dict()["outputs"][name]) < 1e-9
+        assert rows[name] == shown
+    # a velocity that is as small, but as large as the speed of the impact
+    slow = impact.run(at={"e": 0.5, "v1": 1e-11})
+    assert slow.rows()["v1_post"].startswith("2.5 pm/s")
+    # accuracy follows the tolerance: the error of this law is larger
+    assert not impact.run(model="gharib-hurmuzlu-2012").rows()["v1_error"].startswith("0 m/s")
+
+
 def test_text_and_json_have_the_same_names(cli: Run) -> None:
     arguments = ("run", "--model", "gharib-hurmuzlu-2012", "--at", "e=0.2")
     text = cli(*arguments).stdout

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import locale
 import math
 import re
+import sys
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -14,6 +16,7 @@ import impact
 from impact.display import TableForm, encode_frame
 from impact.errors import UsageError
 from impact.plots.data import read_points
+from impact.plots.kinds import Look
 
 from .conftest import ROOT, Run
 
@@ -82,10 +85,27 @@ def test_all_numbers_of_a_picture_have_the_comma(stored: Path) -> None:
     assert any("1,5" in text for text in texts)
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="the locale is not that of the environment")
+def test_the_locale_chooses_the_decimal_separator_and_is_not_changed(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, decimal in (("C", "point"), ("no_SUCH.locale", "point"), ("de_DE.utf8", "comma")):
+        monkeypatch.setenv("LC_ALL", name)
+        before = locale.setlocale(locale.LC_NUMERIC)
+        if decimal == "comma":
+            try:
+                locale.setlocale(locale.LC_NUMERIC, name)
+            except locale.Error:
+                pytest.skip(f"the locale {name} is not installed")
+            locale.setlocale(locale.LC_NUMERIC, before)
+        assert (TableForm(decimal="locale").decimal, Look(decimal="locale").decimal) == (decimal, decimal)
+        assert locale.setlocale(locale.LC_NUMERIC) == before
+        # a point is the default in every locale
+        assert TableForm().decimal == "point"
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["--decimal", "dot"], "--decimal: got dot, expected point or comma"),
+        (["--decimal", "dot"], "--decimal: got dot, expected point, comma or locale"),
         (["--rows", "1"], "--rows: got 1, expected a whole number >= 2"),
         (["-o", "a.txt"], "--output a.txt: expected a name that ends in .csv, .tex or .parquet"),
         # not ignored in silence

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import io
 import json
+import locale
 import re
 import sys
 from abc import abstractmethod
@@ -116,7 +117,7 @@ class TableForm:
     ----------
     rows : at most this number of rows, evenly spread from the first to the last; by default all
     digits : significant digits; by default all, in .tex six
-    decimal : "point", or "comma" with columns that are separated by semicolons
+    decimal : "point", "comma" with columns that are separated by semicolons, or "locale" for that of LC_NUMERIC
     """
 
     rows: int | None = None
@@ -127,7 +128,7 @@ class TableForm:
         for name, value, least in (("rows", self.rows, 2), ("digits", self.digits, 1)):
             if value is not None and value < least:
                 raise UsageError(f"{argument(name)}: got {value}, expected a whole number >= {least}")
-        check_decimal(self.decimal)
+        object.__setattr__(self, "decimal", resolve_decimal(self.decimal))
 
     def check_used(self, path: Path | None, name: str) -> None:
         """Refuse what is set where the argument of a name writes no table."""
@@ -139,10 +140,21 @@ class TableForm:
                 raise UsageError(f"{argument(field.name)}: set without a table, expected {table}")
 
 
-def check_decimal(decimal: str) -> None:
-    """Raise a UsageError unless a decimal separator is known."""
-    if decimal not in DECIMALS:
-        raise UsageError(f"{argument('decimal')}: got {decimal}, expected {' or '.join(DECIMALS)}")
+def resolve_decimal(decimal: str) -> str:
+    """Check the name of a decimal separator; "locale" is that of LC_NUMERIC, of the process or the environment."""
+    if decimal in DECIMALS:
+        return decimal
+    if decimal != "locale":
+        raise UsageError(f"{argument('decimal')}: got {decimal}, expected {', '.join(DECIMALS)} or locale")
+    before = locale.setlocale(locale.LC_NUMERIC)
+    try:
+        # a process has the locale of its environment only if it asks for it
+        locale.setlocale(locale.LC_NUMERIC, "" if before == "C" else before)
+        return "comma" if locale.localeconv()["decimal_point"] == "," else "point"
+    except locale.Error:
+        return "point"
+    finally:
+        locale.setlocale(locale.LC_NUMERIC, before)
 
 
 def check_table(path: Path, name: str) -> None:

@@ -29,6 +29,7 @@ OPTIONS = {
     "overrides": "set",
     "parameter": "for",
     "plugins": "plugin",
+    "sections": "section",
 }
 _is_command_line = False
 
@@ -153,15 +154,6 @@ def prefixed(value: object, unit: str = "1", digits: int | None = None) -> str:
     size, shown = scaled_unit(unit, abs(value))
     superscript = re.sub(r"\^(-?\d+)(?![\d.])", lambda power: power[1].translate(SUPERSCRIPTS), shown)
     return write(value / size) + superscript if unit == "rad" else f"{write(value / size)} {superscript}"
-
-
-def degrees(angle: float) -> str:
-    """Write an angle, given in rad, in degrees.
-
-    >>> degrees(math.pi / 6.0)
-    '30°'
-    """
-    return f"{label(math.degrees(angle))}°"
 
 
 def heading(name: str, of: str = "", unit: str = "1") -> str:

@@ -75,7 +75,7 @@ DigitsOption = Annotated[
 ]
 DecimalOption = Annotated[
     str,
-    typer.Option("--decimal", metavar="NAME", help="point, or comma: then semicolons separate columns."),
+    typer.Option("--decimal", metavar="NAME", help="point, comma (semicolons separate columns) or locale."),
 ]
 TableOption = Annotated[
     Path | None,

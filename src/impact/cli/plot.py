@@ -112,9 +112,14 @@ def plot(
     ] = None,
     no_title: Annotated[bool, typer.Option("--no-title", help="Omit the title and the conditions.")] = False,
     legend: Annotated[
-        str,
-        typer.Option("--legend", metavar="NAMES", help="Name laws in full, short or by keys; none: no legend."),
-    ] = "full",
+        str | None,
+        typer.Option(
+            "--legend",
+            metavar="NAMES",
+            help="Name laws in full, short or by keys; none: no legend. \\[default: full, short or keys, the "
+            "first that takes at most a fifth of the height]",
+        ),
+    ] = None,
     label: Annotated[
         list[str] | None,
         typer.Option(

@@ -10,7 +10,7 @@ import typer
 import impact
 
 from . import exits
-from .options import OverwriteOption, PluginOption
+from .options import ModelOption, OverwriteOption, PluginOption
 
 
 def report(
@@ -20,6 +20,15 @@ def report(
     ] = None,
     overwrite: OverwriteOption = False,
     plugin: PluginOption = None,
+    model: ModelOption = None,
+    section: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--section",
+            metavar="NAME",
+            help="Only this section, such as figures, answer, friction or models; may be repeated.",
+        ),
+    ] = None,
 ) -> None:
     """Write a report: one HTML page with the swept inputs, the ranking, figures, failed points and the config.
 
@@ -27,7 +36,9 @@ def report(
     """
 
     output = output or result.with_suffix(".html")
-    page = impact.report(result, output=output, overwrite=overwrite, plugins=plugin or ())
+    page = impact.report(
+        result, output=output, overwrite=overwrite, plugins=plugin or (), models=model, sections=section
+    )
     figures = page.count("<figure")
     size = f"{len(page.encode()) / 1000:,.0f} kB"
     exits.print_line(f"{output}: {figures} figure{'' if figures == 1 else 's'}, {size}")

@@ -13,13 +13,12 @@ from ..contact.variables import OUTPUTS
 from ..errors import ResultError, UsageError, did_you_mean
 from ..formatting import argument
 from ..results.attributes import read_attribute
+from ..results.schema import DEFAULT_RTOL_FACTOR
 
 Tolerances = Mapping[str, float]
 
 # name of the tolerance for variables that have none of their own
 ALL_VARIABLES = "all"
-# the default tolerance is this many times the solver's rtol
-DEFAULT_RTOL_FACTOR = 10.0
 # ten times the relative accuracy of the ends of profile intervals
 CALIBRATION_TOLERANCE = 1e-5
 TOLERANCE_VARIABLES = [name for name, variable in OUTPUTS.items() if variable.has_tolerance]

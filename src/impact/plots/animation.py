@@ -21,6 +21,7 @@ from .kinds import Choice, Kind
 from .labels import label_axis
 from .layout import Picture
 from .motions import choose_point, curves_over, impact_inputs
+from .style import tint
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -72,9 +73,9 @@ class AnimationData(CurveData):
         for axes, panel in zip(curve_axes, self.panels, strict=True):
             entries = CurveData(self.title, self.conditions, (panel,)).draw([axes], labels, None)
             (line,) = axes.lines
-            axes.plot(line.get_xdata(), line.get_ydata(), color="#c8c8c8", linewidth=0.8, zorder=1.0, label="_")
+            axes.plot(line.get_xdata(), line.get_ydata(), color=tint(0.22), linewidth=0.8, zorder=1.0, label="_")
             lines.append(line)
-            dots += axes.plot([], [], "o", color="black", markersize=5.0, zorder=4.0, label="_")
+            dots += axes.plot([], [], "o", color=tint(1.0), markersize=5.0, zorder=4.0, label="_")
         balls = self._draw_balls(scene, labels)
         show = partial(self.show_frame, balls=balls, lines=lines, dots=dots)
         show(len(self.frames) - 1)

@@ -12,7 +12,6 @@ import numpy as np
 import pandas as pd
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
@@ -25,19 +24,17 @@ from .data import MEASURED, Points
 from .kinds import Choice
 from .labels import label_axis, pretty_conditions, symbol, words_of
 from .slices import unit_of
-from .style import is_geometric, law_key, model_styles
+from .style import FAINT, SOFT, is_geometric, law_key, model_styles, tint
 
 if TYPE_CHECKING:
     import xarray as xr
 
-# colours of the distances from zero that are shaded, the widest first
-BAND_COLOURS = ("#ebf3f8", "#cde2ef")
+# the colour of distances from zero, and its shares in those that are shaded, the widest first, and in lines
+BAND_COLOUR, BAND_SHARES, BAND_LINE_SHARE = "#0072B2", (0.08, 0.2), 0.65
 # height of a panel over the width of the picture: of a single panel, and of several below each other
 PANEL_ASPECT, STACKED_PANEL_ASPECT = 0.56, 0.36
-# the part of a model's colour in a band, on white; and the least distance of labels, as a part of the axis
+# the part of a model's colour in a band; and the least distance of labels, as a part of the axis
 BAND_SHADE, LABEL_DISTANCE = 0.22, 0.055
-# from this number of laws on the legend shows keys instead of titles
-MANY_LAWS = 16
 
 
 @dataclass(frozen=True)
@@ -197,8 +194,7 @@ class CurveData:
             axes.set(xscale="log" if panel.x_log else "linear", yscale="log" if panel.y_log else "linear")
             for curve in panel.curves:
                 chosen_name = labels.get(curve.law or "reference")
-                default_name = curve.law if curve.law and len(styles) >= MANY_LAWS else curve.label
-                name = chosen_name or pretty_conditions(default_name)
+                name = chosen_name or pretty_conditions(curve.label)
                 (line,) = axes.plot(curve.x, curve.y, label=f"_{name}", **_line_style(curve, panel, styles))
                 if name:
                     entries.setdefault(name, line)
@@ -264,14 +260,14 @@ def _draw_points(axes: Axes, panel: Panel, points: Points) -> dict[str, Artist]:
             points.columns[panel.x_name],
             points.columns[name],
             points.columns.get(f"{SIGMA}_{name}", points.columns.get(SIGMA)),
-            color="black",
+            color=tint(1.0),
             zorder=3,
             marker="o",
             markersize=4.0,
             linestyle="none",
             elinewidth=0.9,
             capsize=2.0,
-            markerfacecolor="black" if index == 0 else "white",
+            markerfacecolor=tint(1.0 if index == 0 else 0.0),
         )
         artists[MEASURED if len(shown) == 1 else f"{MEASURED} {name}"] = bars[0]
     return artists
@@ -282,27 +278,27 @@ def _line_style(curve: Curve, panel: Panel, styles: Mapping[str, Mapping[str, An
     points = len(curve.x)
     scattered: dict[str, Any] = {} if panel.joined else {"linestyle": "none"}
     if curve.is_guide:
-        return {"color": "#555555", "linewidth": 0.7, "linestyle": (0, (5, 2)), "zorder": 1.4, **scattered}
+        return {"color": tint(SOFT), "linewidth": 0.7, "linestyle": (0, (5, 2)), "zorder": 1.4, **scattered}
     if curve.model is None:
         # without a line it is a disc, larger than the markers of the models
         disc = {"marker": "o", "markersize": 9.0, "alpha": None} if points == 1 or scattered else {}
-        return {"color": "black" if not disc else "#c0c0c0", "linewidth": 2.0, "zorder": 1.5, **disc, **scattered}
+        return {"color": tint(0.25 if disc else 1.0), "linewidth": 2.0, "zorder": 1.5, **disc, **scattered}
     style = {key: value for key, value in styles[curve.law].items() if key != "hatch"}
     # the markers of different models are at different points, so that equal curves show both
     every = 1 if scattered else max(1, points // 12)
     start = list(styles).index(curve.law) * every // max(1, len(styles)) % every
-    return {**style, "markevery": (start, every), "markerfacecolor": "white", **scattered}
+    return {**style, "markevery": (start, every), "markerfacecolor": tint(0.0), **scattered}
 
 
 def _draw_band(axes: Axes, curve: Curve, line: Line2D) -> Artist:
     """Draw the band of a curve, opaque for formats without transparency; returns its symbol in a legend."""
-    colour = to_rgb(line.get_color())
-    shade = tuple(1.0 - BAND_SHADE * (1.0 - part) for part in colour)
+    colour = str(line.get_color())
+    shade = tint(BAND_SHADE, colour)
     axes.fill_between(curve.x, curve.least, curve.largest, color=shade, linewidth=0.0, zorder=0.8)
     # the edges are above the bands of other curves
     for edge in (curve.least, curve.largest):
         axes.plot(curve.x, edge, color=colour, linewidth=0.5, label="_", zorder=1.3)
-    return Patch(facecolor="#dddddd", edgecolor="#777777", linewidth=0.5)
+    return Patch(facecolor=tint(2 / 15), edgecolor=tint(FAINT), linewidth=0.5)
 
 
 def _label_guides(axes: Axes, guides: Sequence[Curve]) -> None:
@@ -319,20 +315,20 @@ def _label_guides(axes: Axes, guides: Sequence[Curve]) -> None:
             textcoords="offset points",
             va="center",
             fontsize="small",
-            color="#555555",
+            color=tint(SOFT),
             annotation_clip=False,
         )
 
 
 def _draw_bands(axes: Axes, panel: Panel) -> None:
     """Shade the distances from zero, or draw lines at them on a logarithmic axis."""
-    for band, colour in zip(panel.bands, BAND_COLOURS, strict=False):
+    for band, share in zip(panel.bands, BAND_SHARES, strict=False):
         if panel.y_log:
             # above the line of the grid, which may be at the same value
-            axes.axhline(band, color="#5a9cc5", linewidth=0.8, zorder=0.6)
+            axes.axhline(band, color=tint(BAND_LINE_SHARE, BAND_COLOUR), linewidth=0.8, zorder=0.6)
         else:
-            axes.axhspan(-band, band, color=colour, linewidth=0, zorder=0.5)
-            axes.axhline(0.0, color="#777777", linewidth=0.7, zorder=0.6)
+            axes.axhspan(-band, band, color=tint(share, BAND_COLOUR), linewidth=0, zorder=0.5)
+            axes.axhline(0.0, color=tint(FAINT), linewidth=0.7, zorder=0.6)
 
 
 def _label_bands(axes: Axes, panel: Panel) -> None:
@@ -350,7 +346,7 @@ def _label_bands(axes: Axes, panel: Panel) -> None:
             ha="left",
             va="top" if is_below else "bottom",
             fontsize="x-small",
-            color="#0072B2",
+            color=BAND_COLOUR,
             annotation_clip=False,
         )
 
@@ -370,10 +366,10 @@ def _draw_mark(axes: Axes, mark: Mark) -> None:
     """Draw a point, a dashed line from it to its axis, and its name at the foot of the line."""
     low = axes.get_xlim()[0] if mark.along == "y" else axes.get_ylim()[0]
     foot = (mark.x, low) if mark.along == "x" else (low, mark.y)
-    dashes: dict[str, Any] = {"color": "#777777", "linewidth": 0.8, "linestyle": (0, (4, 2)), "zorder": 1.2}
+    dashes: dict[str, Any] = {"color": tint(FAINT), "linewidth": 0.8, "linestyle": (0, (4, 2)), "zorder": 1.2}
     limits = axes.get_xlim(), axes.get_ylim()
     axes.plot((mark.x, foot[0]), (mark.y, foot[1]), label="_", **dashes)
-    axes.plot([mark.x], [mark.y], "o", color="black", markersize=3.5, label="_", zorder=3)
+    axes.plot([mark.x], [mark.y], "o", color=tint(1.0), markersize=3.5, label="_", zorder=3)
     axes.set(xlim=limits[0], ylim=limits[1])
     axes.annotate(
         symbol(mark.label), foot, (4, 3), textcoords="offset points", fontsize="large", va="bottom", ha="left"

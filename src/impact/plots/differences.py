@@ -15,10 +15,11 @@ from matplotlib.lines import Line2D
 from ..comparison.verdict import VariableComparison, Verdict
 from ..errors import UsageError
 from ..formatting import number, safe_text
+from ..results.schema import SCHEMA
 from .labels import axis_text, escape_mathtext, number_axis, words_of
 from .layout import Picture
 from .slices import unit_of
-from .style import COLOURS, MARKERS, default_size, is_geometric, styled
+from .style import COLOURS, MARKERS, SOFT, default_size, is_geometric, styled, tint
 
 # height of a row of panels [in]
 PANEL_HEIGHT = 2.3
@@ -108,9 +109,21 @@ def draw_differences(plot_data: DifferenceData) -> Figure:
         if plot_data.not_shown:
             entries[f"and {plot_data.not_shown} more"] = Line2D([], [], linestyle="")
         figure.add_legend(
-            PANEL_HEIGHT * len(rows), height, [(artist, escape_mathtext(name)) for name, artist in entries.items()]
+            PANEL_HEIGHT * len(rows), height, [(artist, _variable_text(name)) for name, artist in entries.items()]
         )
     return figure
+
+
+def _variable_text(name: str) -> str:
+    r"""Write the meaning and the symbol of a variable of any kind of result, as the axes of pictures do.
+
+    >>> _variable_text("e_out"), _variable_text("and 3 more")
+    ('Restitution that the model delivers $e_\\mathrm{out}$', 'and 3 more')
+    """
+    known = next((variables[name] for variables in SCHEMA.values() if name in variables), None)
+    return (
+        axis_text(words_of({"long_name": known.meaning}, name), name, "", {}) if known else escape_mathtext(name)
+    )
 
 
 def _arrange_panels(panels: Sequence[DifferencePanel]) -> list[tuple[DifferencePanel, ...]]:
@@ -135,7 +148,7 @@ def _draw_panel(
     axes: Axes, panel: DifferencePanel, names: list[str], ends: tuple[float, float]
 ) -> dict[str, Artist]:
     bottom, top = ends
-    axes.axhspan(1.0, top, color="#fbf1eb", linewidth=0, zorder=0.5)
+    axes.axhspan(1.0, top, color=tint(0.08, "#D55E00"), linewidth=0, zorder=0.5)
     _draw_limit(axes, 1.0, "tolerance", linewidth=1.0)
     x = np.asarray(panel.values, float)
     # symbols of equal differences beside each other, where there is room between names
@@ -147,7 +160,7 @@ def _draw_panel(
         style: dict[str, Any] = {
             "color": COLOURS[index % len(COLOURS)],
             "marker": MARKERS[index % len(MARKERS)],
-            "markerfacecolor": "white",
+            "markerfacecolor": tint(0.0),
             "markersize": 4.5 if len(x) <= MANY_POINTS else 2.5,
         }
         counted = np.where(np.isfinite(ratio) & (ratio > 0.0), np.maximum(ratio, bottom), np.nan)
@@ -178,7 +191,7 @@ def _draw_panel(
 
 
 def _draw_limit(axes: Axes, height: float, name: str, **style: Any) -> None:
-    axes.axhline(height, color="black", **style)
+    axes.axhline(height, color=tint(1.0), **style)
     axes.annotate(
         name,
         (1.0, height),
@@ -188,7 +201,7 @@ def _draw_limit(axes: Axes, height: float, name: str, **style: Any) -> None:
         ha="right",
         va="top",
         fontsize="x-small",
-        color="#555555",
+        color=tint(SOFT),
     )
 
 

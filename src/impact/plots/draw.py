@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,9 +20,9 @@ from ..errors import UsageError
 from ..results.single_impact import Impact, histories
 from ..results.xarray_backend import result_of
 from .data import PlotData, Points, read_points
-from .kinds import STUDIES, Choice, Look, default_kind, find_kind
+from .kinds import DEFAULT_LEGENDS, STUDIES, Choice, Look, default_kind, find_kind
 from .labels import check_labels, escape_mathtext, legend_labels, pretty_conditions, tick_with_comma, with_comma
-from .layout import Picture
+from .layout import LEGEND_PART, Picture
 from .style import default_size, styled
 
 if TYPE_CHECKING:
@@ -46,7 +47,7 @@ def plot(
     height: float | str | None = None,
     style: str | Path | None = None,
     title: bool | None = None,
-    legend: str = "full",
+    legend: str | None = None,
     decimal: str = "point",
     labels: Mapping[str, str] | None = None,
     equations: bool = False,
@@ -76,8 +77,9 @@ def plot(
     style : a style sheet of matplotlib, or the name of one; rcParams changed by the user are respected in any case
     title : write the title and the conditions; by default unless `ax` is set
     legend : name laws by title, year and parameters ("full"), by first author and year ("short"), or by key
-        ("keys"); "none" for no legend
-    decimal : "point" or "comma", in all numbers
+        ("keys"); "none" for no legend; by default the first of these with which it takes at most a fifth of the
+        height
+    decimal : "point" or "comma", in all numbers; "locale" for that of LC_NUMERIC
     labels : texts by the name of an axis, of a variable whose name is at the end of its curve, the key of a law,
         "reference" or "title"
     equations : name the laws with the numbers of their equations in the paper
@@ -137,7 +139,7 @@ def draw(
 ) -> Figure:
     """Draw a picture, in a new figure or into the user's axes."""
     check_labels(look.labels or {}, label_keys(plot_data, look))
-    labels = {**legend_labels(plot_data.laws, look.legend), **(look.labels or {})}
+    labels = _labels(plot_data, look)
     measured = points if points is None or isinstance(points, Points) else read_points(points)
     if measured is not None and not plot_data.takes_points:
         raise UsageError(f"{measured.source}: measured points are drawn over curves only")
@@ -152,13 +154,30 @@ def draw(
         figure = all_axes[0].get_figure(root=True)
         assert figure is not None
         return figure
+    if look.legend is not None or not plot_data.laws:
+        return _new_picture(plot_data, look, measured, heading)
+    pictures = []
+    for legend in DEFAULT_LEGENDS:
+        pictures.append(_new_picture(plot_data, replace(look, legend=legend), measured, heading))
+        if pictures[-1].legend_share <= LEGEND_PART:
+            return pictures[-1]
+    return min(pictures, key=lambda picture: picture.legend_share)
+
+
+def _labels(plot_data: PlotData, look: Look) -> dict[str, str]:
+    """The texts of names: those of the user, else of laws those of the legend."""
+    return {**legend_labels(plot_data.laws, look.legend or "full"), **(look.labels or {})}
+
+
+def _new_picture(plot_data: PlotData, look: Look, measured: Points | None, heading: str) -> Picture:
+    """Draw a picture in a new figure."""
     with styled(look.style):
         (width, height), (default_width, default_height) = look.size, default_size()
         width, height = width or default_width, height or default_height
         texts = (heading, pretty_conditions(plot_data.conditions)) if look.title else ()
         picture = Picture(width, *texts)
         all_axes, panels_height = plot_data.place_panels(picture, width)
-        entries = _draw_panels(plot_data, all_axes, labels, measured, look)
+        entries = _draw_panels(plot_data, all_axes, _labels(plot_data, look), measured, look)
         if look.decimal == "comma":
             for text in picture.header:
                 text.set_text(with_comma(text.get_text()))

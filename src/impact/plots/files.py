@@ -50,7 +50,7 @@ def plot_to_files(
     height: float | str | None = None,
     style: str | Path | None = None,
     title: bool = True,
-    legend: str = "full",
+    legend: str | None = None,
     labels: Mapping[str, str] | None = None,
     equations: bool = False,
     frictions: Sequence[str] | None = None,
@@ -76,7 +76,8 @@ def plot_to_files(
     data : file for the numbers behind the picture: .csv, .tex or .parquet
     data_form : "wide", a column for each curve, or "long", a row for each point
     rows, digits : of the numbers: at most so many rows, evenly spread, and significant digits; by default all
-    decimal : "point" or "comma", of the picture and of the numbers, whose columns semicolons then separate
+    decimal : "point" or "comma", of the picture and of the numbers, whose columns semicolons then separate, or
+        "locale"
     overwrite : replace existing files
     x, y, variable, sel, models, log, points, width, height, style, title, legend, labels, equations, frictions :
         see `plot`

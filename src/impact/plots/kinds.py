@@ -13,7 +13,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..display import check_decimal
+from ..display import resolve_decimal
 from ..errors import UsageError, did_you_mean
 from ..formatting import argument
 
@@ -51,6 +51,8 @@ WIDTHS = {"single": 3.5, "double": 7.1}
 LOG_AXES = ("x", "y", "xy")
 # how a legend names laws: by title, year and parameters, by title and year, or by key; "none" for no legend
 LEGENDS = ("full", "short", "keys", "none")
+# the first of them whose legend has room is used where the user chooses none
+DEFAULT_LEGENDS = ("full", "short", "keys")
 # limits of the width and height of a picture
 MIN_SIZE_INCHES, MAX_SIZE_INCHES = 1.0, 60.0
 LENGTH_PATTERN = re.compile(r"\s*([0-9]*\.?[0-9]+(?:[eE][-+]?[0-9]+)?)\s*(mm|cm|in)\s*")
@@ -84,14 +86,14 @@ class Look:
     style: str | Path | None = None
     title: bool = True
     labels: Mapping[str, str] | None = None
-    legend: str = "full"
+    legend: str | None = None
     decimal: str = "point"
 
     def __post_init__(self) -> None:
         _ = self.size
-        if self.legend not in LEGENDS:
+        if self.legend not in (None, *LEGENDS):
             raise UsageError(f"{argument('legend')}: got {self.legend}, expected {', '.join(LEGENDS)}")
-        check_decimal(self.decimal)
+        object.__setattr__(self, "decimal", resolve_decimal(self.decimal))
 
     @property
     def size(self) -> tuple[float | None, float | None]:

@@ -119,7 +119,8 @@ def pretty_conditions(text: str) -> str:
         material = re.fullmatch(r"materials\.(.+)\.\w+", name[1])
         return (symbol(name[1]) or name[1]) + (f" of {material[1]}" if material else "")
 
-    return re.sub(rf"([A-Za-z][\w.-]*)(?={NO_BREAK}={NO_BREAK})", shown, pretty(text))
+    text = pretty(text).replace(f"={NO_BREAK}-", f"={NO_BREAK}−")
+    return re.sub(rf"([A-Za-z][\w.-]*)(?={NO_BREAK}={NO_BREAK})", shown, text)
 
 
 def law_text(title: str, year: int, equation: str, parameters: str, *, numbered: bool) -> str:

@@ -17,7 +17,7 @@ from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
 
-from .style import encoded
+from .style import SOFT, encoded, tint
 
 # space between the parts of a picture, and at its edges
 GAP_INCHES = 0.05
@@ -34,6 +34,8 @@ LABEL_SHARE_OF_AXIS = 0.93
 LEGEND_SHARE = 0.5
 # a legend with more entries, or of a larger part of the height of a picture, has smaller letters
 MANY_ENTRIES, LEGEND_PART = 16, 0.2
+# conditions of more lines have smaller letters
+MAX_CONDITION_LINES = 3
 
 
 class Picture(Figure):
@@ -44,19 +46,23 @@ class Picture(Figure):
         FigureCanvasAgg(self)
         styles: tuple[dict[str, Any], ...] = (
             {"fontweight": "bold", "fontsize": "large"},
-            {"fontsize": "small", "color": "#555555"},
+            {"fontsize": "small", "color": tint(SOFT)},
         )
         texts = zip((title, conditions), styles, strict=True)
         self.header = [self.text(0.0, 1.0, text, va="top", **style) for text, style in texts if text]
         self.entries: list[tuple[Artist, str]] = []
         self.has_small_legend = False
+        # part of the height; each entry that is left out counts as another height
+        self.legend_share = 0.0
         self.shared: tuple[Text, ...] = ()
         # of an animation, which can show each frame
         self.show_frame: Callable[[int], None] | None = None
         self.frame_count = 0
         # a later change of the size makes the legend again, in the present style
         self.style = {
-            key: value for key, value in matplotlib.rcParams.items() if key.startswith(("legend", "font"))
+            key: value
+            for key, value in matplotlib.rcParams.items()
+            if key.startswith(("legend", "font", "text.color"))
         }
         # texts that were broken into lines: original text and present text
         self.fitted: dict[Text, tuple[str, str]] = {}
@@ -90,6 +96,7 @@ class Picture(Figure):
             more = (Line2D([], [], linestyle=""), f"and {len(entries) - len(shown)} more")
             legend = self.place_legend([*shown, more])
         self.set_size_inches(width, height)
+        self.legend_share = self.legend_height() / self.get_figheight() + len(entries) - len(shown)
 
     def place_legend(self, entries: Sequence[tuple[Artist, str]]) -> float:
         """Put the legend at the bottom in as many columns as fit; returns its height [in]."""
@@ -125,7 +132,7 @@ class Picture(Figure):
 
     def _legend(self, columns: int) -> Legend:
         """Add the legend in a number of columns; names wider than the figure are broken into lines."""
-        style: dict[str, Any] = {"fontsize": "x-small"} if self.has_small_legend else {}
+        style: dict[str, Any] = {"fontsize": "x-small", "labelspacing": 0.3} if self.has_small_legend else {}
         handles, names = zip(*self.entries, strict=True)
         legend = self.legend(
             handles, names, loc="lower center", ncols=columns, borderaxespad=0.3, columnspacing=1.2, **style
@@ -148,6 +155,9 @@ class Picture(Figure):
         down = self.bbox.height - gap
         for text in self.header:
             self.fit(text, self.bbox.width - 2.0 * gap)
+            if text.get_text().count("\n") >= MAX_CONDITION_LINES:
+                text.set_fontsize("x-small")
+                self.fit(text, self.bbox.width - 2.0 * gap)
             text.set_position((gap / self.bbox.width, down / self.bbox.height))
             down -= text.get_window_extent(self.renderer).height + gap
         return float((self.bbox.height - down) / self.dpi)

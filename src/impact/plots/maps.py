@@ -28,7 +28,7 @@ from .kinds import Choice, Kind
 from .labels import REFERENCE, label_axis, number_axis, pretty_conditions, split_by_law, symbol, words_of
 from .layout import Picture
 from .slices import choose_plane, conditions_of, not_a_sweep, read, take_plane, unit_of
-from .style import is_geometric, law_key, model_styles
+from .style import is_geometric, law_key, model_styles, tint
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -43,11 +43,9 @@ MIN_DRAWN_DISTANCE = 1e-9
 MAX_VECTOR_CELLS = 2_000
 # errors that have a contour line, and its dashes
 CONTOURS: dict[float, Any] = {0.01: ":", 0.05: "-"}
-FAILED: dict[str, Any] = {"facecolor": "#ebebeb", "edgecolor": "#b4b4b4", "hatch": "/////", "linewidth": 0}
 NO_VALUE = "failed or not defined"
 # where several models are closest, in place of a key, which has no space
 SEVERAL = "several models"
-TIED: dict[str, Any] = {"facecolor": "#bdbdbd", "linewidth": 0}
 # least width of a panel of a map, and of one of the closest model [in]
 MIN_PANEL_WIDTH, MIN_CLOSEST_PANEL_WIDTH = 1.6, 3.0
 # width of what is next to the panels: labels and colour bar [in]
@@ -340,10 +338,10 @@ def _draw_closest(
     closest = np.array(plot_data.closest, object)
     entries: list[tuple[Artist, str]] = []
     for key, share in plot_data.shares.items():
-        style, name = (TIED, f"{SEVERAL}, equally close") if key else (FAILED, NO_VALUE)
+        style, name = (_tied(), f"{SEVERAL}, equally close") if key else (_failed(), NO_VALUE)
         if key in styles:
             look, name = styles[key], names[key]
-            style = {"facecolor": look["color"], "hatch": look["hatch"], "edgecolor": "white", "linewidth": 0}
+            style = {"facecolor": look["color"], "hatch": look["hatch"], "edgecolor": tint(0.0), "linewidth": 0}
         axes[0].add_patch(_merged_cells(x, y, closest == key, style))
         entries.append((Patch(**style), f"{percentage(share)}  {name}"))
     shown = np.ma.maximum(np.ma.masked_invalid(plot_data.distance), MIN_DRAWN_DISTANCE)
@@ -369,8 +367,8 @@ def _draw_values(
             x, y, field, norm=norm, cmap=colours, rasterized=values.size > MAX_VECTOR_CELLS
         )
         if field.mask.any():
-            panel_axes.add_patch(_merged_cells(x, y, np.ma.getmaskarray(field), FAILED))
-            entries[0.0] = Patch(**FAILED), NO_VALUE
+            panel_axes.add_patch(_merged_cells(x, y, np.ma.getmaskarray(field), _failed()))
+            entries[0.0] = Patch(**_failed()), NO_VALUE
         levels = (
             [sign * level for level in CONTOURS for sign in (-1, 1)] if plot_data.variable == "e_error" else []
         )
@@ -384,15 +382,25 @@ def _draw_values(
                 up,
                 wider,
                 inside,
-                colors="black",
+                colors=[tint(1.0)],
                 linewidths=0.8,
                 linestyles=[CONTOURS[abs(level)] for level in inside],
             )
-            drawn.set_path_effects([withStroke(linewidth=1.8, foreground="white")])
+            drawn.set_path_effects([withStroke(linewidth=1.8, foreground=tint(0.0))])
         for level in map(abs, inside):
-            line = Line2D([], [], color="black", linewidth=0.8, linestyle=CONTOURS[level])
+            line = Line2D([], [], color=tint(1.0), linewidth=0.8, linestyle=CONTOURS[level])
             entries[level] = line, f"{name}{level:g}"
     return mesh, [entries[level] for level in sorted(entries)]
+
+
+def _failed() -> dict[str, Any]:
+    """The style of cells without a value."""
+    return {"facecolor": tint(0.08), "edgecolor": tint(0.3), "hatch": "/////", "linewidth": 0}
+
+
+def _tied() -> dict[str, Any]:
+    """The style of cells where several models are closest."""
+    return {"facecolor": tint(0.26), "linewidth": 0}
 
 
 def _merged_cells(x: FloatArray, y: FloatArray, mask: NDArray[np.bool_], style: dict[str, Any]) -> PathPatch:

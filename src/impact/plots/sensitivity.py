@@ -22,6 +22,7 @@ from .data import Points
 from .kinds import Choice, Kind
 from .labels import axis_text, model_label, number_axis, pretty_conditions, symbol
 from .slices import conditions_of
+from .style import tint
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -119,7 +120,7 @@ class BarData:
                     BAR_HEIGHT,
                     xerr=ends,
                     color=BAR_COLOURS[index],
-                    error_kw={"elinewidth": 0.9, "capsize": 2.5, "capthick": 0.9},
+                    error_kw={"ecolor": tint(1.0), "elinewidth": 0.9, "capsize": 2.5, "capthick": 0.9},
                 )
                 entries.setdefault(name, bars.patches[0])
             axes.set_title(
@@ -128,7 +129,7 @@ class BarData:
             inputs = [labels.get(name) or (symbol(name) if "." not in name else name) for name in self.inputs]
             axes.set_yticks(positions, inputs)
             axes.set_xlim(left=min(0.0, axes.get_xlim()[0]))
-            axes.axvline(0.0, color="black", linewidth=0.8)
+            axes.axvline(0.0, color=tint(1.0), linewidth=0.8)
             axes.grid(visible=False, axis="y")
             number_axis(axes.xaxis)
         all_axes[-1].set_xlabel(axis_text("Sobol index", "index", "1", labels))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -12,7 +13,7 @@ from ..config.input_names import InputName, is_input
 from ..config.tables import OBLIQUE_DEFAULTS
 from ..contact.units import names_in, with_numbers
 from ..errors import UsageError, did_you_mean
-from ..formatting import NO_BREAK, argument, degrees, prefixed, quantity, safe_text
+from ..formatting import NO_BREAK, argument, prefixed, safe_text
 from ..results.schema import exponents_of, plain_unit
 from ..results.selection import law_positions, select
 from .kinds import Choice
@@ -259,18 +260,26 @@ def scalars_of(dataset: xr.Dataset) -> dict[str, object]:
 def described_inputs(inputs: Mapping[str, object], units: Mapping[str, str], exponent: str | None = None) -> str:
     """Write inputs with their units; `exponent` is the text for n if the laws shown fix their exponent.
 
-    Values of `UNSAID` are left out.
+    Values of `UNSAID` and unknown ones are left out; inputs of one quantity stand before their common value.
+
+    >>> inputs = {"m1": 2e-4, "m2": 2e-4, "e": 0.5, "R2": math.inf}
+    >>> described_inputs(inputs, {"m1": "kg", "m2": "kg", "e": "1", "R2": "m"}).replace(NO_BREAK, " ")
+    'm1 = m2 = 0.2 g, e = 0.5, R2 = ∞'
     """
-    parts = []
+    names: dict[tuple[str, str], list[str]] = {}
     for name, value in inputs.items():
-        if InputName.parse(name).table in ("sweep", "materials") and value != UNSAID.get(name):
+        is_said = value == value and value != UNSAID.get(name)
+        if is_said and InputName.parse(name).table in ("sweep", "materials"):
             n = inputs.get("n")
             unit = with_numbers(units[name], {"n": n}) if isinstance(n, float) else units[name]
-            text = exponent if name == "n" and exponent else quantity(value, unit)
-            if unit == "rad" and isinstance(value, float):
-                text = degrees(value)
-            parts.append(safe_text(f"{name} = {text}", 60).replace(" ", NO_BREAK))
-    return ", ".join(parts)
+            text = "∞" if value == math.inf else prefixed(value, unit, 6)
+            if name == "n" and exponent:
+                text = exponent
+            # numbers without a unit are of different quantities
+            alone = name if unit == "1" and isinstance(value, float) else ""
+            names.setdefault((text, alone), []).append(name)
+    parts = (" = ".join([*sorted(together), text]) for (text, _), together in names.items())
+    return ", ".join(safe_text(part, 60).replace(" ", NO_BREAK) for part in parts)
 
 
 def parameter_text(key: str, inputs: Mapping[str, object], units: Mapping[str, str]) -> str:

@@ -16,6 +16,7 @@ from typing import Any
 import matplotlib
 import numpy as np
 from matplotlib import rc_params_from_file, rcParams, rcParamsDefault
+from matplotlib.colors import to_rgb, to_rgba
 from matplotlib.figure import Figure
 
 from ..atomic import write_file
@@ -44,6 +45,8 @@ METADATA: dict[str, dict[str, None]] = {
     "gif": {},
 }
 FRAMES_PER_SECOND = 20
+# share of the colour of texts in what is less important
+SOFT, FAINT = 2 / 3, 8 / 15
 
 
 @contextlib.contextmanager
@@ -52,6 +55,9 @@ def styled(style: str | Path | None = None) -> Iterator[None]:
     ours = rc_params_from_file(str(STYLE_SHEET), use_default_template=False)
     unchanged = {key: value for key, value in ours.items() if rcParams[key] == rcParamsDefault[key]}
     with matplotlib.rc_context({**unchanged, **_style_of(style)}):
+        # styles that have no grid may give it the colour of texts, such as dark_background
+        if to_rgb(rcParams["grid.color"]) == to_rgb(rcParams["text.color"]):
+            rcParams["grid.color"] = tint(0.1)
         yield
 
 
@@ -68,6 +74,21 @@ def _style_of(style: str | Path | None) -> Mapping[Any, Any]:
         return rc_params_from_file(str(style), use_default_template=False)
     except (OSError, ValueError, KeyError) as error:
         raise UsageError(f"{argument('style', style)}: cannot be read: {error}") from None
+
+
+def tint(share: float, colour: str | None = None) -> tuple[float, float, float]:
+    """Mix a colour, by default that of texts, with the background of the axes of the present style.
+
+    >>> tint(1.0), tint(0.0), tint(0.5, "red")
+    ((0.0, 0.0, 0.0), (1.0, 1.0, 1.0), (1.0, 0.5, 0.5))
+    """
+    # behind a transparent background is paper
+    *background, alpha = to_rgba(rcParams["axes.facecolor"])
+    paper = 1.0 - alpha * (1.0 - np.array(background))
+    red, green, blue = (
+        (1.0 - share) * paper + share * np.array(to_rgb(colour or rcParams["text.color"]))
+    ).tolist()
+    return red, green, blue
 
 
 def default_size() -> tuple[float, float | None]:

@@ -64,6 +64,7 @@ class _Drawing:
     keys: Sequence[str]
     plugins: Sequence[ForceModel | str | Path]
     name: str
+    model_count: int  # of the result in the file
 
     def figure(
         self, number: int, kind: Kind, choice: Choice, caption: str, plot_data: PlotData, *, is_first: bool = False
@@ -73,7 +74,7 @@ class _Drawing:
         It is narrow, so that its text is legible on a phone.
         """
         # the legend of the closest model depends on the values
-        legend = "full" if is_first or "y" in kind.along else "none"
+        legend = None if is_first or "y" in kind.along else "none"
         picture = draw(plot_data, Look(width="single", title=False, legend=legend))
         # transparent, because the page may be dark
         for background in (picture.patch, *(axes.patch for axes in picture.axes)):
@@ -83,7 +84,7 @@ class _Drawing:
         label = kind.caption if is_first else caption
         return Figure(label, f"Figure {number}. {caption}", source, kind.of_friction, is_first, command)
 
-    def command(self, number: int, kind: Kind, choice: Choice, legend: str) -> str:
+    def command(self, number: int, kind: Kind, choice: Choice, legend: str | None) -> str:
         """Write the command that draws a figure; empty if a model is a Python value."""
         options = {"x": choice.x, "y": choice.y, "variable": choice.variable}
         words = [f"--{name}={value}" for name, value in options.items() if value is not None]
@@ -91,7 +92,7 @@ class _Drawing:
             f"--sel={name}={value!r}" if isinstance(value, float) else f"--sel={name}={value}"
             for name, value in (choice.sel or {}).items()
         ]
-        if choice.models and len(choice.models) < self.dataset.sizes["model"]:
+        if choice.models and len(choice.models) < self.model_count:
             words += [f"--model={key}" for key in choice.models]
         words += [f"--friction={key}" for key in choice.frictions or ()]
         words += ["--legend=none"] if legend == "none" else []
@@ -121,10 +122,17 @@ class _Drawing:
 
 
 def figures_of(
-    dataset: xr.Dataset, keys: Sequence[str], plugins: Sequence[ForceModel | str | Path], name: str = ""
+    dataset: xr.Dataset,
+    keys: Sequence[str],
+    plugins: Sequence[ForceModel | str | Path],
+    name: str,
+    model_count: int,
 ) -> tuple[list[Figure], list[str]]:
-    """Draw the figures of a result, whose file has a name; also returns a sentence for each that is left out."""
-    drawing, figures, left_out = _Drawing(dataset, keys, plugins, name), list[Figure](), list[str]()
+    """Draw the figures of a result, or of some models of its `model_count`, whose file has a name.
+
+    Also returns a sentence for each that is left out.
+    """
+    drawing, figures, left_out = _Drawing(dataset, keys, plugins, name, model_count), list[Figure](), list[str]()
     choices = list(iterate_choices(dataset, keys))
     # numbered as they stand on the page: those of friction have a section of their own
     for of_friction in (False, True):

@@ -26,8 +26,8 @@ from ..contact.model import ForceModel
 from ..contact.models import catalogue
 from ..engine.plan import Plan
 from ..engine.plugins import read_plugins
-from ..errors import ImpactError, UsageError
-from ..formatting import number, prefixed, safe_text, scaled_unit, with_year
+from ..errors import ImpactError, UsageError, did_you_mean
+from ..formatting import argument, number, prefixed, safe_text, scaled_unit, with_year
 from ..plots.slices import varying_inputs
 from ..results.attributes import read_attribute
 from ..results.board import BOARD_HEADINGS, Board, board_rows, check_rows, engine_headline, failure_lines
@@ -44,17 +44,20 @@ from ..results.provenance import stored_config
 from ..results.ranking import DEFAULT_TOL, Ranking, rank_models, rankable_parts
 from ..results.replay_command import describe_point
 from ..results.schema import FIT_STATUSES, count_points, exponents_of
+from ..results.selection import law_positions
 from ..results.sensitivity import INDEX_HEADINGS, describe_design, describe_study, index_rows, iterate_studies
 from ..results.slabs import MAX_SUMMARY_POINTS, is_large
 from ..results.summary import Summary, extremes_of, summarize
 from ..results.xarray_backend import result_of
-from .figures import at_text, coordinate_text, figures_of, numbered_unit
+from .figures import Figure, at_text, coordinate_text, figures_of, numbered_unit
 
 if TYPE_CHECKING:
     import xarray as xr
 
 # the most that is shown: letters of a text and of a line of the config, values of an axis, failed points
 MAX_TEXT_LETTERS, MAX_LINE_LETTERS, MAX_VALUES, MAX_FAILED = 2000, 100_000, 8, 20
+# of the page of a result, in their order
+SECTIONS = ("inputs", "answer", "figures", "friction", "failures", "computed", "models", "config", "commands")
 # letters of the title at the top of a printed page
 MAX_RUNNING_LETTERS = 80
 # with more than MAX_FIGURE_MODELS models the figures show the BEST_MODELS best
@@ -67,6 +70,8 @@ def report(
     output: str | Path | None = None,
     overwrite: bool = False,
     plugins: Sequence[ForceModel | str | Path] = (),
+    models: Sequence[str] | None = None,
+    sections: Sequence[str] | None = None,
 ) -> str:
     """Write a result as one page of HTML, which needs no network and runs no scripts.
 
@@ -76,11 +81,14 @@ def report(
     output : file to write the page to as well, whose name ends in .html
     overwrite : replace the output if it exists
     plugins : plug-in models that the result was computed with; without them the figures of a motion are left out
+    models : keys of the models to show; by default all
+    sections : names of SECTIONS, of which those are written that the result has; by default all. Figures of
+        friction are in the section friction
 
     Raises
     ------
-    UsageError, ResultError : it is a time history, or its attributes are not those of a result; the output exists,
-        or has another ending
+    UsageError, ResultError : it is a time history, or its attributes are not those of a result; there is no such
+        model or section; the output exists, or has another ending
 
     >>> import impact
     >>> result = impact.sweep("configs/figure6.toml", overrides=["models=hertz", "sweep.e=[0.5, 1.0]"])
@@ -92,18 +100,34 @@ def report(
         if output.suffix.lower() not in (".html", ".htm"):
             raise UsageError(f"{output}: expected a name that ends in .html")
         check_outputs([output], [dataset, *plugins], overwrite=overwrite)
-    text = page(result_of(dataset), plugins)
+    text = page(result_of(dataset), plugins, models, sections)
     if output is not None:
         write_file(output, text.encode(), overwrite=overwrite)
     return text
 
 
-def page(dataset: xr.Dataset, plugins: Sequence[ForceModel | str | Path] = ()) -> str:
+def page(
+    dataset: xr.Dataset,
+    plugins: Sequence[ForceModel | str | Path] = (),
+    models: Sequence[str] | None = None,
+    sections: Sequence[str] | None = None,
+) -> str:
     """Write a result as one page of HTML; for errors see `report`."""
+    for name in sections or ():
+        if name not in SECTIONS:
+            raise UsageError(f'{argument("sections")}: no section "{name}"; {did_you_mean(name, SECTIONS)}')
     if is_board(dataset):
+        for name, value in (("models", models), ("sections", sections)):
+            if value:
+                raise UsageError(f"{argument(name)}: does not apply to the page of a board")
         return _board_page(dataset)
     if "model" not in dataset.dims:
         raise UsageError("got a time history, expected the result of a sweep")
+    model_count, part_notes = dataset.sizes["model"], []
+    if models:
+        dataset = dataset.isel(model=law_positions(models, dataset))
+        part_notes = [f"this page shows {dataset.sizes['model']} of the {model_count} models of the result"]
+    sections = sections or SECTIONS
     summary = with_depths(summarize(dataset, MAX_FAILED), dataset)
     fits = _fits_section(dataset) if is_calibration(dataset) else None
     studies = list(_studies(dataset)) if is_sensitivity(dataset) else []
@@ -114,8 +138,11 @@ def page(dataset: xr.Dataset, plugins: Sequence[ForceModel | str | Path] = ()) -
         best = [row.model for row in ranked.models] if ranked else keys
         selection = f"The figures show {BEST_MODELS} of the {len(keys)} models: {', '.join(best[:BEST_MODELS])}."
         keys = best[:BEST_MODELS]
-    drawn, left_out = figures_of(dataset, keys, plugins, Path(str(dataset.encoding.get("source", ""))).name)
-    models = [_model_section(dataset.isel(model=index)) for index in range(dataset.sizes["model"])]
+    drawn, left_out = list[Figure](), list[str]()
+    if {"figures", "friction", "commands"} & {*sections}:
+        name = Path(str(dataset.encoding.get("source", ""))).name
+        drawn, left_out = figures_of(dataset, keys, plugins, name, model_count)
+    descriptions = [_model_section(dataset.isel(model=index)) for index in range(dataset.sizes["model"])]
     inputs = inputs_of(dataset)
     lines = str(dataset.attrs.get("config", "")).replace("\r\n", "\n").expandtabs(4).split("\n")
     return _template("page.html.j2").render(
@@ -125,7 +152,13 @@ def page(dataset: xr.Dataset, plugins: Sequence[ForceModel | str | Path] = ()) -
         studies=studies,
         index_headings=INDEX_HEADINGS,
         design=describe_design(dataset),
-        notes=[*(input_notes(inputs) if inputs else ()), *_pair_notes(dataset, plugins), *result_notes(summary)],
+        sections=list(sections),
+        notes=[
+            *part_notes,
+            *(input_notes(inputs) if inputs else ()),
+            *_pair_notes(dataset, plugins),
+            *result_notes(summary),
+        ],
         outcomes=list(_outcomes(summary)),
         axes=[_axis_row(dataset[name]) for name in varying_inputs(dataset)],
         single_values=list(_single_values(dataset)),
@@ -138,8 +171,8 @@ def page(dataset: xr.Dataset, plugins: Sequence[ForceModel | str | Path] = ()) -
         failures=_failures_section(dataset, summary),
         friction=_friction_section(dataset, summary) if "friction" in dataset.dims else None,
         facts=_facts(dataset),
-        models=models,
-        evidence=[*(row for model in models for row in model["evidence"]), *_friction_evidence(dataset)],
+        models=descriptions,
+        evidence=[*(row for model in descriptions for row in model["evidence"]), *_friction_evidence(dataset)],
         config=Markup("\n").join(safe_text(line, MAX_LINE_LETTERS) for line in lines),
         changes=read_attribute(dataset.attrs, "config_set"),
     )

@@ -175,6 +175,10 @@ SLIP_INPUTS = ("u1", "u2", "angle", "omega1", "omega2", "R1", "R2")
 RECORDED_PACKAGES = ("numpy", "h5py", "h5netcdf", "xarray")
 
 
+# the accuracy of outputs relative to their scale, and the default tolerance of comparisons, over the solver's rtol
+DEFAULT_RTOL_FACTOR = 10.0
+
+
 def scale_of(variable: Variable, read: Callable[[str], NDArray[Any]], *, has_peak: bool) -> NDArray[np.float64]:
     """The scale of the differences of an output in its own unit; its shape broadcasts to that of the points.
 

@@ -11,6 +11,7 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import xarray as xr
 
 from .._version import __version__
@@ -31,7 +32,7 @@ from ..config.grid import Axis
 from ..config.input_names import SWEEP_INPUTS, InputName, input_values
 from ..config.load import Config, build, inline_files
 from ..config.rules import has_other_stiffness
-from ..config.tables import MATERIAL_QUANTITIES, SWEEP_DEFAULTS, expand_models, law_quantities
+from ..config.tables import DEFAULT_RTOL, MATERIAL_QUANTITIES, SWEEP_DEFAULTS, expand_models, law_quantities
 from ..contact.fixed_step import EXACT
 from ..contact.force_expressions import unload_to_residual, unload_with_stiffness
 from ..contact.friction import FrictionLaw, Pair
@@ -45,7 +46,7 @@ from ..contact.output_formulas import collide
 from ..contact.rigid import ObliqueImpacts
 from ..contact.status import FIRST_FAILURE, FrictionStatus, Status
 from ..contact.units import with_numbers
-from ..contact.variables import CENTRAL_OUTPUTS, HISTORY, OUTPUTS, SLIP_HISTORY
+from ..contact.variables import CENTRAL_OUTPUTS, HISTORY, OUTPUTS, SLIP_HISTORY, Variable
 from ..display import Block, Displayed, Styled, Table
 from ..engine.build_impacts import build_impacts, build_oblique, fixed_steps_at
 from ..engine.plan import Plan
@@ -56,7 +57,7 @@ from .calibration import fitted_config, position_of_law
 from .kinds import is_calibration, require_sweep
 from .plausibility import input_notes
 from .provenance import changed_plugins, stored_config, stored_draft, unknown_plugins
-from .schema import SCHEMA_VERSION, attributes_of, is_case, plain_unit
+from .schema import DEFAULT_RTOL_FACTOR, SCHEMA_VERSION, attributes_of, is_case, plain_unit, scale_of
 from .seal import is_result
 from .xarray_backend import open_result
 
@@ -117,6 +118,7 @@ class Impact(Displayed):
         are 0 if the balls stay together
     history : the time history as a dataset over t, or None if the motion cannot be integrated
     friction : the friction law; None for a central impact
+    rtol : relative tolerance of the integration
     """
 
     model: ForceModel
@@ -134,6 +136,7 @@ class Impact(Displayed):
     e_energetic: float
     history: xr.Dataset | None
     friction: FrictionLaw | None = None
+    rtol: float = DEFAULT_RTOL
 
     @property
     def status(self) -> Status:
@@ -196,6 +199,7 @@ class Impact(Displayed):
             else:
                 # a number without a unit is often compared with an input
                 digits = INPUT_DIGITS if variable.unit == "1" else OUTPUT_DIGITS
+                value = 0.0 if self._is_rounding(variable) else value
                 outputs.append((name, prefixed(value, self._with_numbers(variable.unit), digits), meaning))
         outputs += self._derived_rows(MOTION_QUANTITIES, OUTPUT_DIGITS)
         in_domain = "yes" if self.values["in_domain"] else "no"
@@ -205,6 +209,12 @@ class Impact(Displayed):
         if self.integrator != EXACT:
             checks.append(("integrator", self.integrator, "scheme with a fixed step"))
         return {"Inputs": inputs, "Outputs": outputs, "Checks": checks}
+
+    def _is_rounding(self, variable: Variable) -> bool:
+        """Whether `compare` would by default take the value of an output for 0."""
+        numbers = {**self.derived, **self.point, **self.values}
+        scale = scale_of(variable, lambda name: np.asarray(numbers[name]), has_peak=True)
+        return bool(abs(self.values[variable.name]) <= DEFAULT_RTOL_FACTOR * self.rtol * scale)
 
     def rows(self) -> dict[str, str]:
         """The lines of all groups, by name."""
@@ -382,6 +392,7 @@ def run_single_impact(plan: Plan, first: tuple[str, ...], times: int | None = No
         e_energetic=history.e_energetic if history else values["e_energetic"],
         history=history_dataset(history, plan, point, slip) if history else None,
         friction=config.frictions[0] if config.frictions else None,
+        rtol=solver.rtol,
     )
 
 
