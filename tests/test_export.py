@@ -134,6 +134,18 @@ def test_liggghts_takes_the_properties_of_each_type_and_pair() -> None:
     assert parameters["coefficientRestitution"] == "peratomtypepair 2 0.5 0.5 0.5 0.5"
 
 
+def test_liggghts_hooke_remarks_on_its_characteristic_velocity_and_on_attraction() -> None:
+    free, limited = (
+        impact.export(
+            "liggghts", key, source=source("soft", "soft") | {"models": key}, code_version="3.8.0"
+        ).header
+        for key in ("liggghts-hooke", "liggghts-hooke-limit-force")
+    )
+    assert any("follows from characteristicVelocity" in remark for remark in free)
+    assert any("becomes attractive" in remark for remark in free)
+    assert "limitForce on: the force is never negative" in limited
+
+
 @pytest.mark.parametrize(
     ("moduli", "expected"),
     [
