@@ -95,11 +95,14 @@ def explore(
     config, reasons = _config_and_reasons(dataset, swept, plugin_set)
 
     kind_menu = ipywidgets.Dropdown(options=kinds, value=kind or default_kind(dataset).name, description="kind")
-    model_list = ipywidgets.SelectMultiple(options=keys, value=shown, description="models", rows=min(len(keys), 8))
+    # with a row for the scroll bar below names that are wider than the list
+    model_list = ipywidgets.SelectMultiple(
+        options=keys, value=shown, description="models", rows=min(len(keys) + 1, 8)
+    )
     # none to choose from where there is no friction
     laws = [str(key) for key in dataset["friction"].values] if "friction" in dataset.dims else []
     friction_list = ipywidgets.SelectMultiple(
-        options=laws, value=laws, description="frictions", rows=min(len(laws), 8)
+        options=laws, value=laws, description="frictions", rows=min(len(laws) + 1, 8)
     )
     first = x_axis(dataset, None) if axes else None
     first = first if first in axes else next(iter(axes), None)
