@@ -196,11 +196,13 @@ def test_a_link_shows_the_row_of_a_law_as_a_whole(page: Page, site: Path, width:
     assert (layout["page"], layout["outside"]) == (0, 0)
     assert layout["height"] < 900
     page.wait_for(is_in_upper_half("luding-2008"))
+    assert page.settled(is_in_upper_half("luding-2008"))
     # also where the table does not show it
     choose(page, "family", "dashpot")
     page.evaluate("location.hash = '#jkr-1971'")
     page.wait_for(f"{KEYS}.includes('jkr-1971')")
     page.wait_for(is_in_upper_half("jkr-1971"))
+    assert page.settled(is_in_upper_half("jkr-1971"))
 
 
 def test_a_law_opens_and_its_example_is_copied_and_runs(table: Page) -> None:
