@@ -408,6 +408,7 @@ BAD_COMMANDS = {
         sys.executable,
     ): f"YADE is not installed as {sys.executable}; on Debian: apt-get install",
     ("liggghts", "--program", "no_such_liggghts"): 'no program "no_such_liggghts"',
+    ("pymunk", "--program", "echo"): "pymunk is not installed in ",
     ("pymunk", "--timeout", "0"): "--timeout: got 0, expected a number of seconds > 0",
 }
 

@@ -66,7 +66,9 @@ def python_package_version(package: str) -> Callable[[str], str | None]:
             except metadata.PackageNotFoundError:
                 return None
         words = f"from importlib.metadata import version; print(version({package!r}))"
-        return output_of([program, "-c", words]).strip() or None
+        printed = output_of([program, "-c", words]).strip()
+        # a program that is no Python prints something else
+        return printed if re.fullmatch(r"\d\S*", printed) else None
 
     return version_of
 
