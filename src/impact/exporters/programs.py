@@ -67,8 +67,8 @@ def python_package_version(package: str) -> Callable[[str], str | None]:
                 return None
         words = f"from importlib.metadata import version; print(version({package!r}))"
         printed = output_of([program, "-c", words]).strip()
-        # a program that is no Python prints something else
-        return printed if re.fullmatch(r"\d\S*", printed) else None
+        # a program that is no Python prints something else; what follows the digit is checked as a release
+        return printed if printed[:1].isdigit() else None
 
     return version_of
 
