@@ -306,6 +306,8 @@ OBLIQUE: tuple[tuple[str, str, str, Values, Values], ...] = (
         ("newton", "newton-semi-implicit", "coulomb-1785", {}, NEWTON | {"angle": angle})
         for angle in ("70 deg", "40 deg")
     ),
+    ("kratos", "kratos-hertz", "kratos-viscous-coulomb", {}, HERTZIAN),
+    ("kratos", "kratos-linear", "kratos-viscous-coulomb", {}, HERTZIAN),
     *(
         ("mujoco", key, "mujoco-elliptic", parameters, inputs)
         for key, inputs, parameters in (
@@ -398,6 +400,11 @@ PLANTED_FRICTION = (
     ("newton-semi-implicit", "coulomb-1785", "mu=0.3", "mu=0.25", "wall"),
     ("newton-semi-implicit", "coulomb-1785", "kf=", "kf=0.01 * ", "wall"),
     ("newton-semi-implicit", "coulomb-1785", "+ 0.08 * omega2", "- 0.08 * omega2", "ball"),
+    ("kratos-hertz", "kratos-viscous-coulomb", "(-0.3,)", "(0.3,)", "wall"),
+    ("kratos-hertz", "kratos-viscous-coulomb", "(-0.3, 0.5)", "(-0.3, -0.5)", "ball"),
+    ("kratos-hertz", "kratos-viscous-coulomb", '_FRICTION": 0.3', '_FRICTION": 0.2', "wall"),
+    ("kratos-hertz", "kratos-viscous-coulomb", '"RotationOption": True', '"RotationOption": False', "wall"),
+    ("kratos-linear", "kratos-viscous-coulomb", "+ 0.08 * omega2", "- 0.08 * omega2", "ball"),
     ("mujoco-solref", "mujoco-elliptic", "0, 0, 0, -0.3", "0, 0, 0, 0.3", "wall"),
     ("mujoco-solref", "mujoco-elliptic", "0, 0, 0, 0.5", "0, 0, 0, -0.5", "ball"),
     ("mujoco-solref", "mujoco-elliptic", 'solreffriction="0 0"', 'solreffriction="-1 -1000.0"', "wall"),

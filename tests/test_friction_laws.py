@@ -48,8 +48,8 @@ KEYS = {
     "coulomb": ["coulomb-1785"],
     "spring": [
         "cundall-strack-1979", "yade-cundall-strack", "yade-mindlin", "liggghts-history", "yade-viscoelastic",
-        "lammps-linear-history", "lammps-mindlin", "lammps-mindlin-force", "lammps-mindlin-rescale",
-        "lammps-mindlin-rescale-force", "lammps-classic-2025",
+        "kratos-viscous-coulomb", "lammps-linear-history", "lammps-mindlin", "lammps-mindlin-force",
+        "lammps-mindlin-rescale", "lammps-mindlin-rescale-force", "lammps-classic-2025",
     ],
     "dashpot": ["liggghts-no-history", "lammps-linear-nohistory"],
     "regularized": ["simbody-hunt-crossley", "drake-regularized"],
@@ -63,6 +63,7 @@ MEMORY = {
     "lammps-mindlin-rescale-force": (0, 1),
     "liggghts-history": (1, 1),
     "yade-mindlin": (0, 0),
+    "kratos-viscous-coulomb": (0, 1),
 }
 
 
@@ -109,9 +110,11 @@ def test_the_catalogue_has_the_laws_of_each_kind() -> None:
     assert {key: law.memory for key, law in frictions().items() if any(law.memory) or key in MEMORY} == MEMORY
     capped = {"liggghts-history", "yade-mindlin", "yade-viscoelastic"}
     assert {key for key, law in frictions().items() if law.cap == "spring"} == capped
+    assert {key for key, law in frictions().items() if law.cap == "both"} == {"kratos-viscous-coulomb"}
     positive = {
         "drake-regularized",
         "simbody-hunt-crossley",
+        "kratos-viscous-coulomb",
         *(key for key in frictions() if key.startswith("yade-")),
     }
     assert {key for key, law in frictions().items() if law.default_limit == "positive"} == positive

@@ -117,13 +117,12 @@ class FixedStepSlip:
             return
         drag = self.damping * power(x, form.damping_power) * self.slip
         spring = self._spring(x, step) if form.kind == "spring" else np.zeros_like(drag)
-        trial = spring + drag if form.kind != "spring" or form.cap == "total" else spring
+        trial = spring if form.kind == "spring" and form.cap == "spring" else spring + drag
         slips = np.abs(trial) > limit
         at_limit = np.copysign(limit, trial)
         phi = np.where(slips, at_limit, spring + drag)
         if form.kind == "spring":
-            left = np.where(slips, at_limit - (drag if form.cap == "total" else 0.0), spring)
-            self._remember(x, left, slips)
+            self._remember(x, np.where(slips, self._spring_left(spring, drag, limit, at_limit), spring), slips)
         self.slip = self.slip - step * phi
         self.changes = self.changes + ((self.sticks | self.slips) & (slips != self.slipped)).astype(np.int32)
         self.sticks, self.slips, self.slipped = self.sticks | ~slips, self.slips | slips, slips
@@ -146,6 +145,16 @@ class FixedStepSlip:
         if self.remembers_force:
             return self.memory + step * stiffness * self.slip
         return stiffness * (self.memory + step * self.slip)
+
+    def _spring_left(self, spring: Array, drag: Array, limit: Array, at_limit: Array) -> Array:
+        """Compute the force of the spring that a slip leaves, from forces before and at the limit."""
+        match self.form.cap:
+            case "spring":
+                return at_limit
+            case "total":
+                return at_limit - drag
+        # a dashpot that turns the force leaves the spring as it is
+        return np.where(spring * at_limit > 0.0, np.clip(spring, -limit, limit), spring)
 
     def _remember(self, x: Array, spring: Array, slips: Mask) -> None:
         """Keep the force of the spring, or the displacement that belongs to it."""

@@ -42,12 +42,12 @@ from .tangential import FrictionKind, TangentialForm
 
 Mask = NDArray[np.bool_]
 # how the stiffness of the tangential spring is chosen, where the user sets no kt_over_kn: a constant k_t;
-# Mindlin's 8 G* a, or k_t sqrt(x); as LIGGGHTS does, 8 G* a for n = 3/2 and K for n = 1
-# k_t times the radius of the contact in metres
-StiffnessRule = Literal["", "constant", "mindlin", "liggghts", "classic"]
-# how the damping is chosen: xt times that of the contact force; as LIGGGHTS does; as YADE does, by betas; c_t; as
-# MuJoCo does, b_t and the impedance
-DampingRule = Literal["", "xt", "liggghts", "betas", "c_t", "cone"]
+# Mindlin's 8 G* a, or k_t sqrt(x); as LIGGGHTS does, 8 G* a for n = 3/2 and K for n = 1; as Kratos does, 4 G*/E*
+# times that of the contact; k_t times the radius of the contact in metres
+StiffnessRule = Literal["", "constant", "mindlin", "liggghts", "kratos", "classic"]
+# how the damping is chosen: xt times that of the contact force; as LIGGGHTS does; as YADE does, by betas; as
+# Kratos does, by the damping ratio of the contact force; c_t; as MuJoCo does, b_t and the impedance
+DampingRule = Literal["", "xt", "liggghts", "betas", "kratos", "c_t", "cone"]
 HERTZ = 1.5
 # the parameters that set the stiffness of the tangential spring
 STIFFNESS_PARAMETERS = ("k_t", "kt_over_kn")
@@ -89,7 +89,7 @@ class FrictionLaw:
     stiffness: StiffnessRule = ""
     damping: DampingRule = ""
     memory: tuple[float, float] = (0.0, 0.0)
-    cap: Literal["total", "spring"] = "total"
+    cap: Literal["total", "spring", "both"] = "total"
     coefficient: Formula | None = None
     scheme: str = ""
 
@@ -151,6 +151,7 @@ class Pair:
             "xt": normal_power,
             "liggghts": 0.5 * stiffness_power if n == HERTZ else normal_power,
             "betas": 0.5 * stiffness_power,
+            "kratos": normal_power,
             "c_t": 0.0,
             "cone": 0.0,
         }[law.damping]
@@ -258,7 +259,7 @@ def required_inputs(law: FrictionLaw, given: Collection[str], exponents: Collect
 
     `given` are the names of the parameters that the user sets, `exponents` those of the contact forces.
     """
-    is_hertz = law.stiffness == "mindlin" or (law.stiffness == "liggghts" and HERTZ in exponents)
+    is_hertz = law.stiffness in ("mindlin", "kratos") or (law.stiffness == "liggghts" and HERTZ in exponents)
     has_stiffness = any(name in given for name in STIFFNESS_PARAMETERS)
     of_materials = ("E1", "nu1", "E2", "nu2") if is_hertz and not has_stiffness else ()
     is_of_e = "betas" not in given if law.damping == "betas" else law.damping == "liggghts" and is_hertz
@@ -307,7 +308,9 @@ def _spring_values(pair: Pair, oblique: ObliqueImpacts) -> dict[str, Array]:
 
 
 def _stiffness_power(law: FrictionLaw, n: float) -> float:
-    return {"": 0.0, "constant": 0.0, "mindlin": 0.5, "liggghts": n - 1.0, "classic": 0.5}[law.stiffness]
+    as_contact = n - 1.0
+    powers = {"": 0.0, "constant": 0.0, "mindlin": 0.5, "classic": 0.5}
+    return {**powers, "liggghts": as_contact, "kratos": as_contact}[law.stiffness]
 
 
 def _stiffness(pair: Pair, oblique: ObliqueImpacts) -> Array:
@@ -324,6 +327,8 @@ def _stiffness(pair: Pair, oblique: ObliqueImpacts) -> Array:
     if _parameter(law, oblique, "k_t") is not None:
         return _in_own_units(_value(law, oblique, "k_t"), "N/m^1.5", HERTZ, impacts)
     G_eff = effective_shear_modulus(impacts.E1, impacts.nu1, impacts.E2, impacts.nu2)
+    if law.stiffness == "kratos":
+        return 4.0 * G_eff / impacts.E_eff * n
     # K is 4/3 E* sqrt(R*), unless the contact force has a rule of its own
     own_rule = pair.model.stiffness is not None
     mindlin = 8.0 * G_eff * np.sqrt(impacts.R_eff) / impacts.K if own_rule else 6.0 * G_eff / impacts.E_eff
@@ -353,6 +358,8 @@ def _damping(pair: Pair, oblique: ObliqueImpacts) -> Array:
             betas = _parameter(law, oblique, "betas")
             beta = gap_damping(impacts.e) if betas is None else betas
             return 2.0 * beta * np.sqrt(_stiffness(pair, oblique))
+        case "kratos":
+            return _normal_damping(pair.model, impacts) * np.sqrt(_stiffness(pair, oblique) / impacts.n)
         case "cone":
             b_t = _parameter(law, oblique, "b_t")
             b = _force_at(pair.model, impacts, v=1.0) if b_t is None else impacts.in_own_units(b_t, "1/s")
@@ -439,17 +446,22 @@ def _problems(pair: Pair, oblique: ObliqueImpacts) -> Iterator[tuple[Mask, str]]
                 n == HERTZ,
                 "8 G* a needs a contact force without permanent indentation and without unloading branch",
             )
-    if law.damping in ("xt", "liggghts"):
-        factor = _value(law, oblique, "xt" if law.damping == "xt" else "tangential_damping")
+    if law.damping in _FACTORS_OF_DAMPING:
+        name, off = _FACTORS_OF_DAMPING[law.damping]
+        factor = _value(law, oblique, name) if name else _ones(oblique.impacts)
         others = [
             exponent for exponent in distinct_values(n).tolist() if declared_dashpot(model, exponent) is None
         ]
-        is_needed = (factor != 0.0) & (law.damping == "xt" or n != HERTZ)
-        off = "xt = 0" if law.damping == "xt" else 'tangential_damping = "off"'
-        yield (
-            np.isin(n, others) & is_needed,
-            f"the contact force has no dashpot C x^q v for the damping; set {off}",
-        )
+        is_needed = (factor != 0.0) & (law.damping != "liggghts" or n != HERTZ)
+        yield np.isin(n, others) & is_needed, f"the contact force has no dashpot C x^q v for the damping{off}"
+
+
+# of rules that take the damping of the contact force: the parameter that is a factor of it, and how to do without
+_FACTORS_OF_DAMPING = {
+    "xt": ("xt", "; set xt = 0"),
+    "liggghts": ("tangential_damping", '; set tangential_damping = "off"'),
+    "kratos": ("", ""),
+}
 
 
 def _adhesion_problems(pair: Pair, oblique: ObliqueImpacts) -> Iterator[tuple[Mask, str]]:

@@ -76,7 +76,8 @@ class TangentialForm:
     stiffness_power, damping_power : powers of x in the tangential stiffness k x^kp and damping c x^q
     memory : r on loading and on unloading; while the contact grows or shrinks, 0 keeps the force, 1 the
         displacement
-    cap : what mu N limits, the "total" force, or that of the "spring" alone
+    cap : what mu N limits, the "total" force, that of the "spring" alone, or, of a fixed step, that of the spring
+        and then the total, "both"
     coefficient : of kind "regularized": the coefficient of friction over mu as a formula of y, which is
         `SLIP_SCALE` abs(G), and of other values of the problem, by their names without `PREFIX`
     has_dashpot : whether any trajectory has a dashpot
@@ -86,7 +87,7 @@ class TangentialForm:
     stiffness_power: float = 0.0
     damping_power: float = 0.0
     memory: tuple[float, float] = (0.0, 0.0)
-    cap: Literal["total", "spring"] = "total"
+    cap: Literal["total", "spring", "both"] = "total"
     coefficient: Formula | None = None
     has_dashpot: bool = True
 

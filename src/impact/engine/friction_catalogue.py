@@ -26,7 +26,11 @@ MEMORY = {
     (0.0, 1.0): "the force, rescaled on unloading",
     (1.0, 2.0): "the displacement, rescaled on unloading",
 }
-CAPS = {"total": "spring and dashpot together", "spring": "the spring alone, without a dashpot where it slips"}
+CAPS = {
+    "total": "spring and dashpot together",
+    "spring": "the spring alone, without a dashpot where it slips",
+    "both": "the spring, and spring and dashpot together",
+}
 
 
 @dataclass(frozen=True)

@@ -116,6 +116,7 @@ class Collision:
             if slip == 0.0:
                 raise UsageError(f"{argument('script')}: there is no slip before the impact, and so no beta")
             values |= {"u1": u1, "u2": u2, "rim2": rim2, "slip": slip}
+            values["reach"] += 4.0 * (abs(u1) + abs(u2)) * (self.steps * self.dt + self.gap / self["v0"])
             # so that the normal is along x at the first touch
             values |= {"y1": -u1 * self.gap / self["v0"], "y2": -u2 * self.gap / self["v0"]}
             values |= {name: self[name] for name in ("omega1", "omega2")}
@@ -147,7 +148,6 @@ class Code:
     template : a complete input that prints `e_out = VALUE` last, see `script`; "" if none was ever run
     wall : what the template has for a plane wall, by the text for ball 2 that it replaces; empty without one
     frictions : what the code calls each of its friction laws, by key of the catalogue
-    without_friction : why a code with no friction laws has none
     has_friction : whether the code has a friction law with a law, from the keys of the law and the friction law
     shortens_arms : whether friction acts at less than the radius from the centre, by a part of the indentation
     oblique : what the template has for an oblique impact, by the text that it replaces, before a wall; it prints
@@ -177,7 +177,6 @@ class Code:
     template: str = ""
     wall: Mapping[str, str] = field(default_factory=dict)
     frictions: Mapping[str, str] = field(default_factory=dict)
-    without_friction: str = "none of it was run"
     has_friction: Callable[[str, str], bool] = lambda key, friction: True
     shortens_arms: bool = False
     oblique: Mapping[str, str] = field(default_factory=dict)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 
-from .code import Code, Collision, Parameters
+from .code import PRINT_BETA, Code, Collision, Parameters
 from .programs import python_package_version
 
 LAWS = {
@@ -142,6 +142,21 @@ print("e_out =", (v2 - v1) / {v0}, flush=True)
 os._exit(0)
 '''
 )
+# the normal is along x at the first touch, the tangent along y, so that spins are about z
+OBLIQUE = {
+    "1 {x1} 0 0\n": "1 {x1} {y1} 0\n",
+    "2 {x2} 0 0\n": "2 {x2} {y2} 0\n",
+    '"RotationOption": False': '"RotationOption": True',
+    "for ball, speed in zip(balls, ({v1}, {v2})):\n": (
+        "for ball, speed, u, omega in zip(balls, ({v1}, {v2}), ({u1}, {u2}), ({omega1}, {omega2})):\n"
+        "    ball.SetSolutionStepValue(Kratos.VELOCITY_Y, u)\n"
+        "    ball.SetSolutionStepValue(Kratos.ANGULAR_VELOCITY_Z, omega)\n"
+    ),
+    'print("e_out ="': (
+        "u1, u2 = (ball.GetSolutionStepValue(Kratos.VELOCITY_Y) for ball in balls)\n"
+        "omega1, omega2 = (ball.GetSolutionStepValue(Kratos.ANGULAR_VELOCITY_Z) for ball in balls)\n" + PRINT_BETA
+    ),
+}
 
 
 def parameters(collision: Collision) -> dict[str, float | str]:
@@ -151,10 +166,12 @@ def parameters(collision: Collision) -> dict[str, float | str]:
     second: dict[str, float | str] = (
         {} if c.has_one_material else {"YOUNG_MODULUS2": c["E2"], "POISSON_RATIO2": c["nu2"]}
     )
+    friction = dict.fromkeys(("STATIC_FRICTION", "DYNAMIC_FRICTION"), c["mu"]) if c.friction else {}
     return {
         "YOUNG_MODULUS": c["E1"],
         "POISSON_RATIO": c["nu1"],
         **second,
+        **friction,
         "COEFFICIENT_OF_RESTITUTION": c["e"],
         "DEM_DISCONTINUUM_CONSTITUTIVE_LAW_NAME": LAWS[c.model.key],
     }
@@ -167,8 +184,8 @@ def lines(collision: Collision, parameters: Parameters) -> list[str]:
     relation = {
         "COEFFICIENT_OF_RESTITUTION": parameters["COEFFICIENT_OF_RESTITUTION"],
         "DEM_DISCONTINUUM_CONSTITUTIVE_LAW_NAME": parameters["DEM_DISCONTINUUM_CONSTITUTIVE_LAW_NAME"],
-        "STATIC_FRICTION": 0.0,
-        "DYNAMIC_FRICTION": 0.0,
+        "STATIC_FRICTION": parameters.get("STATIC_FRICTION", 0.0),
+        "DYNAMIC_FRICTION": parameters.get("DYNAMIC_FRICTION", 0.0),
         "FRICTION_DECAY": 500.0,
         "ROLLING_FRICTION": 0.0,
     }
@@ -193,6 +210,14 @@ def notes(collision: Collision) -> list[str]:
         remarks.append(
             "material2 is of the rigid face; it is found within search_tolerance_against_walls, unset 0"
         )
+    if collision.friction:
+        remarks += [
+            "the tangential stiffness follows from nu: k_t/k_n = 4 G*/E*, 2 (1 - nu)/(2 - nu) of equal materials",
+            "RotationOption is true: without it balls slide, but do not spin",
+            "friction acts at less than the radius from the centre, by a part of the indentation",
+        ]
+    else:
+        remarks.append("no friction: replace STATIC_FRICTION and DYNAMIC_FRICTION by yours")
     if collision.model.key == "kratos-linear":
         remarks.append("Kratos finds the damping ratio by bisection to 1e-4")
     remarks.append(
@@ -214,10 +239,12 @@ CODE = Code(
     lines=lines,
     notes=notes,
     template=TWO_BALLS,
-    without_friction="its tangential law is not in the catalogue; where rigid balls stick its spring reverses the "
-    "slip: with e = 0.8, mu = 0.3, 40 degrees, beta was 0.22 with kratos-hertz and 0.32 with kratos-linear",
+    frictions={"kratos-viscous-coulomb": "STATIC_FRICTION and DYNAMIC_FRICTION, the same"},
+    shortens_arms=True,
+    oblique=OBLIQUE,
     wall={
         "2 {x2} 0 0\n": "",
+        "2 {x2} {y2} 0\n": "",
         "2 0 2\n": "",
         "2 0 {R2}\n": "",
         BALL2: "",
@@ -228,7 +255,14 @@ CODE = Code(
         ),
         '    "NeighbourSearch': '    "search_tolerance_against_walls": 0.01,\n    "NeighbourSearch',
         "for i in (1, 2)]\nfor ball": "for i in (1,)]\nfor ball",
+        "({v1}, {v2}), ({u1}, {u2}), ({omega1}, {omega2})": "({v1},), ({u1},), ({omega1},)",
         "({v1}, {v2})": "({v1},)",
+        "u1, u2 = (ball.GetSolutionStepValue(Kratos.VELOCITY_Y) for ball in balls)": (
+            "u1, u2 = balls[0].GetSolutionStepValue(Kratos.VELOCITY_Y), {u2}"
+        ),
+        "omega1, omega2 = (ball.GetSolutionStepValue(Kratos.ANGULAR_VELOCITY_Z) for ball in balls)": (
+            "omega1, omega2 = balls[0].GetSolutionStepValue(Kratos.ANGULAR_VELOCITY_Z), 0.0"
+        ),
         "v1, v2 = (ball.GetSolutionStepValue(Kratos.VELOCITY_X) for ball in balls)": (
             "v1, v2 = balls[0].GetSolutionStepValue(Kratos.VELOCITY_X), {v2}"
         ),

@@ -176,7 +176,7 @@ def _choose_friction(
     known = code.frictions_of(model)
     if friction is not None and friction not in known:
         beside = f" with {model}" if friction in code.frictions else ""
-        reason = "" if code.frictions else f": {code.without_friction}"
+        reason = "" if code.frictions else ": none of it was run"
         expected = did_you_mean(friction, known) if known else f"no friction is written for it{reason}"
         raise UsageError(f'{argument("friction")}: {code.title} has no "{friction}"{beside}; {expected}')
     keys = [law.key for law in source.draft(model).frictions]

@@ -1,4 +1,4 @@
-"""Friction laws of LAMMPS, LIGGGHTS and YADE, with the names that these codes have for them."""
+"""Friction laws of LAMMPS, LIGGGHTS, YADE and Kratos, with the names that these codes have for them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from ..evidence import Evidence
 from ..fixed_step import KICK_DRIFT
 from ..friction import FrictionLaw
 from ..model import Parameter
-from ..models.cited_sources import LIGGGHTS, YADE_2025
+from ..models.cited_sources import KRATOS, LIGGGHTS, YADE_2025
 from .parameters import CONSTANT_STIFFNESS, KT_OVER_KN, MINDLIN_STIFFNESS, XT, choice, limit
 
 # ---- LAMMPS
@@ -200,4 +200,30 @@ YADE_VISCOELASTIC = FrictionLaw(
     stiffness="constant",
     damping="c_t",
     cap="spring",
+)
+
+# ---- Kratos
+
+# only a fixed step: its slip below the limit of the spring is not among the modes of `impact.contact.slip_motion`
+KRATOS_VISCOUS_COULOMB = FrictionLaw(
+    key="kratos-viscous-coulomb",
+    title="Kratos DEM, viscous Coulomb (10.4.4)",
+    year=2015,
+    equation="f = f_e + c_n √κ g,  ḟ_e = κ n K δⁿ⁻¹ g,  κ = 4 G*/E*,  and f_e ∝ δⁿ⁻¹ on unloading,  "
+    "|f_e| ≤ μ max(F, 0), |f| ≤ μ max(F, 0)",
+    reference="Kratos DEM, DEM_D_Hertz_viscous_Coulomb and DEM_D_Linear_viscous_Coulomb",
+    kind="spring",
+    evidence=Evidence(
+        "seen",
+        f"{KRATOS}, custom_constitutive/DEM_D_Hertz_viscous_Coulomb_CL.cpp @03f57bf0, "
+        "DEM_D_Linear_viscous_Coulomb_CL.cpp @013f9253 and DEM_D_Linear_viscous_Coulomb_CL.h @016af01b",
+        note="for STATIC_FRICTION = DYNAMIC_FRICTION; a spring beyond the limit is not cut back while the dashpot "
+        "opposes it",
+    ),
+    parameters=(limit("positive"),),
+    stiffness="kratos",
+    damping="kratos",
+    memory=(0.0, 1.0),
+    cap="both",
+    scheme=KICK_DRIFT,
 )

@@ -26,6 +26,7 @@ LETHE = (
     "@8bf81c3b, doc/source/theory/dem/dem.rst @023e4352"
 )
 LIGGGHTS = "CFDEMproject/LIGGGHTS-PUBLIC @3d5c00f2 (3.8.0, 2024), src/"
+KRATOS = "KratosMultiphysics/Kratos, applications/DEMApplication"
 YADE_2025 = "c61292558/yade4deepin, a copy of YADE 2025.2.0, pkg/dem/ @f1486c0 (2025)"
 DEMLAB_VISCOELASTIC = (
     "rlrangel/DEMLab, src/interactions/force/ContactForceN_ViscoElasticNonlinear.m @23e741d (2024)"

@@ -10,7 +10,7 @@ from ..evidence import Evidence
 from ..model import ForceModel, Parameter
 from ..powers import power
 from .aliases import same_law
-from .cited_sources import CHRONO, DEMLAB_VISCOELASTIC, LETHE, LIGGGHTS, YADE_2025
+from .cited_sources import CHRONO, DEMLAB_VISCOELASTIC, KRATOS, LETHE, LIGGGHTS, YADE_2025
 from .dashpot import (
     ANAGNOSTOPOULOS_1988,
     HERTZIAN_DASHPOT,
@@ -283,7 +283,6 @@ MFIX_HERTZ = of_code(
 
 # ---- Kratos
 
-KRATOS = "KratosMultiphysics/Kratos, applications/DEMApplication"
 # sphere_strategy.py replaces an e below the first by it, and has no damping above the second
 KRATOS_MIN_E, KRATOS_MAX_E = 0.001, 0.999
 
