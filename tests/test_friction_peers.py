@@ -61,7 +61,7 @@ class Pairing:
     # the mass and radius of a second ball at rest; empty for a plane
     second: Values = field(default_factory=dict)
     steps: tuple[int, ...] = STEPS
-    # largest error of the damping that the code finds itself
+    # error of a code of single precision, or that finds its damping roughly
     slack: float = 0.0
 
     @property
@@ -376,6 +376,41 @@ PAIRINGS += tuple(
     )
     for name in KRATOS_LAWS
     for material, E in (("soft", MATERIAL["E"]), ("hard", HARD))
+    for second in ({}, SECOND)
+)
+# below this slip TAMSI takes less friction than mu N
+DRAKE_WALL, STICTION = Code("Drake", "run_drake_wall.py"), 1e-6
+PAIRINGS += tuple(
+    Pairing(
+        "coulomb-1785",
+        "drake-point-contact",
+        DRAKE_WALL,
+        {"K": K, "n": 1.0, "drake-point-contact.d": 0.5},
+        {},
+        lambda values, mu, K=K: {"k": K, "d": 0.5, "mu": mu, "stiction": STICTION},
+        scheme="drake-tamsi",
+        shortens_arms=True,
+        second=second,
+    )
+    for K in (1e6, 1e12)
+    for second in ({}, SECOND)
+)
+# of single precision, which a soft contact resolves; each of its steps takes a millisecond
+SOFT = {"K": 1e5, "n": 1.0, "newton-semi-implicit.kd": 20.0}
+PAIRINGS += tuple(
+    Pairing(
+        "coulomb-1785",
+        "newton-semi-implicit",
+        Code("Newton", "run_newton_wall.py"),
+        SOFT,
+        {},
+        lambda values, mu: {"ke": SOFT["K"], "kd": SOFT["newton-semi-implicit.kd"], "mu": mu},
+        # against a plane its lever arm is the radius
+        shortens_arms=bool(second),
+        second=second,
+        steps=(12, 31),
+        slack=1e-3,
+    )
     for second in ({}, SECOND)
 )
 
