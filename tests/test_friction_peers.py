@@ -225,7 +225,7 @@ PAIRINGS = (
     ),
     *(
         Pairing(
-            f"liggghts-{'history' if tangential == 'history' else 'no-history'}",
+            f"liggghts-{tangential.replace('_', '-')}",
             f"liggghts-{model}",
             LIGGGHTS_WALL,
             HERTZ,
@@ -318,15 +318,18 @@ PAIRINGS += (
         )
         for key, name in MINDLIN.items()
     ),
-    Pairing(
-        "liggghts-history",
-        "liggghts-hertz",
-        LIGGGHTS_WALL,
-        HARD_HERTZ,
-        {"tangential_damping": "off"},
-        liggghts("hertz", "history", "tangential_damping off", HARD),
-        shortens_arms=True,
-        second=SECOND,
+    *(
+        Pairing(
+            f"liggghts-{tangential.replace('_', '-')}",
+            "liggghts-hertz",
+            LIGGGHTS_WALL,
+            HARD_HERTZ,
+            values,
+            liggghts("hertz", tangential, " ".join(f"{name} {word}" for name, word in values.items()), HARD),
+            shortens_arms=True,
+            second=SECOND,
+        )
+        for tangential, values in (("history", {"tangential_damping": "off"}), ("no_history", {}))
     ),
     Pairing(
         "yade-viscoelastic",
