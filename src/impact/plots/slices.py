@@ -231,7 +231,7 @@ def _is_float(dataset: xr.Dataset, name: str) -> bool:
     return dataset[name].dtype.kind == "f"
 
 
-def unit_of(coordinate: xr.DataArray) -> str:
+def unit_of(coordinate: xr.DataArray | xr.Variable) -> str:
     """Read the unit of a coordinate; "1" if it has none."""
     return safe_text(plain_unit(str(coordinate.attrs.get("units", "1"))))
 
@@ -245,16 +245,14 @@ def conditions_of(dataset: xr.Dataset, *drawn: str) -> str:
 
 def units_of(dataset: xr.Dataset) -> dict[str, str]:
     """Read the units of all coordinates."""
-    return {str(name): unit_of(coordinate) for name, coordinate in dataset.coords.items()}
+    # of a variable alone: to make an array finds its coordinates among all others, a thousand times for a report
+    return {str(name): unit_of(dataset.variables[name]) for name in dataset.coords}
 
 
 def scalars_of(dataset: xr.Dataset) -> dict[str, object]:
     """Find the inputs that have one value."""
-    return {
-        str(name): coordinate.values.item()
-        for name, coordinate in dataset.coords.items()
-        if coordinate.ndim == 0 and is_input(name)
-    }
+    variables = {name: dataset.variables[name] for name in dataset.coords if is_input(name)}
+    return {str(name): variable.values.item() for name, variable in variables.items() if variable.ndim == 0}
 
 
 def described_inputs(inputs: Mapping[str, object], units: Mapping[str, str], exponent: str | None = None) -> str:
