@@ -275,11 +275,16 @@ def test_an_end_of_the_allowed_values_is_a_limit_and_no_bound_of_the_search(
     assert result.status == status
 
 
-@pytest.mark.slow
+SLOW_AND_LONG = [pytest.mark.slow, pytest.mark.long]
+
+
+@pytest.mark.parametrize(
+    "count", [pytest.param(count, marks=mark) for count, mark in zip((100, 400), SLOW_AND_LONG, strict=True)]
+)
 @pytest.mark.parametrize("deviation", [0.03, 0.003])
-def test_coverage_of_400_sets_of_four_specimens(deviation: float) -> None:
-    """Of intervals of 95 %, within four standard errors of the check; the figures are in docs/calibrate.md."""
-    count, sigma = 400, 0.01
+def test_coverage_of_sets_of_four_specimens(deviation: float, count: int) -> None:
+    """Of intervals of 95 %, within four standard errors of the check; docs/calibrate.md has the figures of 400."""
+    sigma = 0.01
     bounds = Bounds(np.array([0.0]), np.array([1.0]))
     sets = [specimens_with_deviations(deviation, sigma, seed) for seed in range(count)]
     data = DataPoints(sets[0], np.full(SPECIMENS.size, sigma), "excess", SPECIMENS)
@@ -292,10 +297,12 @@ def test_coverage_of_400_sets_of_four_specimens(deviation: float) -> None:
     assert 0.95 - 4.0 * np.sqrt(0.95 * 0.05 / count) <= covered <= most
 
 
-@pytest.mark.slow
-def test_coverage_and_bias_of_4000_synthetic_sets() -> None:
-    """Each within four standard errors of the check itself; the figures are in docs/calibrate.md."""
-    count, n, sigma = 4000, 20, 0.01
+@pytest.mark.parametrize(
+    "count", [pytest.param(count, marks=mark) for count, mark in zip((1000, 4000), SLOW_AND_LONG, strict=True)]
+)
+def test_coverage_and_bias_of_synthetic_sets(count: int) -> None:
+    """Each within four standard errors of the check itself; the figures of 4000 are in docs/calibrate.md."""
+    n, sigma = 20, 0.01
     random = np.random.default_rng(20261123)
     bounds = Bounds(np.array([0.01]), np.array([0.9]))
     values = restitution(np.array([ZETA])) + sigma * random.standard_normal((count, n))

@@ -356,8 +356,10 @@ def check_interrupted(completed: FinishedSweep, folder: Path, number: int, at: o
     [
         (CONFIG_TEXT, 3, 1),
         pytest.param(FACTORED_CONFIG, 3, 1, marks=pytest.mark.slow),
-        pytest.param(CONFIG_TEXT, 60, 40, marks=pytest.mark.faults),
-        pytest.param(FACTORED_CONFIG, 20, 40, marks=pytest.mark.faults),
+        pytest.param(CONFIG_TEXT, 20, 15, marks=pytest.mark.faults),
+        pytest.param(FACTORED_CONFIG, 20, 15, marks=pytest.mark.faults),
+        pytest.param(CONFIG_TEXT, 60, 40, marks=pytest.mark.long),
+        pytest.param(FACTORED_CONFIG, 20, 40, marks=pytest.mark.long),
     ],
 )
 def test_an_interrupted_sweep_prints_one_line_and_is_resumed(

@@ -153,13 +153,15 @@ def test_the_report_has_every_note_of_the_sweep(cli: Run, tmp_path: Path, layout
         LIMIT,
     ]
     result = impact.load(tmp_path / "r.h5")
-    assert notes_of(impact.report(result)) == [line.removeprefix("c.json: ") for line in printed]
+    assert notes_of(impact.report(result, sections=["inputs"])) == [
+        line.removeprefix("c.json: ") for line in printed
+    ]
     # a part of a result has the number of its own points
     single = {"e": 0, "v1": 2, "m1": 1, "m2": 0, "material1": 1, "materials.rubber.rho": 1, "kelvin-voigt.C": 0}
     part = result.isel(single)
     depth = part["peak_indentation"].values / np.cbrt(3 * 0.001 / (4 * np.pi * 1200.0))
     note = f"{LIMIT} at {(depth > 0.1).sum()} of 3 points, at most {depth.max():.0%}; {SMALL}"
-    assert notes_of(impact.report(part))[1:] == [mass, note]
+    assert notes_of(impact.report(part, sections=["inputs"]))[1:] == [mass, note]
     # without the values, or what the radii follow from, there is none
-    assert len(notes_of(impact.report(result.drop_vars("peak_indentation")))) == 2
-    assert notes_of(impact.report(result.assign_attrs(materials="{}"))) == []
+    without = (result.drop_vars("peak_indentation"), result.assign_attrs(materials="{}"))
+    assert [len(notes_of(impact.report(each, sections=["inputs"]))) for each in without] == [2, 0]

@@ -146,16 +146,16 @@ def _number_in(line: str) -> dict[str, float]:
         return {}
 
 
-def verify_scripts(problem: ExportProblem, program: str, dt: float) -> Verification:
-    """Run scripts at several phases and compare them with the map of the code's scheme.
+def verify_scripts(problem: ExportProblem, program: str, dt: float, n_phases: int = PHASES) -> Verification:
+    """Run scripts at `n_phases` phases of a step and compare them with the map of the code's scheme.
 
     Without a scheme, they are run at dt, dt/2 and dt/4, the mean over the phases is extrapolated to a step of
     zero, and compared with the continuous law. The uncertainty is then the difference of the extrapolations from
     dt and dt/2, and from dt/2 and dt/4, and half the spread over the phases at dt/4. Where a script measures no
     number, nothing is extrapolated.
     """
-    code = problem.code
-    phases = (np.arange(PHASES) + 0.5) / PHASES
+    problem = replace(problem, law=replace(problem.law, phases=n_phases))
+    code, phases = problem.code, (np.arange(n_phases) + 0.5) / n_phases
     steps = np.array([dt] if code.scheme is not None else [dt, dt / 2, dt / 4])
     runs = [[_measure(problem, program, dt, phase) for phase in phases.tolist()] for dt in steps.tolist()]
     measured = np.array([[run["e_out"] for run in row] for row in runs])
@@ -170,13 +170,11 @@ def verify_scripts(problem: ExportProblem, program: str, dt: float) -> Verificat
             uncertainty=max(uncertainty, FLOOR, code.uncertainty_of(problem.model.key)),
         )
     predicted = (
-        np.full(measured.shape, problem.e_continuous)
-        if code.scheme is None
-        else replace(problem.law, phases=PHASES).restitution(steps)
+        np.full(measured.shape, problem.e_continuous) if code.scheme is None else problem.law.restitution(steps)
     )
     verification = Verification(
         program=program,
-        dt=tuple(np.repeat(steps, PHASES).tolist()),
+        dt=tuple(np.repeat(steps, n_phases).tolist()),
         phases=tuple(np.tile(phases, steps.size).tolist()),
         measured=tuple(measured.ravel().tolist()),
         predicted=tuple(predicted.ravel().tolist()),
@@ -195,7 +193,7 @@ def _with_friction(
     """
     oblique = problem.law.oblique
     assert oblique is not None
-    predicted = replace(problem.law, phases=PHASES).tangential_restitution(steps)
+    predicted = problem.law.tangential_restitution(steps)
     exact, impact = verification.uncertainty, problem.law.impact
     v0, slip = float(impact.v0[0]), float(oblique.impact.slip.item())
     speed = math.hypot(v0, float((oblique.impact.u1 - oblique.impact.u2).item()))
