@@ -147,10 +147,14 @@ def test_labels_name_what_differs(beads: xr.Dataset) -> None:
     title = model_label(beads.isel(model=0, mu=0, angle=0))
     assert labels[f"{TSUJI} with {COULOMB}"] == f"{title} with Coulomb"
     assert labels[f"{TSUJI} with {FORCE}"] == f"{title} with LAMMPS mindlin/force, xt = 0, limit = positive"
-    # a single model is not named, and nor are parameters at their defaults
+    # a single model is named once, in the conditions, and parameters at their defaults are not
     alone = curves_of(beads, "beta", models=[HOOKE], frictions=[CONSTANT, COULOMB])
     shown = [curve.label.replace("\N{NO-BREAK SPACE}", " ") for curve in of_pairs(alone)]
     assert shown == ["Cundall and Strack, k_t = 1 MN/m", "Coulomb"]
+    hooke = model_label(beads.isel(model=1, mu=0, angle=0))
+    assert conditions_of(alone).startswith(f"Beads: {hooke}, ".replace("\N{NO-BREAK SPACE}", " "))
+    assert hooke not in curves_of(beads, "beta").conditions
+    assert names_of(draw(alone, Look(legend="keys"))) == [CONSTANT, COULOMB]
     assert "angle" not in conditions_of(alone)
     assert "mu = 0.1" in conditions_of(alone)
     assert "angle = 1°" in conditions_of(curves_of(beads, "beta", x="mu"))
@@ -301,6 +305,7 @@ def test_the_area_of_a_friction_loop_is_the_energy_lost(beads: xr.Dataset, cli: 
     one = curves_of(beads, "friction-loop", models=[TSUJI], frictions=[FORCE, COULOMB])
     shown = [curve.label.replace("\N{NO-BREAK SPACE}", " ") for curve in of_pairs(one)]
     assert shown == ["LAMMPS mindlin/force, xt = 0, limit = positive", "Coulomb"]
+    assert conditions_of(one).startswith(model_label(beads.isel(model=0, mu=0, angle=0)))
     check_layout(draw(one, Look(width="84mm")))
     # a time history is drawn as it is, if it has friction
     impact.save(beads, tmp_path / "beads.h5")

@@ -143,20 +143,27 @@ def model_label(model_data: xr.Dataset, *, numbered: bool = False) -> str:
 def legend_labels(laws: Collection[str], legend: str) -> dict[str, str]:
     """Name laws by their keys, or by the first author and year without parameters; full names are not changed.
 
-    >>> legend_labels({"flores-2011 with coulomb-1785"}, "short")
-    {'flores-2011 with coulomb-1785': 'Flores et al. (2011) with Coulomb (1785)'}
+    A single model is not named beside every friction law.
+
+    >>> legend_labels(["flores-2011 with coulomb-1785"], "short")
+    {'flores-2011 with coulomb-1785': 'Coulomb (1785)'}
+    >>> legend_labels(["flores-2011 with coulomb-1785", "hertz with coulomb-1785"], "short").popitem()
+    ('hertz with coulomb-1785', 'Hertz (1882) with Coulomb (1785)')
     """
-    if legend == "keys":
-        return {law: escape_mathtext(law) for law in laws}
-    if legend != "short":
+    if legend not in ("keys", "short"):
         return {}
+    keys = {law: law.split(WITH) for law in laws}
+    if len({model for model, *_ in keys.values()}) == 1:
+        keys = {law: friction or [model] for law, (model, *friction) in keys.items()}
+    if legend == "keys":
+        return {law: escape_mathtext(WITH.join(parts)) for law, parts in keys.items()}
 
     def short(key: str) -> str:
         law = catalogue().get(key) or frictions().get(key)
         # a plug-in is not in the catalogue
         return key if law is None else re.sub(THREE_AUTHORS, r"\1 et al.", with_year(law.title, law.year))
 
-    return {law: escape_mathtext(WITH.join(map(short, law.split(WITH)))) for law in laws}
+    return {law: escape_mathtext(WITH.join(map(short, parts))) for law, parts in keys.items()}
 
 
 class LawPart(NamedTuple):

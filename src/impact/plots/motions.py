@@ -131,7 +131,9 @@ def curves_over(
         ]
         (x_label, x_unit), (y_label, y_unit) = _axis_label_and_unit(first, x), _axis_label_and_unit(first, y)
         panels.append(Panel(x_label, y_label, tuple(curves), x_unit, y_unit, x_name=x, y_name=y))
-    return CurveData(title, _conditions_text(histories), tuple(panels))
+    model = _model_label(first, choice.equations) if of_friction and is_single else ""
+    conditions = ", ".join(filter(None, (model, _conditions_text(histories))))
+    return CurveData(title, conditions, tuple(panels))
 
 
 def _series(history: xr.Dataset, name: str) -> Array:
