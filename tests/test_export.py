@@ -577,6 +577,16 @@ def test_verify_exits_with_0_for_the_predicted_restitutions_and_with_1_for_other
     assert differing.stdout.splitlines()[-1] == "DIFFERS: largest difference 1e-08, uncertainty 1e-09"
 
 
+def test_verify_runs_the_script_that_is_exported(tmp_path: Path) -> None:
+    """The program prints the number of its lines."""
+    program = write_program(tmp_path / "lmp", RELEASE + 'echo "e_out = $(wc -l < "$2")"')
+    export = impact.export("lammps", at={"e": 0.6}, verify=True, script=True, program=str(program))
+    assert export.verification is not None
+    # a comment comes before it
+    lines = sum(not line.startswith("#") for line in export.script.splitlines())
+    assert export.verification.measured == (lines,) * 4
+
+
 @pytest.mark.parametrize(("phase", "value"), list(enumerate(["nan", "inf", "-nan", "nan"])))
 def test_a_restitution_that_is_no_number_differs_at_any_phase(
     tmp_path: Path, predicted: tuple[float, ...], phase: int, value: str

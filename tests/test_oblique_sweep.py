@@ -10,7 +10,7 @@ import pytest
 import xarray as xr
 
 import impact
-from impact.contact.status import FrictionStatus
+from impact.contact.status import FrictionStatus, Status
 from impact.engine.executors import choose_executor
 from impact.engine.run import Run as SweepRun
 from impact.errors import ConfigError, UnfinishedError
@@ -307,3 +307,17 @@ def test_compare_reports_a_changed_restitution(cli: Run, folder: Path, layout: s
     assert done.returncode == 1
     assert "beta: 1 of 144 differ" in done.stdout
     assert f"model=tsuji-1992, friction={SPRING}, angle=" in done.stdout
+
+
+@pytest.mark.filterwarnings("ignore::impact.ImpactWarning")
+@pytest.mark.parametrize("extreme", [1e-170, 1e160])
+def test_speeds_at_an_angle_are_checked_as_closing_speeds_are(extreme: float) -> None:
+    balls = {"m1": 1.0, "m2": 1.0, "K": 1e9, "e": 0.5, "mu": 0.3}
+    config = {"models": "tsuji-1992", "frictions": SLIDING, "output": {"layout": "factored"}}
+    angles = [0.0, 1.5]
+    swept = impact.sweep(config | {"sweep": balls | {"speed": [1.0, extreme], "angle": angles}})
+    for angle, at_angle in zip(angles, swept.transpose("angle", ...).status.values, strict=True):
+        speeds = (np.array([1.0, extreme]) * np.cos(angle)).tolist()
+        central = impact.sweep(config | {"sweep": balls | {"v1": speeds, "u1": 0.1}})
+        assert set(at_angle.ravel()) == {Status.OK, Status.OUT_OF_RANGE}
+        assert at_angle.ravel().tolist() == central.status.values.ravel().tolist()
