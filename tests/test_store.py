@@ -213,6 +213,9 @@ def test_threads_processes_and_an_interruption_change_no_byte(tmp_path: Path, la
     with pytest.raises(UnfinishedError, match=r"16,500 of 33,000 trajectories are kept"):
         sweep_into(resumed, plan, SweepRun(should_stop=lambda: any(tmp_path.glob("resumed.h5.work/*.npz"))))
     assert not resumed.exists()
+    # what it had is kept, whether it was read before another interruption or not
+    with pytest.raises(UnfinishedError, match=r"16,500 of 33,000 trajectories are kept"):
+        sweep_into(resumed, plan, SweepRun(resume=True, should_stop=lambda: True))
     sweep_into(resumed, plan, SweepRun(resume=True))
     assert len({path.read_bytes() for path in tmp_path.glob("*.h5")}) == 1
     assert len(list(tmp_path.iterdir())) == 4

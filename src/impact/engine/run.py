@@ -98,11 +98,13 @@ class ProgressCounter:
         """Add a finished range."""
         # a pair without a meaning did not fail
         is_failure = (collisions.status >= FIRST_FAILURE) & (collisions.status != FrictionStatus.NOT_COMBINABLE)
-        failed = int(np.count_nonzero(is_failure))
+        self.add(trajectory_range.size, int(np.count_nonzero(is_failure)))
+
+    def add(self, finished: int, failed: int = 0) -> None:
+        """Add to the numbers of finished and failed trajectories."""
+        progress = self.progress
         self.progress = replace(
-            self.progress,
-            trajectories=self.progress.trajectories + trajectory_range.size,
-            failed=self.progress.failed + failed,
+            progress, trajectories=progress.trajectories + finished, failed=progress.failed + failed
         )
 
     def report(self) -> None:

@@ -319,8 +319,12 @@ def complete_ranges(
 ) -> None:
     """Integrate the ranges that a work folder does not have yet."""
     todo: list[TrajectoryRange] = []
-    for trajectory_range in ranges:
-        stored = None if run.should_stop() else work_folder.load(trajectory_range)
+    for number, trajectory_range in enumerate(ranges):
+        if run.should_stop():
+            # those that are not read are kept as well
+            counter.add(sum(part.size for part in ranges[number:] if work_folder.path(part).is_file()))
+            raise UnfinishedError
+        stored = work_folder.load(trajectory_range)
         if stored is None:
             todo.append(trajectory_range)
         else:
