@@ -456,6 +456,26 @@ def test_info(cli: Run, stored: Path) -> None:
     assert printed["attributes"]["config"].startswith("#:schema")
 
 
+def test_the_schema_is_printed_or_written(cli: Run, tmp_path: Path) -> None:
+    assert json.loads(cli("schema").stdout) == impact.schema()
+    written = cli("schema", "-o", "s.json", cwd=tmp_path)
+    assert (written.returncode, written.stdout, written.stderr) == (0, "", "s.json: written\n")
+    assert json.loads((tmp_path / "s.json").read_text(encoding="utf-8")) == impact.schema()
+
+
+def test_no_switch_is_on_unless_it_is_given() -> None:
+    from impact.cli.main import COMMANDS, load_command
+
+    switches = {
+        (name, option.name): option.default
+        for name in COMMANDS
+        for option in load_command(name).params
+        if getattr(option, "is_flag", False)
+    }
+    assert ("recommend", "overwrite") in switches
+    assert {switch: default for switch, default in switches.items() if default} == {}
+
+
 @pytest.mark.slow
 def test_init_and_schema(cli: Run, tmp_path: Path) -> None:
     import jsonschema

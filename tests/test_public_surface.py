@@ -13,10 +13,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import typer
 
 import impact
-from impact.cli.main import app
+from impact.cli import main as program
 
 from .conftest import Run
 from .fork_server import start_fork_server
@@ -101,9 +100,8 @@ def describe_parameter(parameter: inspect.Parameter) -> str:
 
 def options() -> Iterator[str]:
     """Give a line for each command: its arguments and options."""
-    group = typer.main.get_command(app)
-    for name, command in sorted(group.commands.items()):  # type: ignore[attr-defined]
-        words = ["/".join([*option.opts, *option.secondary_opts]) for option in command.params]
+    for name in sorted(program.COMMANDS):
+        words = ["/".join([*option.opts, *option.secondary_opts]) for option in program.load_command(name).params]
         yield f"{name}: {' '.join(words)}"
 
 

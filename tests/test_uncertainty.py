@@ -90,6 +90,15 @@ def hunt_crossley(c: np.ndarray, v1: np.ndarray) -> np.ndarray:
     return e
 
 
+def test_indices_do_not_depend_on_the_size_of_an_output() -> None:
+    soft = hertz(n=64)
+    stiff = soft | {"sweep": soft["sweep"] | {"K": {"uniform": [1e12 * end for end in ENDS["K"]]}}}
+    of_soft, of_stiff = (impact.sensitivity(config, of="contact_time") for config in (soft, stiff))
+    assert float(of_stiff["mean"].squeeze()) < 1e-4
+    for name in ("first", "total"):
+        np.testing.assert_allclose(of_stiff[name], of_soft[name], rtol=1e-6)
+
+
 SIMBODY_ENDS = {"c": (0.01, 3.0), "v1": (0.05, 3.0)}
 
 
