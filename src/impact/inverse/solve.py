@@ -212,8 +212,11 @@ def unknown_of(model: ForceModel, name: str, friction: FrictionLaw | None = None
     A parameter of the friction law has its config name, `friction.KEY.NAME`, of which NAME is enough.
 
     >>> from impact.contact.models import find
+    >>> from impact.contact.frictions import find_friction
     >>> unknown_of(find("hunt-crossley-1975"), "e").most
     1.0
+    >>> unknown_of(find("hertz"), "kt_over_kn", find_friction("lammps-mindlin")).name
+    'friction.lammps-mindlin.kt_over_kn'
     """
     unknowns = {parameter.name: parameter for parameter in model.parameters}
     unknowns["K"] = Parameter("K", "N/m^n", "stiffness", least=0.0)
