@@ -117,3 +117,8 @@ def test_an_output_that_the_law_lacks_is_refused() -> None:
         impact.prepare(model="hertz", outputs="beta")
     with pytest.raises(impact.UsageError, match='got the integrator "kick-drift", expected "exact"'):
         impact.prepare({"models": "hertz", "sweep": {**BALLS, "dt": 1e-6}, "solver": {"integrator": "kick-drift"}})
+
+
+def test_an_exponent_that_the_law_fixes_is_no_input() -> None:
+    with pytest.raises(impact.UsageError, match='no input "n" of this law'):
+        impact.prepare(model="hertz", at={"v1": 1.0})(n=1.5)

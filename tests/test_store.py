@@ -572,3 +572,11 @@ def test_longer_names_than_a_folder_can_have_are_refused(cli: Run, tmp_path: Pat
     line = _refused(cli, tmp_path, f"{SWEEP}K = 6e9\nn = 1.0\n", "r" * (length - 3) + ".h5")
     assert f"got a name of {length} bytes, expected at most " in line
     assert len(line) < 200
+
+
+def test_stored_chunks_are_those_of_the_config(tmp_path: Path) -> None:
+    sweep = {"e": [0.2, 0.4, 0.6], "v1": [1.0, 2.0], "m1": 1.0, "m2": 1.0, "K": 6e9}
+    config = {"models": ["hertz", "tsuji-1992"], "sweep": sweep, "output": {"chunks": {"e": 2, "v1": 50}}}
+    impact.sweep_to_file(config, tmp_path / "r.h5", overrides=["output.layout=full"])
+    with h5py.File(tmp_path / "r.h5") as file:
+        assert file["e_out"].chunks == (1, 2, 2)
