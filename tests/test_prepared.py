@@ -121,4 +121,4 @@ def test_an_output_that_the_law_lacks_is_refused() -> None:
 
 def test_an_exponent_that_the_law_fixes_is_no_input() -> None:
     with pytest.raises(impact.UsageError, match='no input "n" of this law'):
-        impact.prepare(model="hertz", at={"v1": 1.0})(n=1.5)
+        impact.prepare(model="tsuji-1992", at={"v1": 1.0})(n=1.5)
