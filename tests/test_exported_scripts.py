@@ -74,9 +74,11 @@ def test_an_exported_script_measures_the_predicted_restitution(
     """Of the walls, one is at rest, the other one moves."""
     code, program, version = code_and_version(name, key)
     entry = EXPORTED[name, key]
-    # the first one is run with a wall
-    collisions = entry.collisions[1:] if second == "ball" else [with_wall(balls) for balls in entry.collisions[:2]]
     steps = COARSE_STEPS if code.scheme is not None else (float(entry.code.steps_per_contact),)
+    # of two, the first one is run with a wall
+    collisions = entry.collisions[len(steps) - 1 :]
+    if second == "wall":
+        collisions = [with_wall(balls) for balls in entry.collisions[:2]]
     differences, uncertainties = [], []
     for collision, steps_per_contact in zip(collisions, steps, strict=False):
         source = config_of(key, collision)
