@@ -253,7 +253,7 @@ PAIRINGS = (
             yade_viscoelastic,
             shortens_arms=True,
         )
-        for ratio, c_t in ((2 / 7, 0.0), (0.8, 5.0))
+        for ratio, c_t in ((2 / 7, 0.0), (0.8, 5.0), (1.5, 0.0))
     ),
     *(
         Pairing("yade-mindlin", "yade-betan", YADE_WALL, HERTZ, {"betas": betas}, yade_mindlin, shortens_arms=True)
@@ -275,19 +275,22 @@ PAIRINGS += (
         shortens_arms=True,
     ),
 )
-# its lever arm is the radius
-BULLET: Values = {"K": 1e6, "n": 1.0, "kelvin-voigt-no-tension.C": 30.0}
-PAIRINGS += (
-    Pairing(
+PYBULLET_WALL = Code("PyBullet", "run_pybullet_wall.py")
+
+
+def pybullet(K: float, C: float, second: Values) -> Pairing:
+    """A spring and a dashpot; against a plane the lever arm of friction is the radius."""
+    return Pairing(
         "coulomb-1785",
         "kelvin-voigt-no-tension",
-        Code("PyBullet", "run_pybullet_wall.py"),
-        BULLET,
+        PYBULLET_WALL,
+        {"K": K, "n": 1.0, "kelvin-voigt-no-tension.C": C},
         {},
-        lambda values, mu: {"k": BULLET["K"], "c": BULLET["kelvin-voigt-no-tension.C"], "mu": mu},
+        lambda values, mu: {"k": K, "c": C, "mu": mu},
         scheme="pybullet",
-    ),
-)
+        shortens_arms=bool(second),
+        second=second,
+    )
 
 
 # the normal of two balls turns while they touch: no map agrees closer with a code than with a shorter arm
@@ -295,6 +298,8 @@ SECOND: Values = {"m2": 0.03, "R2": 0.08}
 HARD_HOOKE, HARD_HERTZ = HOOKE | {"K": 1e12}, HERTZ | {"material": "hard"}
 HARD_VISCOELASTIC = VISCOELASTIC | {"K": 1e12, "yade-viscoelastic.C": 3e4}
 PAIRINGS += (
+    pybullet(1e6, 30.0, {}),
+    pybullet(1e12, 3e4, SECOND),
     Pairing(
         "lammps-linear-history",
         "lammps-coeff-restitution-hooke",

@@ -1,4 +1,4 @@
-"""A sphere and a plane in PyBullet, each with a stiffness, a damping and a friction of its own."""
+"""A sphere and a plane, or a second sphere, in PyBullet, with stiffness, damping and friction of their own."""
 
 from __future__ import annotations
 
@@ -11,17 +11,20 @@ from runner import serve
 
 def collide(
     k: float, c: float, mu: float, m1: float, R1: float, v1: float, u1: float, omega1: float, gap: float,
-    step: float, count: int,
+    step: float, count: int, m2: float = math.inf, R2: float = math.inf,
 ) -> tuple[float, float, float]:  # fmt: skip
     pybullet.connect(pybullet.DIRECT)
     pybullet.setTimeStep(step)
     pybullet.setPhysicsEngineParameter(contactSlop=0)
     sphere = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=R1)
-    plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, planeNormal=[-1, 0, 0])
-    bodies = [
-        pybullet.createMultiBody(m1, sphere, basePosition=[-R1 - gap, 0, 0]),
-        pybullet.createMultiBody(0, plane),
-    ]
+    # the normal is along x at the first touch, the tangent along y
+    bodies = [pybullet.createMultiBody(m1, sphere, basePosition=[-R1 - gap, -u1 * gap / v1, 0])]
+    if math.isinf(R2):
+        plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, planeNormal=[-1, 0, 0])
+        bodies.append(pybullet.createMultiBody(0, plane))
+    else:
+        second = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=R2)
+        bodies.append(pybullet.createMultiBody(m2, second, basePosition=[R2, 0, 0]))
     for body in bodies:
         # the springs act in series, the dashpots add, and the coefficient of friction is a product
         pybullet.changeDynamics(
