@@ -265,7 +265,7 @@ def notes(collision: Collision) -> list[str]:
     if collision.has_wall:
         remarks += [
             "fix wall/gran hooke/history and hertz/history of 22 July 2025: their friction depends on the unit of",
-            "length, and 13 of 41 impacts had another beta than their law; in the release of 23 June 2022 none had",
+            "length, and 13 of 41 impacts had another beta than their law; in that of 23 June 2022 none had",
         ]
     else:
         remarks.append(
