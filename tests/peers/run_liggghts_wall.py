@@ -13,12 +13,8 @@ from pathlib import Path
 
 from runner import serve
 
-# a single process of Open MPI needs neither a network nor a daemon, for which it would look each time
-ENVIRONMENT = os.environ | {
-    "OMPI_MCA_pml": "ob1",
-    "OMPI_MCA_btl": "self",
-    "OMPI_MCA_ess_singleton_isolated": "1",
-}
+# one process needs no network, for which MPI would look each time
+ENVIRONMENT = os.environ | {"OMPI_MCA_pml": "ob1", "OMPI_MCA_btl": "self"}
 SCRIPT = """
 atom_style granular
 atom_modify map array

@@ -23,8 +23,6 @@ VERSION_TIMEOUT_S = 60
 # a program that prints more than the first is stopped; of its output, the end is kept
 MAX_OUTPUT_BYTES, KEPT_OUTPUT_BYTES = 2**26, 2**20
 POLL_INTERVAL_S = 0.05
-# a single process of Open MPI needs neither a network nor a daemon, for which it would look each time
-SINGLE_PROCESS = {"OMPI_MCA_pml": "ob1", "OMPI_MCA_btl": "self", "OMPI_MCA_ess_singleton_isolated": "1"}
 
 
 def find_program(name: str, requested: str | None) -> str | None:
@@ -80,13 +78,7 @@ def run_program(command: Sequence[str], folder: str, timeout_s: float) -> subpro
     deadline = time.monotonic() + timeout_s
     with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
         process = subprocess.Popen(
-            command,
-            cwd=folder,
-            stdin=subprocess.DEVNULL,
-            stdout=out,
-            stderr=err,
-            start_new_session=True,
-            env=SINGLE_PROCESS | os.environ,
+            command, cwd=folder, stdin=subprocess.DEVNULL, stdout=out, stderr=err, start_new_session=True
         )
         try:
             while process.poll() is None:
