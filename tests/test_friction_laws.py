@@ -133,6 +133,33 @@ def test_a_friction_law_has_a_source_and_whole_parameters(law: FrictionLaw) -> N
         assert not parameter.choices or parameter.most == len(parameter.choices) - 1
 
 
+@pytest.mark.parametrize(("model", "n"), [("anagnostopoulos-1988", 1.0), ("tsuji-1992", 1.5)])
+def test_kratos_takes_a_part_of_the_stiffness_and_the_damping_ratio_of_its_contact_force(
+    model: str, n: float
+) -> None:
+    values, part = values_of("kratos-viscous-coulomb", model, n), 2.0 * (1.0 - NU) / (2.0 - NU)
+    of_contact = values_of("lammps-linear-nohistory", model, n)[TANGENTIAL_DAMPING]
+    assert values[TANGENTIAL_STIFFNESS] == pytest.approx(part * n * SOLID, rel=1e-12)
+    assert values[TANGENTIAL_DAMPING] == pytest.approx(math.sqrt(part) * of_contact, rel=1e-12)
+
+
+def test_kratos_has_its_part_of_a_stiffness_that_is_set() -> None:
+    """The law has no parameter for the tangential stiffness."""
+    at = {
+        "K": 1e7,
+        "e": 0.7,
+        "mu": 0.3,
+        "angle": "40 deg",
+        "v1": 1.0,
+        "m1": 1.0,
+        "m2": 1.0,
+        "R1": 0.05,
+        "R2": 0.05,
+    }
+    rows = impact.timestep("kratos-linear", friction="kratos-viscous-coulomb", at=at, steps_per_contact=[12]).rows
+    assert rows[0].beta_mean == pytest.approx(0.2664, abs=1e-4)
+
+
 def test_unknown_and_malformed_keys_are_refused() -> None:
     with pytest.raises(ModelError, match='no friction law "coulomb"; did you mean "coulomb-1785"'):
         find_friction("coulomb")

@@ -53,7 +53,7 @@ End SubModelPart
 
 
 def mesh(places: list[tuple[float, float]], radii: list[float]) -> str:
-    """Particles at places of the plane z = 0."""
+    """Write particles at places of the plane z = 0."""
     balls = range(1, len(places) + 1)
     nodes = "".join(f"{i} {x!r} {y!r} 0\n" for i, (x, y) in zip(balls, places, strict=True))
     elements = "".join(f"{i} 0 {i}\n" for i in balls)

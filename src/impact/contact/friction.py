@@ -244,7 +244,8 @@ def parameter_problem(
     names = [name for name in STIFFNESS_PARAMETERS if any(p.name == name for p in law.parameters)]
     if len(chosen) == 2:
         return "k_t: set together with kt_over_kn, expected one of the two"
-    if chosen or not law.stiffness:
+    if chosen or not names:
+        # a law without a choice takes a part of the stiffness of the contact, or none
         return ""
     if law.stiffness in ("constant", "classic"):
         expected = "[N/m], such as 1e6; or kt_over_kn" if len(names) > 1 else "[N/m^2], such as 1e6"
@@ -259,9 +260,10 @@ def required_inputs(law: FrictionLaw, given: Collection[str], exponents: Collect
 
     `given` are the names of the parameters that the user sets, `exponents` those of the contact forces.
     """
-    is_hertz = law.stiffness in ("mindlin", "kratos") or (law.stiffness == "liggghts" and HERTZ in exponents)
+    is_hertz = law.stiffness == "mindlin" or (law.stiffness == "liggghts" and HERTZ in exponents)
+    is_of_materials = is_hertz or law.stiffness == "kratos"
     has_stiffness = any(name in given for name in STIFFNESS_PARAMETERS)
-    of_materials = ("E1", "nu1", "E2", "nu2") if is_hertz and not has_stiffness else ()
+    of_materials = ("E1", "nu1", "E2", "nu2") if is_of_materials and not has_stiffness else ()
     is_of_e = "betas" not in given if law.damping == "betas" else law.damping == "liggghts" and is_hertz
     return frozenset((*of_materials, *(("e",) if is_of_e else ())))
 
@@ -308,9 +310,7 @@ def _spring_values(pair: Pair, oblique: ObliqueImpacts) -> dict[str, Array]:
 
 
 def _stiffness_power(law: FrictionLaw, n: float) -> float:
-    as_contact = n - 1.0
-    powers = {"": 0.0, "constant": 0.0, "mindlin": 0.5, "classic": 0.5}
-    return {**powers, "liggghts": as_contact, "kratos": as_contact}[law.stiffness]
+    return {"mindlin": 0.5, "classic": 0.5, "liggghts": n - 1.0, "kratos": n - 1.0}.get(law.stiffness, 0.0)
 
 
 def _stiffness(pair: Pair, oblique: ObliqueImpacts) -> Array:
