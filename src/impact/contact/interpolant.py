@@ -42,6 +42,8 @@ MAX_INTERVALS = 250
 REAL_ROOT, NOISE = 1e-6, 1e-13
 # the intervals of a dimensionless group; other values are integrated
 GROUP_EDGES = np.concatenate([[0.0], 10.0 ** np.arange(-4, 9)])
+# how many values are computed at a time
+BLOCK = 4096
 # the columns of a collision that are interpolated, and their sizes where their values are smaller
 FLOORS = {
     "e_out": 1.0,
@@ -236,7 +238,13 @@ class Interpolant:
 
     def _polynomials(self, x: Array, number: NDArray[np.intp]) -> Array:
         t = to_unit(x, self._edges[number], self._edges[number + 1])
-        return np.asarray(chebyshev.chebval(t[:, None], self._coefficients[:, number], tensor=False), float)
+        values: Array = np.empty((x.size, self.floors.size))
+        # in blocks whose coefficients stay in the cache
+        for start in range(0, x.size, BLOCK):
+            part = slice(start, start + BLOCK)
+            coefficients = self._coefficients[:, number[part]]
+            values[part] = chebyshev.chebval(t[part, None], coefficients, tensor=False)
+        return values
 
     def _refine(self, numbers: NDArray[np.intp]) -> bool:
         """Try intervals that are untried, and divide those that are not accurate; whether any was."""
