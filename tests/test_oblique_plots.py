@@ -210,14 +210,22 @@ def test_conditions_of_84_mm_have_three_lines(config: str) -> None:
     assert {"$m_2$", "∞"} <= set(re.split(r"[\s,=]+", conditions.get_text()))
 
 
-def test_more_conditions_have_smaller_letters(beads: xr.Dataset) -> None:
+def test_more_conditions_have_smaller_letters_and_at_most_three_lines(beads: xr.Dataset) -> None:
     plot_data = curves_of(beads, "beta")
-    texts = [
-        draw(replace(plot_data, conditions=conditions), Look(width="84mm")).texts[1]
-        for conditions in ("e = 0.5", ", ".join(["e = 0.5"] * 30))
+    figures = [
+        draw(replace(plot_data, conditions=", ".join(["e = 0.5"] * count)), Look(width="84mm"))
+        for count in (1, 23, 60)
     ]
-    short, long = (text.get_fontsize() for text in texts)
-    assert long < short
+    one, many, most = (figure.texts[1] for figure in figures)
+    assert most.get_fontsize() == many.get_fontsize() < one.get_fontsize()
+    assert many.get_text().split().count("e") == 23
+    assert most.get_text().count("\n") == 2
+    shown = most.get_text().split().count("e")
+    assert most.get_text().replace("\n", " ").endswith(f"e = 0.5, and {60 - shown} more")
+    # a wider figure has room for all
+    figures[2].set_size_inches(12.0, 3.0)
+    figures[2].canvas.draw()
+    assert most.get_text().split().count("e") == 60
 
 
 def test_friction_laws_are_selected_as_models_are(

@@ -78,7 +78,7 @@ def plot(
     title : write the title and the conditions; by default unless `ax` is set
     legend : name laws by title, year and parameters ("full"), by first author and year ("short"), or by key
         ("keys"); "none" for no legend; by default the first of these with which it takes at most a fifth of the
-        height
+        height, else the shortest in a higher picture
     decimal : "point" or "comma", in all numbers; "locale" for that of LC_NUMERIC
     labels : texts by the name of an axis, of a variable whose name is at the end of its curve, the key of a law,
         "reference" or "title"
@@ -156,12 +156,14 @@ def draw(
         return figure
     if look.legend is not None or not plot_data.laws:
         return _new_picture(plot_data, look, measured, heading)
-    pictures = []
+    shares = {}
     for legend in DEFAULT_LEGENDS:
-        pictures.append(_new_picture(plot_data, replace(look, legend=legend), measured, heading))
-        if pictures[-1].legend_share <= LEGEND_PART:
-            return pictures[-1]
-    return min(pictures, key=lambda picture: picture.legend_share)
+        picture = _new_picture(plot_data, replace(look, legend=legend), measured, heading)
+        if picture.legend_share <= LEGEND_PART:
+            return picture
+        shares[legend] = picture.legend_share
+    smallest = replace(look, legend=min(shares, key=shares.__getitem__))
+    return _new_picture(plot_data, smallest, measured, heading, legend_rows=True)
 
 
 def _labels(plot_data: PlotData, look: Look) -> dict[str, str]:
@@ -169,13 +171,16 @@ def _labels(plot_data: PlotData, look: Look) -> dict[str, str]:
     return {**legend_labels(plot_data.laws, look.legend or "full"), **(look.labels or {})}
 
 
-def _new_picture(plot_data: PlotData, look: Look, measured: Points | None, heading: str) -> Picture:
-    """Draw a picture in a new figure."""
+def _new_picture(
+    plot_data: PlotData, look: Look, measured: Points | None, heading: str, *, legend_rows: bool = False
+) -> Picture:
+    """Draw a picture in a new figure, with the names of its legend in columns or one after the other in rows."""
     with styled(look.style):
         (width, height), (default_width, default_height) = look.size, default_size()
         width, height = width or default_width, height or default_height
         texts = (heading, pretty_conditions(plot_data.conditions)) if look.title else ()
         picture = Picture(width, *texts)
+        picture.has_legend_rows = legend_rows
         all_axes, panels_height = plot_data.place_panels(picture, width)
         entries = _draw_panels(plot_data, all_axes, _labels(plot_data, look), measured, look)
         if look.decimal == "comma":

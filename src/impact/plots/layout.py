@@ -34,7 +34,9 @@ LABEL_SHARE_OF_AXIS = 0.93
 LEGEND_SHARE = 0.5
 # a legend with more entries, or of a larger part of the height of a picture, has smaller letters
 MANY_ENTRIES, LEGEND_PART = 16, 0.2
-# conditions of more lines have smaller letters
+# space between columns, in letters
+COLUMN_SPACING = 1.2
+# conditions of more lines have smaller letters, and the last are left out
 MAX_CONDITION_LINES = 3
 
 
@@ -50,8 +52,11 @@ class Picture(Figure):
         )
         texts = zip((title, conditions), styles, strict=True)
         self.header = [self.text(0.0, 1.0, text, va="top", **style) for text, style in texts if text]
+        self.title = self.header[0] if title else None
         self.entries: list[tuple[Artist, str]] = []
         self.has_small_legend = False
+        # whether names follow each other in rows, without columns
+        self.has_legend_rows = False
         # part of the height; each entry that is left out counts as another height
         self.legend_share = 0.0
         self.shared: tuple[Text, ...] = ()
@@ -87,7 +92,10 @@ class Picture(Figure):
         if legend > LEGEND_PART * (height or GAP_INCHES + self.place_header() + body + legend):
             self.has_small_legend = True
             legend = self.place_legend(shown)
-        if height is None:
+        if height is None and self.has_legend_rows:
+            height = GAP_INCHES + self.place_header() + body + legend
+            height = max(height, min(legend / LEGEND_PART, MAX_HEIGHT_INCHES))
+        elif height is None:
             most = min(legend, MAX_HEIGHT_INCHES / 2.0)
             height = GAP_INCHES + self.place_header() + max(body, most) + most
         while legend > LEGEND_SHARE * height and len(shown) > 1:
@@ -110,6 +118,9 @@ class Picture(Figure):
         return self.legend_height()
 
     def _place_legend(self) -> None:
+        if self.has_legend_rows:
+            self._place_rows()
+            return
         max_width = self.bbox.width - GAP_INCHES * self.dpi
         columns = max(1, int(max_width / self._legend(1).get_window_extent(self.renderer).width))
         # columns of short names are narrower than a single column: another one may fit
@@ -118,6 +129,30 @@ class Picture(Figure):
             if self._legend(number).get_window_extent(self.renderer).width <= max_width:
                 break
 
+    def _place_rows(self) -> None:
+        """Put the entries one after the other, in as many rows as it takes; each row is a legend."""
+        legend = self._legend(1)
+        size = float(legend.get_texts()[0].get_fontsize()) * self.dpi / 72.0
+        between = (legend.handlelength + legend.handletextpad + COLUMN_SPACING) * size
+        widths = [text.get_window_extent(self.renderer).width + between for text in legend.get_texts()]
+        legend.remove()
+        rows: list[list[tuple[Artist, str]]] = []
+        left = 0.0
+        for entry, width in zip(self.entries, widths, strict=True):
+            if width > left:
+                rows.append([])
+                left = self.bbox.width
+            rows[-1].append(entry)
+            left -= width
+        bottom = GAP_INCHES
+        for row in reversed(rows):
+            # in inches from the lower left corner, at any resolution
+            place = {"bbox_to_anchor": (GAP_INCHES, bottom), "bbox_transform": self.dpi_scale_trans}
+            legend = self._legend(len(row), row, loc="lower left", borderaxespad=0.0, borderpad=0.1, **place)
+            bottom += float(legend.get_window_extent(self.renderer).height / self.dpi)
+        # from the first row to the last
+        self.legends.reverse()
+
     @property
     def renderer(self) -> RendererBase:
         """Get the renderer that measures text at the present resolution; a text would keep the one used before."""
@@ -125,18 +160,18 @@ class Picture(Figure):
 
     def legend_height(self) -> float:
         """Measure the legend [in]."""
-        return sum(
-            float(legend.get_window_extent(self.renderer).height / self.dpi) + GAP_INCHES
-            for legend in self.legends
-        )
+        if not self.legends:
+            return 0.0
+        boxes = [legend.get_window_extent(self.renderer) for legend in self.legends]
+        height = max(box.y1 for box in boxes) if self.has_legend_rows else boxes[0].height
+        return float(height / self.dpi) + GAP_INCHES
 
-    def _legend(self, columns: int) -> Legend:
-        """Add the legend in a number of columns; names wider than the figure are broken into lines."""
+    def _legend(self, columns: int, entries: Sequence[tuple[Artist, str]] = (), **place: Any) -> Legend:
+        """Add a legend in a number of columns; names wider than the figure are broken into lines."""
         style: dict[str, Any] = {"fontsize": "x-small", "labelspacing": 0.3} if self.has_small_legend else {}
-        handles, names = zip(*self.entries, strict=True)
-        legend = self.legend(
-            handles, names, loc="lower center", ncols=columns, borderaxespad=0.3, columnspacing=1.2, **style
-        )
+        handles, names = zip(*(entries or self.entries), strict=True)
+        style |= {"loc": "lower center", "ncols": columns, "borderaxespad": 0.3, "columnspacing": COLUMN_SPACING}
+        legend = self.legend(handles, names, **(style | place))
         max_width = self.bbox.width - 4.5 * float(legend.get_texts()[0].get_fontsize()) * self.dpi / 72.0
         for text in legend.get_texts():
             self.fit(text, max_width)
@@ -158,9 +193,22 @@ class Picture(Figure):
             if text.get_text().count("\n") >= MAX_CONDITION_LINES:
                 text.set_fontsize("x-small")
                 self.fit(text, self.bbox.width - 2.0 * gap)
+                if text is not self.title:
+                    self._shorten(text, self.bbox.width - 2.0 * gap)
             text.set_position((gap / self.bbox.width, down / self.bbox.height))
             down -= text.get_window_extent(self.renderer).height + gap
         return float((self.bbox.height - down) / self.dpi)
+
+    def _shorten(self, conditions: Text, max_width: float) -> None:
+        """Leave out the conditions beyond MAX_CONDITION_LINES lines, and say how many they are."""
+        whole, _ = self.fitted[conditions]
+        parts = whole.split(", ")
+        for count in range(len(parts) - 1, 0, -1):
+            if conditions.get_text().count("\n") < MAX_CONDITION_LINES:
+                break
+            conditions.set_text(f"{', '.join(parts[:count])}, and {len(parts) - count} more")
+            self.fit(conditions, max_width)
+        self.fitted[conditions] = whole, conditions.get_text()
 
     def place_around(self) -> tuple[float, float, float]:
         """Place the texts around the panels; returns the fractions that they take left, below, above."""
