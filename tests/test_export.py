@@ -71,7 +71,7 @@ def test_the_default_law_is_the_first_that_the_installed_release_has(cli: Run, t
     models = ["lammps-coeff-restitution-hooke", "lammps-velocity-hooke"]
     config = source("soft", "soft") | {"models": models, "model": {models[1]: {"C": 10.0}}}
     assert impact.export("lammps", source=config, program=str(lmp)).model == models[1]
-    with pytest.raises(UsageError, match="LAMMPS 20210929 has no coeff_restitution, expected 20240601 or later"):
+    with pytest.raises(UsageError, match="LAMMPS 20210929 has no coeff_restitution, expected code_version 20240601 or"):
         impact.export("lammps", source=config | {"models": models[0]}, program=str(lmp))
 
 
@@ -429,7 +429,7 @@ def test_every_law_of_a_code_is_in_the_list(cli: Run) -> None:
         (("--to", "lammps", "--code-version", "new"), '--code-version: got "new", expected the date of a release'),
         (
             ("--to", "lammps", "--model", "lammps-coeff-restitution-hertz", "--code-version", "29Aug2019"),
-            "has no coeff_restitution, expected 20240601 or later",
+            "has no coeff_restitution, expected --code-version 20240601 or later",
         ),
         (
             ("--to", "lammps", "--verify", "--program", "/nowhere"),

@@ -146,8 +146,9 @@ def law_for_version(key: str, version: str) -> str:
     _, damping, limit = OPTIONS[key]
     for name, since in (("coeff_restitution", COEFF_RESTITUTION_SINCE), ("limit_damping", LIMIT_SINCE)):
         if name in (damping, limit.strip()) and version < since:
+            # the version may be that of the installed program
             origin = argument("code_version")
-            raise UsageError(f"{origin}: LAMMPS {version} has no {name}, expected {since} or later")
+            raise UsageError(f"LAMMPS {version} has no {name}, expected {origin} {since} or later")
     if damping != "tsuji":
         return key
     stem = key.removesuffix("-limit").removesuffix("-without-root")
