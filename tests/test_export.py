@@ -71,7 +71,9 @@ def test_the_default_law_is_the_first_that_the_installed_release_has(cli: Run, t
     models = ["lammps-coeff-restitution-hooke", "lammps-velocity-hooke"]
     config = source("soft", "soft") | {"models": models, "model": {models[1]: {"C": 10.0}}}
     assert impact.export("lammps", source=config, program=str(lmp)).model == models[1]
-    with pytest.raises(UsageError, match="LAMMPS 20210929 has no coeff_restitution, expected code_version 20240601 or"):
+    with pytest.raises(
+        UsageError, match="LAMMPS 20210929 has no coeff_restitution, expected code_version 20240601 or"
+    ):
         impact.export("lammps", source=config | {"models": models[0]}, program=str(lmp))
 
 

@@ -15,6 +15,7 @@ import pandas as pd
 import pint
 import pytest
 import xarray as xr
+from rich.cells import cell_len
 
 import impact
 
@@ -222,11 +223,41 @@ def test_a_law_of_the_catalogue_is_the_same_law_after_pickling() -> None:
     assert pickle.loads(pickle.dumps(law)) is law
 
 
+def damped(e: float) -> float:
+    """The damping of a law of this module."""
+    return 1.0 - e
+
+
+def test_a_law_of_a_module_is_pickled() -> None:
+    law = impact.hysteresis("mine-2026", title="Mine", year=2026, equation="", reference="", chi=damped)
+    assert pickle.loads(pickle.dumps(impact.run(model="mine-2026", plugins=[law]))).model.key == "mine-2026"
+
+
+def test_the_text_of_a_result_has_100_columns() -> None:
+    for text in map(
+        str,
+        (
+            impact.models(),
+            impact.frictions(),
+            impact.run(friction="coulomb-1785", at={"mu": 0.3, "angle": "45 deg"}),
+        ),
+    ):
+        # a dot above a letter takes no column
+        assert 90 < max(map(cell_len, text.splitlines())) <= 100
+
+
 def test_errors_are_those_of_python() -> None:
     with pytest.raises(ValueError, match=r"got 1\.4"):
         impact.run(at={"e": 1.4})
     with pytest.raises(FileNotFoundError, match=r"^no\.toml: cannot be read"):
         impact.sweep("no.toml")
+    # also the errors of their kind, as before
+    with pytest.raises(FileNotFoundError, match=r"^no\.h5: does not exist") as missing:
+        impact.load("no.h5")
+    assert isinstance(missing.value, impact.ResultError)
+    with pytest.raises(FileNotFoundError, match=r"^no\.py: cannot be read") as missing:
+        impact.run(plugins=["no.py"])
+    assert isinstance(missing.value, impact.UsageError)
     error = pickle.loads(pickle.dumps(impact.ConfigError("a", "b\n")))
     assert (type(error), error.problems) == (impact.ConfigError, ("a", "b\\x0a"))
 

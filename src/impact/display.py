@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     import pandas as pd
     from rich.console import Console
 
-# width of a table that is not printed on a terminal
-PIPE_WIDTH = 160
+# width of a table of a command that is not printed on a terminal, and of a result as text
+PIPE_WIDTH, TEXT_WIDTH = 160, 100
 # characters of a cell, and of a line, which may be a command that is copied
 MAX_CELL, MAX_LINE = 200, 4000
 # files of tables, and their decimal separators
@@ -303,7 +303,7 @@ class Displayed:
         return pd.DataFrame.from_records(list(self.records()))
 
     def __str__(self) -> str:
-        stream, width = io.StringIO(), _width(sys.stdout)
+        stream, width = io.StringIO(), _width(sys.stdout, TEXT_WIDTH)
         print_blocks(self.sections(width), stream, width)
         return stream.getvalue().removesuffix("\n")
 
@@ -343,9 +343,9 @@ def print_blocks(blocks: Iterable[Block], stream: TextIO | None = None, width: i
             print(safe_text(block, MAX_LINE), file=stream)
 
 
-def _width(stream: TextIO) -> int:
-    """The columns of a terminal; of a pipe PIPE_WIDTH."""
-    return _console(stream).width if stream.isatty() else PIPE_WIDTH
+def _width(stream: TextIO, other: int = PIPE_WIDTH) -> int:
+    """The columns of a terminal; another width without one."""
+    return _console(stream).width if stream.isatty() else other
 
 
 def _console(stream: TextIO, width: int | None = None) -> Console:

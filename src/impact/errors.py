@@ -2,10 +2,10 @@
 
     ImpactError
     ├── ConfigError    the config of a sweep is invalid: all problems, one per line; a ValueError
-    │   └── MissingFileError  a file that was named does not exist; a FileNotFoundError
     ├── ModelError     the definition of a contact force model is invalid
     ├── UsageError     an argument does not fit the data or the file system; a ValueError
     ├── ResultError    a file is not a readable result
+    ├── MissingFileError  a file that was named does not exist: all of these three, and a FileNotFoundError
     ├── StoreError     the result could not be computed or stored; finished ranges are kept
     ├── InUseError     another process writes the output
     └── UnfinishedError  a signal stopped a sweep; finished ranges are kept
@@ -60,10 +60,6 @@ class ConfigError(ImpactError, ValueError):
     """The config of a sweep is invalid; `problems` holds one line for each problem."""
 
 
-class MissingFileError(ConfigError, FileNotFoundError):
-    """A file that was named does not exist."""
-
-
 class ModelError(ImpactError):
     """The definition of a contact force model is invalid, or a model is not in the catalogue."""
 
@@ -74,6 +70,10 @@ class UsageError(ImpactError, ValueError):
 
 class ResultError(ImpactError):
     """A file is not a readable result: foreign, damaged, or of another schema version."""
+
+
+class MissingFileError(ConfigError, UsageError, ResultError, FileNotFoundError):
+    """A file that was named does not exist: a config, a plug-in, a table of numbers or a result."""
 
 
 class StoreError(ImpactError):

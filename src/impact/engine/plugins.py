@@ -26,7 +26,7 @@ from typing import NamedTuple
 from ..config.quantities import as_text
 from ..contact.model import ForceModel
 from ..contact.models import catalogue
-from ..errors import NOT_OF_A_PLUGIN, ImpactError, ModelError, UsageError
+from ..errors import NOT_OF_A_PLUGIN, ImpactError, MissingFileError, ModelError, UsageError
 from ..formatting import safe_text
 
 ENTRY_POINT_GROUP = "impact.models"
@@ -214,7 +214,8 @@ def _read_source(path: Path) -> PythonFile:
         raise
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise UsageError(f"{path}: cannot be read: {reason}") from None
+        kind_of_error = MissingFileError if isinstance(error, FileNotFoundError) else UsageError
+        raise kind_of_error(f"{path}: cannot be read: {reason}") from None
 
 
 def _execute_module(source: PythonFile, sha256: str) -> ModuleType:

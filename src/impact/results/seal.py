@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from ..config.files import RESULT_MAGIC, file_hint
-from ..errors import ResultError
+from ..errors import MissingFileError, ResultError
 from .schema import SCHEMA_VERSION
 
 # bytes at the start of an HDF5 file that the format leaves to applications: its "user block"
@@ -74,8 +74,10 @@ def is_result(path: Path) -> bool:
 @contextmanager
 def open_regular_file(path: Path) -> Iterator[BinaryIO]:
     """Open a regular file for reading."""
+    if not path.exists():
+        raise MissingFileError("does not exist")
     if not path.is_file():
-        raise ResultError("is not a regular file" if path.exists() else "does not exist")
+        raise ResultError("is not a regular file")
     # also a file of the system such as /proc/kmsg, of which reading might never end
     if not path.stat().st_size:
         raise ResultError("is not a readable result (empty: it does not begin with the header of a sealed file)")

@@ -161,7 +161,7 @@ def _named_errors(path: str | Path) -> Iterator[None]:
     except ResultError as error:
         if str(error).startswith(f"{safe_text(str(path))}: "):
             raise
-        raise ResultError(f"{path}: {error}") from None
+        raise type(error)(f"{path}: {error}") from None
     except Exception as error:
         raise ResultError(f"{path}: is not a readable result ({safe_text(str(error), 80)})") from error
 

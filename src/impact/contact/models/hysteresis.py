@@ -32,7 +32,7 @@ def hysteresis(key: str, *, chi: Formula, **about: Unpack[About]) -> ForceModel:
         **about,
         force=damped,
         coefficients={"chi": chi},
-        oracle=lambda chi: delivered_restitution(chi),
+        oracle=delivered_restitution,
         velocity_coordinate="log",
         family="hysteresis",
     )
