@@ -215,6 +215,8 @@ def write_reference(app: Any) -> None:
         path = REFERENCE / f"{name}.md"
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text, encoding="utf-8")
+    figure6 = impact.sweep(REFERENCE.parents[1] / "configs" / "figure6.toml")
+    impact.page(figure6, output=REFERENCE / "figure6.html", overwrite=True)
     pages = {"commands": command_page, "config": config_page, "python": api_page, "modules": module_page}
     for name, page in pages.items():
         (REFERENCE / f"{name}.md").write_text(page(), encoding="utf-8")

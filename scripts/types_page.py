@@ -146,6 +146,7 @@ def calls_of_results(folder: Path) -> dict[str, Call]:
         "`plot`": lambda result: impact.plot(result).axes[0].lines[-1].get_ydata(),
         "`recommend`": lambda result: impact.recommend(result)[0].max_error,
         "`report`": lambda result: len(impact.report(result)) > 0,
+        "`page`": lambda result: len(impact.page(result)) > 0,
         "`info`": lambda result: impact.info(result).as_dict()["points"],
         "`compare`": lambda result: impact.compare(result, path).equal,
         "`run`, `source`": lambda result: impact.run(result, at={"e": 0.5, "v1": 2.0}).values["v1_post"],

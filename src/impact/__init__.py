@@ -10,7 +10,8 @@ merge, progress_bar
 >>> result["e_out"].sel(model="flores-2011").round(4).values.tolist()
 [0.4704, 0.8939]
 
-See results and choose a law: recommend, plot, plot_to_files, explore, report, describe, info
+See results and choose a law: recommend, plot, plot_to_files, explore, report, page,
+describe, info
 
 >>> impact.recommend(result, tol=0.1)[0].model
 'flores-2011'
@@ -89,6 +90,7 @@ if TYPE_CHECKING:
     from .plots.explore import explore as explore
     from .plots.files import plot_to_files as plot_to_files
     from .progress_display import progress_bar as progress_bar
+    from .reporting.explorer import page as page
     from .reporting.page import report as report
     from .results.board import Board as Board
     from .results.citations import Citations as Citations, cite as cite
@@ -154,6 +156,7 @@ _MODULES = {
     "materials": "config.material_library",
     "merge": "results.shards",
     "models": "engine.model_catalogue",
+    "page": "reporting.explorer",
     "plot": "plots.draw",
     "plot_to_files": "plots.files",
     "power": "contact.powers",

@@ -29,6 +29,7 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
         "results.h5 --tol 2% --sel m2=1.0",
     ),
     "report": ("report", "Write a report as one HTML page.", "results.h5 -o report.html"),
+    "page": ("page", "Write a page with sliders for a browser.", "results.h5 -o page.html"),
     "run": ("run", "Run one impact.", "--model gharib-hurmuzlu-2012 --at e=0.05 --at m2=2.0 --history out.h5"),
     "solve": (
         "solve",

@@ -198,16 +198,14 @@ def _slider(dataset: xr.Dataset, name: str, is_free: bool, value: float | str | 
     """Make the slider of an axis, of any number in its range with a field or of its values, at a value."""
     import ipywidgets
 
-    parsed, unit, values = InputName.parse(name), unit_of(dataset[name]), dataset[name].values
-    # the parameter before its law, which may be cut
-    label = ", ".join(filter(None, (parsed.key if unit == "1" else f"{parsed.key} [{unit}]", parsed.owner)))
+    values, label = dataset[name].values, axis_label(name, unit_of(dataset[name]))
     first = values[0].item() if value is None else in_si(dataset[name], value)
     if not (is_free and isinstance(first, float | int) and values.min() <= first <= values.max()):
         # one of the grid, or the message that there is no such value
         first = select(dataset, {name: first})[name].values.ravel()[0].item()
     if not is_free:
         return ipywidgets.SelectionSlider(
-            options=_shown_values(dataset[name]), value=first, description=label, continuous_update=False
+            options=shown_values(dataset[name]), value=first, description=label, continuous_update=False
         )
     least, most = float(values.min()), float(values.max())
     is_log = is_geometric(np.sort(values))
@@ -223,6 +221,16 @@ def _slider(dataset: xr.Dataset, name: str, is_free: bool, value: float | str | 
         readout_format=".6",
         continuous_update=False,
     )
+
+
+def axis_label(name: str, unit: str = "1") -> str:
+    """Name an axis beside its control: the parameter before its law, which may be cut.
+
+    >>> axis_label("kuwabara-kono-1987.A", "s")
+    'A [s], kuwabara-kono-1987'
+    """
+    parsed = InputName.parse(name)
+    return ", ".join(filter(None, (parsed.key if unit == "1" else f"{parsed.key} [{unit}]", parsed.owner)))
 
 
 def value_shown(value: float, grid: np.ndarray) -> float:
@@ -331,7 +339,7 @@ def axes_of(dataset: xr.Dataset) -> list[str]:
     return [str(dim) for dim in dataset.dims if dim not in ("model", "friction", SAMPLE) and dim in dataset.coords]
 
 
-def _shown_values(coordinate: xr.DataArray) -> list[tuple[str, Any]]:
+def shown_values(coordinate: xr.DataArray) -> list[tuple[str, Any]]:
     """List the texts and values of the positions of an axis."""
     word, unit = InputName.parse(coordinate.name).word, unit_of(coordinate)
     return [(safe_text(quantity(word(value), unit)), value) for value in coordinate.values.tolist()]

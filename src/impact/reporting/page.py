@@ -145,8 +145,8 @@ def page(
     descriptions = [_model_section(dataset.isel(model=index)) for index in range(dataset.sizes["model"])]
     inputs = inputs_of(dataset)
     lines = str(dataset.attrs.get("config", "")).replace("\r\n", "\n").expandtabs(4).split("\n")
-    return _template("page.html.j2").render(
-        title=_title(dataset),
+    return template("page.html.j2").render(
+        title=page_title(dataset),
         summary=f"{describe_data(dataset)}." if fits else "" if studies else _summary_sentence(dataset),
         fits=fits,
         studies=studies,
@@ -167,7 +167,7 @@ def page(
         selection=selection,
         figures=drawn,
         left_out=left_out,
-        running_title=_css_text(_title(dataset)),
+        running_title=_css_text(page_title(dataset)),
         failures=_failures_section(dataset, summary),
         friction=_friction_section(dataset, summary) if "friction" in dataset.dims else None,
         facts=_facts(dataset),
@@ -182,8 +182,8 @@ def _board_page(dataset: xr.Dataset) -> str:
     """Write a board as one page of HTML."""
     board = Board(dataset)
     engines = board.engines
-    return _template("board.html.j2").render(
-        title=_title(dataset),
+    return template("board.html.j2").render(
+        title=page_title(dataset),
         names=[engine["engine"] for engine in engines],
         rows=board_rows(engines),
         headings=list(BOARD_HEADINGS),
@@ -197,7 +197,7 @@ def _board_page(dataset: xr.Dataset) -> str:
             for engine in engines
         ],
         facts=_facts(dataset),
-        running_title=_css_text(_title(dataset)),
+        running_title=_css_text(page_title(dataset)),
     )
 
 
@@ -213,7 +213,7 @@ def _css_text(text: str) -> Markup:
     )
 
 
-def _title(dataset: xr.Dataset) -> str:
+def page_title(dataset: xr.Dataset) -> str:
     if is_calibration(dataset):
         return calibration_title(dataset) or "Calibration"
     if is_sensitivity(dataset):
@@ -254,7 +254,7 @@ def _studies(dataset: xr.Dataset) -> Iterator[dict[str, Any]]:
         }
 
 
-def _template(name: str) -> Template:
+def template(name: str) -> Template:
     """Load a template, which escapes all values."""
 
     def text(value: object) -> str:

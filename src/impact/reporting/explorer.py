@@ -1,0 +1,256 @@
+"""A result to look at in a browser: one file of HTML, with what was integrated and no law and no integrator.
+
+The outputs follow from it by a few formulas, in `explorer.js`; `explorer.html.j2` is the template.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from markupsafe import Markup
+from numpy.typing import NDArray
+
+from .._version import __version__
+from ..array_types import Array
+from ..atomic import check_outputs, write_file
+from ..config.grid import SAMPLE
+from ..config.input_names import InputName
+from ..contact.status import FIRST_FAILURE
+from ..contact.variables import OUTPUTS
+from ..engine.build_impacts import build_impacts, mass_at, restitution_at, velocity_at
+from ..engine.inputs import Inputs
+from ..errors import UsageError
+from ..formatting import argument, with_year
+from ..plots.explore import axes_of, axis_label, shown_values
+from ..plots.slices import conditions_of, unit_of
+from ..plots.style import is_geometric, model_styles
+from ..results.factored import read_inputs
+from ..results.selection import law_positions
+from ..results.trajectory_table import TrajectoryTable, table_of_result
+from ..results.xarray_backend import open_result, result_of
+from .page import page_title, template
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+SHOWN = ("e_out", "e_error", "v1_post", "v2_post", "v1_error", "v2_error", "peak_force", "contact_time")
+# columns of a trajectory, in the contact's own units, by the names of the outputs that follow from them
+TRAJECTORY = {"e_out": "e_out", "peak_force": "force", "contact_time": "contact_time", "status": "status"}
+# inputs of each ball
+OF_BALLS = {"v": velocity_at, "m": mass_at}
+MAX_BYTES = 10_000_000
+VALUE_BYTES = 8
+# pixels of a line of one point of the plots
+DASH_PIXELS = 1.6
+
+
+def page(
+    dataset: xr.Dataset | str | Path,
+    *,
+    output: str | Path | None = None,
+    overwrite: bool = False,
+    models: Sequence[str] | None = None,
+) -> str:
+    """Write a result as one page of HTML with controls, which needs neither Python nor a network.
+
+    It draws the restitution, velocities after the impact, their errors, the peak force and the contact time over
+    any axis, with a slider for each other one. Values at points of the grid are those of the result.
+
+    Parameters
+    ----------
+    dataset : a result, or the file of one
+    output : file to write the page to as well, whose name ends in .html
+    overwrite : replace the output if it exists
+    models : keys of the models to show; by default all
+
+    Returns
+    -------
+    str : the page
+
+    Raises
+    ------
+    UsageError, ResultError : it is not the result of a sweep with an axis, it takes more than 10 MB, there is no
+        such model; the output exists, or has another ending
+
+    >>> import impact
+    >>> result = impact.sweep("configs/figure6.toml", overrides=["models=hertz", "sweep.e=[0.5, 1.0]"])
+    >>> "<h1>Final velocities comparison</h1>" in impact.page(result)
+    True
+    """
+    if output is not None:
+        output = Path(output)
+        if output.suffix.lower() not in (".html", ".htm"):
+            raise UsageError(f"{output}: expected a name that ends in .html")
+        check_outputs([output], [dataset], overwrite=overwrite)
+    # a file of a trajectory table is not expanded
+    opened = open_result(dataset) if isinstance(dataset, str | Path) else result_of(dataset)
+    with opened:
+        text = _page_of(opened, models)
+    if output is not None:
+        write_file(output, text.encode(), overwrite=overwrite)
+    return text
+
+
+def _page_of(dataset: xr.Dataset, models: Sequence[str] | None) -> str:
+    if "model" not in dataset.dims or SAMPLE in dataset.dims or not axes_of(dataset):
+        raise UsageError("expected the result of a sweep over an axis; impact report writes a page of any result")
+    positions = law_positions(models, dataset) if models else [*range(dataset.sizes["model"])]
+    table = table_of_result(dataset)
+    if table is None:
+        dataset, positions = dataset.isel(model=positions), [*range(len(positions))]
+        inputs = read_inputs(dataset, axes_of(dataset))
+        arrays = _stored_values(dataset, inputs)
+    else:
+        inputs = table.inputs
+        arrays = _trajectories(table, positions)
+    of_dataset = dataset.isel(model=positions)
+    laws = [{**law, **columns} for law, columns in zip(_laws(of_dataset), arrays, strict=True)]
+    axes = [_axis(dataset, axis.name) for axis in inputs.axes]
+    content = {
+        "title": page_title(dataset),
+        "reference": "Impulse-momentum",
+        "first_failure": FIRST_FAILURE,
+        "first_axis": _first_axis(axes),
+        "axes": axes,
+        "inputs": {name: _array(values) for name, values in _inputs(inputs).items()},
+        "outputs": [_output(name) for name in SHOWN if name in dataset],
+        "laws": laws,
+    }
+    # no text of a result ends the script
+    data = json.dumps(content, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
+    _check_size(len(data))
+    return template("explorer.html.j2").render(
+        title=content["title"],
+        running_title='""',
+        summary=conditions_of(dataset, *(name for axis in inputs.axes for name in axis.columns)),
+        data=Markup(data),
+        version=__version__,
+    )
+
+
+def _laws(dataset: xr.Dataset) -> Iterator[dict[str, Any]]:
+    """Name the laws, with their style in pictures."""
+    keys = [str(key) for key in dataset["model"].values]
+    styles = model_styles(keys)
+    for key, title, year in zip(keys, dataset["title"].values, dataset["year"].values, strict=True):
+        style = styles[key]
+        dashes = [DASH_PIXELS * length for length in style["linestyle"][1]] if style["linestyle"] != "-" else []
+        yield {
+            "key": key,
+            "label": with_year(str(title), int(year)),
+            "color": style["color"],
+            "marker": style["marker"],
+            "dashes": " ".join(map("{:g}".format, dashes)) or "none",
+        }
+
+
+def _check_size(size: int) -> None:
+    """Refuse more bytes than a page has."""
+    if size > MAX_BYTES:
+        raise UsageError(
+            f"its values take more than {MAX_BYTES / 1e6:g} MB; take a part first, by {argument('models')} or "
+            "impact expand RESULT --sel AXIS=VALUE"
+        )
+
+
+def _trajectories(table: TrajectoryTable, positions: Sequence[int]) -> Iterator[dict[str, Any]]:
+    """Collect the trajectories of laws, and what converts them to SI."""
+    index = table.inputs.index()
+    for position in positions:
+        law, trajectory_map = table.laws[position], table.maps[position]
+        # before they are read
+        _check_size(trajectory_map.count * len(TRAJECTORY) * VALUE_BYTES)
+        rows = table.rows.take(position, np.arange(trajectory_map.count))
+        impacts = build_impacts(table.inputs, law, index, table.stiffness[position])
+        _check_size(impacts.K.size * VALUE_BYTES)
+        columns = {
+            name: {**_encoded(getattr(rows, column)), "axes": list(trajectory_map.axes), "is_shared": True}
+            for name, column in TRAJECTORY.items()
+        }
+        cells = trajectory_map.of_cell
+        yield {
+            "is_table": True,
+            "asks_for_e": "e" in law.quantities,
+            "cells": None if cells is None else _encoded(cells.astype(np.int32)),
+            "columns": {**columns, "K": _array(impacts.K), "n": _array(impacts.n)},
+        }
+
+
+def _stored_values(dataset: xr.Dataset, inputs: Inputs) -> Iterator[dict[str, Any]]:
+    """Collect the values of laws that a result stores; outputs that it lacks are left out."""
+    if "e_out" not in dataset:
+        raise UsageError("e_out is not in this result; sweep with it in output.variables")
+    names = [name for name in TRAJECTORY if name in dataset and name != "status"]
+    dims = [axis.name for axis in inputs.axes]
+    others = {*dataset["e_out"].dims} - {"model", *dims}
+    if others:
+        raise UsageError(f"e_out depends on {', '.join(map(str, others))} in this result; select one value of it")
+    _check_size(dataset["e_out"].size * len(names) * VALUE_BYTES)
+    for position in range(dataset.sizes["model"]):
+        values = {
+            name: dataset[name].isel(model=position).transpose(*dims, missing_dims="ignore") for name in names
+        }
+        yield {
+            "is_table": False,
+            "cells": None,
+            "columns": {
+                name: {
+                    **_encoded(np.asarray(array.values, float)),
+                    "axes": [dims.index(str(dim)) for dim in array.dims],
+                }
+                for name, array in values.items()
+            },
+        }
+
+
+def _inputs(inputs: Inputs) -> dict[str, Array]:
+    """What the outputs depend on besides the trajectory, of length 1 along axes on which it does not depend."""
+    index = inputs.index()
+    of_balls = {f"{name}{ball}": at(inputs, ball, index) for name, at in OF_BALLS.items() for ball in "12"}
+    return {**of_balls, "e": restitution_at(inputs, index)}
+
+
+def _array(values: Array) -> dict[str, Any]:
+    """Encode values over the grid, without the axes along which they do not vary."""
+    axes = [axis for axis, size in enumerate(values.shape) if size > 1]
+    return {**_encoded(np.asarray(values, float)), "axes": axes}
+
+
+def _encoded(values: NDArray[Any]) -> dict[str, Any]:
+    """Encode an array in C order, little-endian."""
+    little = np.ascontiguousarray(values, values.dtype.newbyteorder("<"))
+    return {"type": little.dtype.str[1:], "base64": base64.b64encode(little.tobytes()).decode()}
+
+
+def _output(name: str) -> dict[str, str]:
+    meaning = OUTPUTS[name].meaning
+    return {"name": name, "label": meaning[:1].upper() + meaning[1:], "unit": OUTPUTS[name].unit}
+
+
+def _axis(dataset: xr.Dataset, name: str) -> dict[str, Any]:
+    """Describe an axis of the grid: its values, null where they are infinite, and their texts."""
+    coordinate, word = dataset[name], InputName.parse(name).word
+    has_words = any(isinstance(word(value), str) for value in coordinate.values.tolist())
+    numbers = np.arange(coordinate.size, dtype=float) if has_words else np.asarray(coordinate.values, float)
+    return {
+        "name": name,
+        "label": axis_label(name),
+        "unit": unit_of(coordinate),
+        "values": [value if math.isfinite(value) else None for value in numbers.tolist()],
+        "texts": [text for text, _ in shown_values(coordinate)],
+        "has_words": has_words,
+        "is_log": not has_words and is_geometric(np.sort(numbers)),
+    }
+
+
+def _first_axis(axes: Sequence[Mapping[str, Any]]) -> int:
+    """Choose e to draw over, else the first axis with several numbers."""
+    several = [number for number, axis in enumerate(axes) if len(axis["values"]) > 1 and not axis["has_words"]]
+    of_e = [number for number in several if axes[number]["name"] == "e"]
+    return (of_e or several or [0])[0]

@@ -1,0 +1,258 @@
+"""`impact page`: a result in a browser, whose values are those of the program."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import subprocess
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import impact
+from impact.errors import UsageError
+
+from .conftest import ROOT, Run
+from .test_explore_in_jupyterlab import Page, answer_of, free_port
+
+REPORTING = ROOT / "src" / "impact" / "reporting"
+STEEL = {"E": 210e9, "nu": 0.3, "rho": 7850}
+SOFT = {"E": 2e9, "nu": 0.4, "rho": 1100}
+# a table with axes of each kind, with a wall, balls that miss each other, a law with a parameter that varies
+TABLE: dict[str, Any] = {
+    "title": "Table </script><b>",
+    "models": ["gharib-hurmuzlu-2012", "kuwabara-kono-1987", "bilinear", "tsuji-1992"],
+    "sweep": {
+        "e": {"linspace": [0.05, 1.0, 11]},
+        "v1": {"geomspace": [0.1, 10.0, 5]},
+        "v2": [-0.5, 0.0, 2.0],
+        "m2": [1.0, 3.0, math.inf],
+        "m1": 1.0,
+        "R1": 0.02,
+        "R2": [0.02, 0.05],
+        "material1": "steel",
+        "material2": ["steel", "soft"],
+    },
+    "materials": {"steel": STEEL, "soft": SOFT},
+    "model": {"kuwabara-kono-1987": {"A": [1e-6, 1e-5]}},
+    "output": {"layout": "factored"},
+}
+OUTPUTS = ("e_out", "e_error", "v1_post", "v2_post", "v1_error", "v2_error", "peak_force", "contact_time")
+
+
+@pytest.fixture(scope="module")
+def table_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A sweep as a file of its trajectory table."""
+    path = tmp_path_factory.mktemp("page") / "table.h5"
+    impact.sweep_to_file(TABLE, path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def results(table_file: Path) -> dict[str, xr.Dataset]:
+    """The values of that file, a part of them, and the same sweep with all values."""
+    table = impact.load(table_file)
+    return {"table": table, "part": table.isel(v2=1, e=slice(0, 4)), "full": impact.sweep(TABLE)}
+
+
+def content_of(text: str) -> dict[str, Any]:
+    """The data of a page."""
+    found = re.search(r'<script type="application/json" id="data">(.*?)</script>', text, re.DOTALL)
+    assert found is not None
+    content: dict[str, Any] = json.loads(found[1])
+    return content
+
+
+def test_a_page_has_no_law_no_network_and_texts_that_do_not_end_its_script(
+    table_file: Path, results: dict[str, xr.Dataset]
+) -> None:
+    text = impact.page(table_file)
+    content = content_of(text)
+    assert content["title"] == "Table </script><b>"
+    assert text.count("</script>") == 2
+    assert "default-src 'none'" in text
+    assert not re.search(r"https?://(?!www\.w3\.org/2000/svg)", text)
+    # trajectories, not points: e and the ratio of A to the contact time vary
+    assert len(content["laws"][0]["columns"]["e_out"]["base64"]) < 200
+    assert results["table"]["e_out"].size > 10_000
+    assert len(text) < 100_000
+
+
+def test_the_script_and_the_template_are_short() -> None:
+    lines = [
+        len((REPORTING / name).read_text(encoding="utf-8").splitlines())
+        for name in ("explorer.js", "explorer.html.j2")
+    ]
+    assert sum(lines) < 400
+
+
+def test_the_command_writes_a_page(results: dict[str, xr.Dataset], cli: Run, tmp_path: Path) -> None:
+    impact.save(results["part"], tmp_path / "part.h5")
+    done = cli("page", "part.h5", "--model", "bilinear", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert re.fullmatch(r"part\.html: \d+ kB\n", done.stderr)
+    text = (tmp_path / "part.html").read_text(encoding="utf-8")
+    assert [law["key"] for law in content_of(text)["laws"]] == ["bilinear"]
+    again = cli("page", "part.h5", cwd=tmp_path)
+    assert (again.returncode, "part.html" in again.stderr) == (2, True)
+
+
+def test_what_a_page_cannot_show_is_refused_in_one_line(results: dict[str, xr.Dataset], tmp_path: Path) -> None:
+    large = {**TABLE, "models": "hertz", "output": {}}
+    large["sweep"] = {
+        "e": 0.5,
+        "v1": {"linspace": [1, 2, 700]},
+        "m2": {"linspace": [1, 2, 700]},
+        "m1": 1.0,
+        "K": 1e9,
+    }
+    cases = {
+        "expected the result of a sweep over an axis": impact.run().history,
+        "take more than 10 MB; take a part first, by models or impact expand": impact.sweep(large),
+        'no model "hertz" in this result': results["table"],
+    }
+    for problem, dataset in cases.items():
+        models = ["hertz"] if "no model" in problem else None
+        with pytest.raises(UsageError, match=re.escape(problem)):
+            impact.page(dataset, models=models)
+    with pytest.raises(UsageError, match=r"page\.txt: expected a name that ends in \.html"):
+        impact.page(results["table"], output=tmp_path / "page.txt")
+
+
+@pytest.fixture(scope="module")
+def browser(chromium: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
+    """A page of a browser."""
+    port = free_port()
+    words = [
+        *(chromium, "--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"),
+        *(f"--remote-debugging-port={port}", f"--user-data-dir={tmp_path_factory.mktemp('profile')}"),
+        "about:blank",
+    ]
+    with ExitStack() as stack:
+        process = stack.enter_context(
+            subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        )
+        stack.callback(process.terminate)
+        targets = json.loads(answer_of(f"http://127.0.0.1:{port}/json"))
+        page = Page(next(one["webSocketDebuggerUrl"] for one in targets if one["type"] == "page"))
+        stack.callback(page.socket.close)
+        page.call("Page.enable")
+        yield page
+
+
+def show(browser: Page, result: xr.Dataset | Path, path: Path) -> None:
+    """Open the page of a result."""
+    impact.page(result, output=path, overwrite=True)
+    browser.call("Page.navigate", url="about:blank")
+    browser.call("Page.navigate", url=path.as_uri())
+    browser.wait_for("document.readyState == 'complete' && document.querySelectorAll('#values tr').length > 0")
+
+
+def choose(browser: Page, control: str, value: object) -> None:
+    """Set a control, as a user does."""
+    browser.evaluate(
+        f"(c => {{ c.value = {json.dumps(str(value))}; c.dispatchEvent(new Event('input', {{bubbles: true}}));"
+        f" c.dispatchEvent(new Event('change', {{bubbles: true}})); }})(document.getElementById('{control}'))"
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["table", "part", "full"])
+def test_values_at_points_of_the_grid_are_those_of_the_program(
+    table_file: Path, results: dict[str, xr.Dataset], browser: Page, tmp_path: Path, name: str
+) -> None:
+    dataset = results[name]
+    show(browser, table_file if name == "table" else dataset, tmp_path / "page.html")
+    axes = [axis["name"] for axis in content_of((tmp_path / "page.html").read_text(encoding="utf-8"))["axes"]]
+    generator = np.random.default_rng(1)
+    at = np.stack([generator.integers(dataset.sizes[axis], size=200) for axis in axes], axis=1)
+    laws = generator.integers(dataset.sizes["model"], size=200)
+    for output in OUTPUTS:
+        expression = (
+            f"{json.dumps(at.tolist())}.map((cell, number) => "
+            f"String(value('{output}', laws[{json.dumps(laws.tolist())}[number]], cell)))"
+        )
+        theirs = np.array([float(text.replace("Infinity", "inf")) for text in browser.evaluate(expression)])
+        places = {axis: xr.DataArray(at[:, number], dims="cell") for number, axis in enumerate(axes)}
+        ours = (
+            dataset[output]
+            .isel({**places, "model": xr.DataArray(laws, dims="cell")}, missing_dims="ignore")
+            .values
+        )
+        assert np.isfinite(ours).sum() > 50
+        # rounding of a difference of velocities up to 13 m/s
+        atol = 0.0 if output in ("peak_force", "contact_time") else 1e-14
+        np.testing.assert_allclose(theirs, ours, rtol=2e-14, atol=atol, err_msg=output)
+
+
+@pytest.mark.slow
+def test_sliders_laws_the_cursor_and_the_numbers_follow_the_controls(
+    results: dict[str, xr.Dataset], browser: Page, tmp_path: Path
+) -> None:
+    dataset = results["table"]
+    show(browser, dataset, tmp_path / "page.html")
+    rows = "[...document.querySelectorAll('#values tr')].map(row => row.innerText.split('\\t'))"
+    assert browser.evaluate(rows)[0][0] == "Impulse-momentum"
+    assert len(browser.evaluate(rows)) == 5
+    browser.evaluate("document.getElementById('law-bilinear').click()")
+    assert len(browser.evaluate(rows)) == 4
+    # the slider of the axis that is drawn is hidden, and comes back
+    hidden = (
+        "page.axes.filter((axis, i) => document.getElementById(`axis-${i}`).parentNode.hidden).map(a => a.name)"
+    )
+    assert browser.evaluate(hidden) == ["e"]
+    names = browser.evaluate("page.axes.map(axis => axis.name)")
+    choose(browser, "x", names.index("v1"))
+    assert browser.evaluate(hidden) == ["v1"]
+    choose(browser, "variable", "peak_force")
+    choose(browser, f"axis-{names.index('e')}", 4)
+    choose(browser, f"axis-{names.index('v2')}", 1)
+    choose(browser, f"axis-{names.index('material2')}", 1)
+    text = browser.evaluate("csv()")
+    head = [line for line in text.splitlines() if line.startswith("#")]
+    assert {"# e = 0.43", "# v2 = 0 m/s", "# material2 = soft"} <= set(head)
+    numbers = np.array([line.split(",") for line in text.splitlines()[len(head) + 1 :]], float)
+    part = dataset["peak_force"].isel(e=4, v2=1, m2=0, R2=0, material2=1, missing_dims="ignore")
+    part = part.isel({"kuwabara-kono-1987.A": 0})
+    np.testing.assert_array_equal(numbers[:, 0], dataset["v1"].values)
+    np.testing.assert_allclose(numbers[:, 1], part.sel(model="gharib-hurmuzlu-2012").values, rtol=2e-14)
+    # between two values of the grid
+    browser.evaluate("state.cursor = 0.2; list()")
+    assert "interpolated" in browser.evaluate("document.getElementById('note').textContent")
+    assert browser.evaluate(rows)[0][1].startswith("≈ ")
+    browser.evaluate(
+        "document.getElementById('picture').dispatchEvent(new KeyboardEvent('keydown', {key: 'ArrowRight'}))"
+    )
+    assert "interpolated" not in browser.evaluate("document.getElementById('note').textContent")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("width", [400, 1280, 1600])
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_a_page_fits_its_window(
+    results: dict[str, xr.Dataset], browser: Page, tmp_path: Path, width: int, scheme: str
+) -> None:
+    browser.resize(width, 900)
+    browser.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
+    show(browser, results["table"], tmp_path / "page.html")
+    for output in ("e_out", "contact_time"):
+        choose(browser, "variable", output)
+        page = browser.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth")
+        assert page <= 0
+        outside = browser.evaluate(
+            "(picture => [...document.querySelectorAll('svg text')].map(text => text.getBoundingClientRect())"
+            ".filter(box => box.left < picture.left - 1 || box.right > picture.right + 1).length)"
+            "(document.getElementById('picture').getBoundingClientRect())"
+        )
+        assert outside == 0
+    colours = "(style => [style.color, style.backgroundColor])(getComputedStyle(document.body))"
+    ink, paper = (sum(map(int, re.findall(r"\d+", colour))) for colour in browser.evaluate(colours))
+    assert (ink < paper) == (scheme == "light")
+    browser.screenshot(tmp_path / "page.png")
+    assert (tmp_path / "page.png").stat().st_size > 10_000
