@@ -92,6 +92,12 @@ def test_the_script_and_the_template_are_short() -> None:
     assert sum(lines) < 400
 
 
+def test_inputs_that_vary_together_are_named_beside_their_slider() -> None:
+    sweep = {"e": [0.5, 0.6], "m1": [1.0, 2.0], "m2": [1.0, math.inf], "zip": [["m1", "m2"]], "K": 1e9, "v1": 1.0}
+    _, axis = content_of(impact.page(impact.sweep({"models": "hertz", "sweep": sweep})))["axes"]
+    assert axis["texts"] == ["1 kg, m2 = 1 kg", "2 kg, m2 = ∞"]
+
+
 def test_the_command_writes_a_page(results: dict[str, xr.Dataset], cli: Run, tmp_path: Path) -> None:
     impact.save(results["part"], tmp_path / "part.h5")
     done = cli("page", "part.h5", "--model", "bilinear", cwd=tmp_path)

@@ -342,4 +342,5 @@ def axes_of(dataset: xr.Dataset) -> list[str]:
 def shown_values(coordinate: xr.DataArray) -> list[tuple[str, Any]]:
     """List the texts and values of the positions of an axis."""
     word, unit = InputName.parse(coordinate.name).word, unit_of(coordinate)
-    return [(safe_text(quantity(word(value), unit)), value) for value in coordinate.values.tolist()]
+    values = coordinate.values.tolist()
+    return [("∞" if value == math.inf else safe_text(quantity(word(value), unit)), value) for value in values]

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from .._version import __version__
 from ..array_types import Array
 from ..atomic import check_outputs, write_file
-from ..config.grid import SAMPLE
+from ..config.grid import SAMPLE, Axis
 from ..config.input_names import InputName
 from ..contact.status import FIRST_FAILURE
 from ..contact.variables import OUTPUTS
@@ -111,7 +111,7 @@ def _page_of(dataset: xr.Dataset, models: Sequence[str] | None) -> str:
         arrays = _trajectories(table, positions)
     of_dataset = dataset.isel(model=positions)
     laws = [{**law, **columns} for law, columns in zip(_laws(of_dataset), arrays, strict=True)]
-    axes = [_axis(dataset, axis.name) for axis in inputs.axes]
+    axes = [_axis(dataset, axis) for axis in inputs.axes]
     content = {
         "title": page_title(dataset),
         "reference": "Impulse-momentum",
@@ -233,17 +233,22 @@ def _output(name: str) -> dict[str, str]:
     return {"name": name, "label": meaning[:1].upper() + meaning[1:], "unit": OUTPUTS[name].unit}
 
 
-def _axis(dataset: xr.Dataset, name: str) -> dict[str, Any]:
-    """Describe an axis of the grid: its values, null where they are infinite, and their texts."""
-    coordinate, word = dataset[name], InputName.parse(name).word
+def _axis(dataset: xr.Dataset, axis: Axis) -> dict[str, Any]:
+    """Describe an axis of the grid: its values, null where infinite, and their texts with the other columns."""
+    coordinate, word = dataset[axis.name], InputName.parse(axis.name).word
     has_words = any(isinstance(word(value), str) for value in coordinate.values.tolist())
     numbers = np.arange(coordinate.size, dtype=float) if has_words else np.asarray(coordinate.values, float)
+    texts = [text for text, _ in shown_values(coordinate)]
+    for name in axis.columns:
+        if name != axis.name:
+            along = [f"{axis_label(name)} = {text}" for text, _ in shown_values(dataset[name])]
+            texts = [f"{text}, {other}" for text, other in zip(texts, along, strict=True)]
     return {
-        "name": name,
-        "label": axis_label(name),
+        "name": axis.name,
+        "label": axis_label(axis.name),
         "unit": unit_of(coordinate),
         "values": [value if math.isfinite(value) else None for value in numbers.tolist()],
-        "texts": [text for text, _ in shown_values(coordinate)],
+        "texts": texts,
         "has_words": has_words,
         "is_log": not has_words and is_geometric(np.sort(numbers)),
     }
