@@ -339,6 +339,34 @@ def test_a_radius_replaces_the_mass_of_the_starter_config() -> None:
 
 
 @pytest.mark.parametrize(
+    ("inputs", "dims"),
+    [
+        ({"cases": pd.DataFrame({"v1 [cm/s]": [50.0, 100.0], "e": [0.5, 0.6], "m1": 2.0})}, {"case": 2}),
+        ({"cases": {"alpha": [0.1, 0.2]}}, {"case": 2}),
+        ({"cases": {"R1": [0.1, 0.2], "R2": [0.1, 0.1], "e": [0.5, 0.6]}}, {"case": 2}),
+        ({"cases": {"material1": ["steel", "glass"], "e": [0.5, 0.6]}, "material2": "steel"}, {"case": 2}),
+        ({"e": 0.5, "speed": 2.0, "angle": "30 deg", "mu": 0.3, "frictions": "coulomb-1785"}, {"friction": 1}),
+    ],
+    ids=["cases", "alpha", "radii", "materials", "speed"],
+)
+def test_inputs_replace_those_of_the_starter_config(
+    inputs: dict[str, Any], dims: dict[str, int], tmp_path: Path
+) -> None:
+    """Also where the result is repeated from its file."""
+    swept = impact.sweep(models="hertz", output=tmp_path / "r.h5", **inputs)
+    assert dict(swept.sizes) == {"model": 1, **dims}
+    assert impact.rerun(tmp_path / "r.h5").equal
+
+
+def test_cases_of_a_file_replace_inputs_of_the_starter_config(tmp_path: Path) -> None:
+    (tmp_path / "c.csv").write_text("v1 [m/s],e\n0.5,0.5\n1.0,0.6\n", encoding="utf-8")
+    swept = impact.sweep(models="hertz", cases=str(tmp_path / "c.csv"))
+    assert swept["v1"].values.tolist() == [0.5, 1.0]
+    with pytest.raises(impact.ConfigError, match="set together with"):
+        impact.sweep(models="hertz", cases=str(tmp_path / "c.csv"), v1=2.0)
+
+
+@pytest.mark.parametrize(
     ("inputs", "message"),
     [
         ({"overide": ["a"]}, "overide: sweep.overide: unknown key; known: K, "),

@@ -15,6 +15,7 @@ import numpy as np
 import xarray as xr
 
 from .._version import __version__
+from ..config.columns import without_replaced_inputs
 from ..config.design import distribution_paths
 from ..config.draft import (
     Draft,
@@ -25,7 +26,6 @@ from ..config.draft import (
     open_text,
     reject_law_key,
     settings_of,
-    without_default_masses,
 )
 from ..config.files import as_table, to_plain_data
 from ..config.grid import Axis
@@ -587,9 +587,9 @@ def open_source(source: ConfigSource, overrides: Overrides, plugins: Plugins) ->
     if isinstance(source, xr.Dataset):
         return _open_stored(source, overrides, plugins, "the result")
     if source is None:
-        draft = open_config(None, plugins.models).with_settings(
-            [Setting.parse(STARTER_E), *settings_of(overrides)]
-        )
+        starter = open_config(None, plugins.models).with_settings([Setting.parse(STARTER_E)])
+        # that setting is no input of the user
+        draft = replace(starter, origins={}).with_settings(settings_of(overrides))
         return PointSource(draft, plugins, has_selection=("models",) in draft.origins, is_starter=True)
     reject_law_key(source, "model", plugins.models)
     draft = open_config(Path(source) if isinstance(source, str) else source, plugins.models)
@@ -649,11 +649,11 @@ def single_point(
         Setting(InputName.parse(name).path, values, argument("over", key=name)) for name, values in over.items()
     ]
     draft = draft.with_settings(settings)
-    if source.is_starter:
-        draft = without_default_masses(draft, fixed)
     if isinstance(draft.table("sweep").get("cases"), str):
         # the inputs that vary together are the columns of the file
         draft = inline_files(draft)
+    if source.is_starter:
+        draft = without_replaced_inputs(draft, fixed)
     joint = _joint_inputs(draft)
     varying = {str(name) for name, value in input_values(draft.data) if isinstance(value, list | dict)}
     labels = {name: value for name, value in source.labels.items() if name in varying | joint or is_case(name)}
