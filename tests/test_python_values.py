@@ -88,6 +88,30 @@ def test_another_type_is_named(source: object) -> None:
         (lambda: impact.run(model=["hertz"]), "model: got a list, expected str | None"),
         (lambda: impact.solve("hertz", "K", 0.5), "target: got a float, expected Mapping[str, object]"),
         (
+            lambda: impact.plot(impact.sweep(BASE), models=[1]),  # type: ignore[list-item]
+            "models: got a list with an int, expected Sequence[str] | None",
+        ),
+        (
+            lambda: impact.recommend(impact.sweep(BASE), models=[1]),  # type: ignore[list-item]
+            "models: got a list with an int, expected str | Sequence[str] | None",
+        ),
+        (
+            lambda: impact.plot(impact.sweep(BASE), sel={1: 2}),  # type: ignore[dict-item]
+            "sel: got a dict with an int, expected Mapping[str, object] | None",
+        ),
+        (
+            lambda: impact.solve("hertz", "K", {1: 0.5}),  # type: ignore[dict-item]
+            "target: got a dict with an int, expected Mapping[str, object]",
+        ),
+        (
+            lambda: impact.sweep(BASE, overrides=[1]),  # type: ignore[list-item]
+            "overrides: got a list with an int, expected Sequence[str] | Mapping[str, object]",
+        ),
+        (
+            lambda: impact.plot(impact.sweep(BASE), kind="restitution", labels={"hertz": 3}),  # type: ignore[dict-item]
+            "labels: got a dict with an int, expected Mapping[str, str] | None",
+        ),
+        (
             lambda: impact.cite("hertz", 5),
             "laws: got an int, expected str | Path | xr.Dataset | ForceModel | FrictionLaw",
         ),
