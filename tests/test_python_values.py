@@ -112,6 +112,10 @@ def test_another_type_is_named(source: object) -> None:
             "labels: got a dict with an int, expected Mapping[str, str] | None",
         ),
         (
+            lambda: impact.plot(impact.sweep(BASE), kind="loop", sel={"v1": "1 kg"}),
+            'sel["v1"]: sweep.v1: got "1 kg", expected a unit of m/s',
+        ),
+        (
             lambda: impact.cite("hertz", 5),
             "laws: got an int, expected str | Path | xr.Dataset | ForceModel | FrictionLaw",
         ),

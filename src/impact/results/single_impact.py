@@ -468,7 +468,7 @@ def histories(
     integrator = str(dataset.attrs.get("integrator", EXACT))
     if integrator != EXACT:
         raise UsageError(f"no motion to draw in this result: {no_motion(integrator)}")
-    source = open_source(dataset, (), plugins)
+    source = replace(open_source(dataset, (), plugins), at_name="sel")
     for changed in changed_plugins(dataset.attrs, plugins, "the result"):
         # a changed law has another motion than the result
         raise UsageError(changed)
@@ -554,6 +554,7 @@ class PointSource:
     labels: Mapping[str, float | str] = field(default_factory=dict)  # at which a part of a result was selected
     has_selection: bool = True  # selects models, unlike the starter config
     is_starter: bool = False
+    at_name: str = "at"  # the argument with the values of the point, for messages
     calibration: Calibration | None = None
 
     @property
@@ -638,9 +639,9 @@ def single_point(
     fixed = {str(_input_name(name, *laws)): to_plain_data(value)[0] for name, value in (at or {}).items()}
     for name, value in fixed.items():
         if isinstance(value, dict | list):
-            raise UsageError(f"{argument('at', {name: value})}: got several values, expected one")
+            raise UsageError(f"{argument(source.at_name, {name: value})}: got several values, expected one")
     if {"e", "alpha"} <= fixed.keys():
-        raise UsageError(f"{argument('at', key='alpha')}: got alpha and e, expected one of the two")
+        raise UsageError(f"{argument(source.at_name, key='alpha')}: got alpha and e, expected one of the two")
     settings = [] if law is None else [Setting(("models",), [law.key], argument("model", law.key))]
     if friction_law is not None:
         settings.append(Setting(("frictions",), [friction_law.key], argument("friction", friction)))
@@ -660,7 +661,7 @@ def single_point(
     # the exponent n decides whose stiffness K is
     for name, value in sorted({**labels, **fixed}.items(), key=lambda item: item[0] == "K"):
         if name not in joint and not is_case(name):
-            draft = draft.with_settings([_setting_at(draft, name, value, law)])
+            draft = draft.with_settings([_setting_at(draft, name, value, law, source.at_name)])
     config = build(draft)
     for name in fixed:
         if is_case(name) and name not in {axis.numbered for axis in config.axes}:
@@ -693,7 +694,7 @@ def _joint_inputs(draft: Draft) -> set[str]:
     return names
 
 
-def _setting_at(draft: Draft, name: str, value: float | str, law: ForceModel | None) -> Setting:
+def _setting_at(draft: Draft, name: str, value: float | str, law: ForceModel | None, at_name: str) -> Setting:
     """Fix an input at a value; K of a model with another exponent than [sweep] is that of its own table."""
     if not _has_input(draft, InputName.parse(name)):
         raise _unknown_input(draft, name)
@@ -701,7 +702,7 @@ def _setting_at(draft: Draft, name: str, value: float | str, law: ForceModel | N
     path, value = parsed.path, parsed.word(value)
     if name == "K" and law is not None and has_other_stiffness(draft, law):
         path = ("model", law.key, "K")
-    return Setting(path, value, argument("at", value, key=name))
+    return Setting(path, value, argument(at_name, value, key=name))
 
 
 def _has_input(draft: Draft, name: InputName) -> bool:
