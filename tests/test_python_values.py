@@ -311,7 +311,32 @@ def test_a_step_is_a_number_or_several_with_or_without_a_unit(dt: Any) -> None:
 
 
 def test_a_tolerance_may_be_a_percentage(result: xr.Dataset) -> None:
+    changed = result.assign(v1_post=result["v1_post"] + 0.005)
+    for tol in ("1%", 0.01 * unit.dimensionless, {"all": "1%"}, {"v1_post": np.float32(0.01)}):
+        assert impact.compare(changed, result, tol=tol).equal  # type: ignore[arg-type]
+    assert not impact.compare(changed, result, tol="0.1%").equal
     assert impact.recommend(result, tol="2%").tol == impact.recommend(result, tol=0.02).tol == 0.02
+
+
+def test_a_width_may_be_a_quantity(result: xr.Dataset) -> None:
+    widths = [impact.plot(result, width=width).get_figwidth() for width in ("84mm", 84 * unit.mm, 84 / 25.4)]
+    assert widths == pytest.approx([84 / 25.4] * 3, rel=1e-15)
+
+
+@pytest.mark.parametrize("half", [np.array([0.5]), pd.Series([0.5]), xr.DataArray([0.5], dims="e"), [0.5]])
+def test_an_array_of_one_element_is_a_value(half: object, result: xr.Dataset) -> None:
+    assert impact.run(at={"e": half}).point["e"] == 0.5
+    assert impact.recommend(result, sel={"e": half})[0].points == 1
+    assert impact.solve("mujoco-solref", "dampratio", {"e_out": half}).roots
+
+
+@pytest.mark.parametrize("collect", [np.array, pd.Series, pd.Index, xr.DataArray])
+def test_models_may_be_an_array_of_keys(collect: Callable[[list[str]], Any], result: xr.Dataset) -> None:
+    keys = collect(["tsuji-1992", "hertz"])
+    assert impact.sweep(models=keys)["model"].values.tolist() == ["tsuji-1992", "hertz"]
+    assert len(impact.recommend(result, models=keys)) == 2
+    assert impact.plot(result, models=keys).axes
+    assert "tsuji-1992" in impact.report(result.isel(e=[0]), models=keys, sections=["models"])
 
 
 def test_one_model_may_be_named_without_a_list(result: xr.Dataset) -> None:

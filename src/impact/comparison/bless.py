@@ -26,7 +26,7 @@ def bless(
     baseline: str | Path,
     *,
     reason: str,
-    tol: float | Tolerances | None = None,
+    tol: float | str | Tolerances | None = None,
     allow_failed: bool = False,
     show: Callable[[Verdict], None] | None = None,
 ) -> Verdict | None:

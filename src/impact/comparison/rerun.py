@@ -27,7 +27,7 @@ def rerun(
     result: str | Path,
     *,
     plugins: Sequence[ForceModel | str | Path] = (),
-    tol: float | Tolerances | None = None,
+    tol: float | str | Tolerances | None = None,
     subset: bool = False,
     max_points: int = MAX_POINTS,
     execute: Callable[..., xr.Dataset] | None = None,

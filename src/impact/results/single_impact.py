@@ -27,7 +27,7 @@ from ..config.draft import (
     reject_law_key,
     settings_of,
 )
-from ..config.files import as_table, to_plain_data
+from ..config.files import as_table, to_plain_value
 from ..config.grid import Axis
 from ..config.input_names import SWEEP_INPUTS, InputName, input_values
 from ..config.load import Config, build, inline_files
@@ -636,7 +636,7 @@ def single_point(
     law = None if model is None else find(model, source.plugins.models)
     friction_law = None if friction is None else find_friction(friction)
     laws = (law or next(iter(draft.models), None), friction_law or next(iter(draft.frictions), None))
-    fixed = {str(_input_name(name, *laws)): to_plain_data(value)[0] for name, value in (at or {}).items()}
+    fixed = {str(_input_name(name, *laws)): to_plain_value(value) for name, value in (at or {}).items()}
     for name, value in fixed.items():
         if isinstance(value, dict | list):
             raise UsageError(f"{argument(source.at_name, {name: value})}: got several values, expected one")

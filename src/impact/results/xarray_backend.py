@@ -14,7 +14,7 @@ import xarray as xr
 from xarray.backends import BackendEntrypoint
 
 from ..atomic import Sink, atomic_write, check_output, check_outputs
-from ..config.files import RESULT_MAGIC
+from ..config.files import RESULT_MAGIC, to_plain_data
 from ..config.grid import MAX_POINTS
 from ..config.tables import Output
 from ..contact.variables import OUTPUTS
@@ -245,6 +245,7 @@ def expand(
     dataset = select(opened, sel or {})
     if "model" not in dataset.dims:
         raise UsageError(f"{shown}: is a time history, expected a result of a sweep")
+    models, _ = to_plain_data(models)
     if models:
         dataset = dataset.isel(model=law_positions(models, dataset))
     points = math.prod(dataset.sizes.values())
