@@ -147,6 +147,12 @@ def test_a_message_names_the_argument_as_python_does(call: Callable[[], object],
     assert "--" not in str(refusal.value)
 
 
+@pytest.mark.parametrize("function", [impact.plot, impact.recommend, impact.report, impact.run, impact.prepare])
+def test_a_dataset_of_another_program_is_not_a_result(function: Callable[[xr.Dataset], object]) -> None:
+    with pytest.raises(impact.UsageError, match="not a result of impact: it has no coordinate model"):
+        function(xr.Dataset({"a": ("x", [1.0])}))
+
+
 def test_what_fails_for_another_reason_stays_the_error_that_it_is() -> None:
     with pytest.raises(TypeError, match="unexpected keyword argument 'modle'"):
         impact.run(modle="hertz")  # type: ignore[call-arg]

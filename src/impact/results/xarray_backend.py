@@ -21,7 +21,7 @@ from ..contact.variables import OUTPUTS
 from ..errors import ResultError, UnfinishedError, UsageError
 from ..formatting import argument, safe_text, type_of
 from .hdf5_structure import byte_reader, check_root
-from .kinds import kind_of, require_sweep
+from .kinds import kind_of, require_result, require_sweep
 from .layouts import LAYOUTS
 from .netcdf import RegionValues, encode_attribute, read_variables, write_dataset
 from .schema import MODEL_METADATA
@@ -191,6 +191,7 @@ def result_of(result: xr.Dataset | str | Path) -> xr.Dataset:
     if not isinstance(result, xr.Dataset):
         # the public function names its argument
         raise TypeError(f"got {type_of(result)}, expected a dataset, or the file of a result")
+    require_result(result)
     for dim in ("friction", "model"):
         if dim in result.coords and result[dim].ndim == 0 and kind_of(result) == "sweep":
             metadata = ("exponent", *MODEL_METADATA) if dim == "model" else ()
