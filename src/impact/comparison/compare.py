@@ -58,6 +58,10 @@ def compare(
         "all" for the others; by default what the baseline carries, else 10 times its solver's rtol
     subset : compare what both have, and ignore what only one has
 
+    Returns
+    -------
+    Verdict : `equal`, the differences by variable, and what explains them; `print` shows it
+
     Raises
     ------
     ResultError : a file is not a readable result

@@ -44,6 +44,10 @@ def rerun(
     max_points : the largest number of points
     execute : function that runs a plan; by default it is run in this process
 
+    Returns
+    -------
+    Verdict : see `compare`
+
     Raises
     ------
     ResultError : the file is not a readable result

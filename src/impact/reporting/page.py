@@ -86,6 +86,10 @@ def report(
     sections : names of SECTIONS, of which those are written that the result has; by default all. Figures of
         friction are in the section friction
 
+    Returns
+    -------
+    str : the page, as HTML
+
     Raises
     ------
     UsageError, ResultError : it is a time history, or its attributes are not those of a result; there is no such

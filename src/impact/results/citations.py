@@ -79,6 +79,10 @@ def cite(*laws: str | Path | xr.Dataset | ForceModel | FrictionLaw, plugins: Seq
     laws : keys of models and friction laws, laws, or results, of which every law is cited
     plugins : Python files with user-defined models, or their models
 
+    Returns
+    -------
+    Citations : one for each law, with its BibTeX and its evidence; `print` shows BibTeX
+
     Raises
     ------
     ModelError : a law is not in the catalogue; the message names the nearest key

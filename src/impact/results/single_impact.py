@@ -311,6 +311,11 @@ def run(
     times : number of points of the history, uniform from first contact to release; by default the steps of the
         integrator
 
+    Returns
+    -------
+    Impact : `values` has the outputs of docs/schema.md, one number each, in SI, `history` the motion as a dataset
+        over the time t [s], or None where there is none; a failed impact is a `status`, not an error
+
     Raises
     ------
     ConfigError, UsageError, ModelError, ResultError : the source, a plug-in, a name or a value is invalid

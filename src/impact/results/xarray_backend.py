@@ -66,6 +66,10 @@ def save(
     output : dtype, compression and chunks
     should_stop : called before each slab; writing stops if it returns True
 
+    Returns
+    -------
+    None : the file is complete; after an error it is as it was before
+
     Raises
     ------
     UsageError : the file exists, its folder cannot be written to, or the dataset is not a result
@@ -169,8 +173,20 @@ def _named_errors(path: str | Path) -> Iterator[None]:
 def load(path: str | Path) -> xr.Dataset:
     """Open a result, and read or compute all of its values if they take at most 512 MB.
 
-    The values of a larger result are read or computed when they are indexed; see `open_result`, also for
-    exceptions and warnings.
+    The values of a larger result are read or computed when they are indexed. Variables that are not part of a
+    result are ignored with a warning.
+
+    Parameters
+    ----------
+    path : the file
+
+    Returns
+    -------
+    xarray.Dataset : variables, dimensions and units of docs/schema.md, with coordinates for the axes
+
+    Raises
+    ------
+    ResultError : the file is not a readable result, or does not exist, which is a FileNotFoundError as well
 
     >>> import impact
     >>> impact.load("README.md")  # doctest: +ELLIPSIS

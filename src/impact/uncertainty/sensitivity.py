@@ -112,6 +112,10 @@ def sensitivities(
     of : names of the outputs; of one alone the result can be written
     source, output, overwrite, overrides, plugins, max_points, execute : see `sensitivity`
 
+    Returns
+    -------
+    list of Dataset : one for each output, in their order, see `sensitivity`
+
     Raises
     ------
     ConfigError, UsageError, StoreError : see `sensitivity`
