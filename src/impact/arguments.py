@@ -6,6 +6,7 @@ import ast
 import builtins
 import inspect
 import numbers
+import warnings
 from collections.abc import Callable
 from functools import wraps
 from types import UnionType
@@ -20,15 +21,29 @@ T = TypeVar("T")
 # a number of another library is one as well
 ABSTRACT = {"float": numbers.Real, "int": numbers.Integral, "Any": object, "None": type(None)}
 
+# keywords of public functions for objects that are not public
+DEPRECATED = {
+    "bless": "show",
+    "rerun": "execute",
+    "sensitivity": "execute",
+    "sensitivities": "execute",
+    "save": "output",
+}
+
 
 def name_wrong_types(function: Callable[P, T]) -> Callable[P, T]:
     """Wrap a public function: an unexpected error becomes a UsageError if an argument is not of its type.
 
-    Types are only compared after an error, so that whatever works is taken.
+    Types are only compared after an error, so that whatever works is taken. A deprecated keyword is a warning, but
+    not for this package, which calls the function itself.
     """
+    deprecated = DEPRECATED.get(function.__name__)
 
     @wraps(function)
     def call(*args: P.args, **kwargs: P.kwargs) -> T:
+        if deprecated in kwargs:
+            text = f"{function.__name__}: {deprecated} is deprecated and will be removed in version 2"
+            warnings.warn(text, DeprecationWarning, stacklevel=2)
         try:
             return function(*args, **kwargs)
         except ImpactError:

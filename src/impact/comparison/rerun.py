@@ -42,7 +42,7 @@ def rerun(
     plugins : the plug-in models that it was computed with; a note of the verdict names a changed one
     tol, subset : see `compare`
     max_points : the largest number of points
-    execute : function that runs a plan; by default it is run in this process
+    execute : deprecated; function that runs a plan, by default it is run in this process
 
     Returns
     -------

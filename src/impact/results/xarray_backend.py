@@ -53,7 +53,7 @@ def save(
     path: str | Path,
     *,
     overwrite: bool = False,
-    output: Output = DEFAULT_OUTPUT,
+    output: Output | None = None,
     should_stop: Callable[[], bool] | None = None,
 ) -> None:
     """Store a dataset as a sealed netCDF-4 file, with all of its values.
@@ -63,7 +63,7 @@ def save(
     dataset : a result, or a part of one; a lazy one is read slab by slab
     path : the file
     overwrite : replace a file that exists
-    output : dtype, compression and chunks
+    output : deprecated; dtype, compression and chunks, which `[output]` of a config sets
     should_stop : called before each slab; writing stops if it returns True
 
     Returns
@@ -98,7 +98,7 @@ def save(
                 yield str(name), tuple(slab.values()), variable.isel(slab).values
 
     with atomic_write(path, overwrite=overwrite) as sink:
-        write_sealed(sink, dataset, parts(), output)
+        write_sealed(sink, dataset, parts(), output or DEFAULT_OUTPUT)
         check_readable(sink, path)
 
 

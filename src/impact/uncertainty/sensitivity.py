@@ -59,7 +59,7 @@ def sensitivity(
     overwrite : replace it if it exists
     overrides, plugins : see `sweep`
     max_points : the largest number of points
-    execute : function that runs a plan; by default it is run in this process
+    execute : deprecated; function that runs a plan, by default it is run in this process
 
     Returns
     -------
