@@ -267,6 +267,18 @@ def test_a_law_of_a_module_is_pickled() -> None:
     assert pickle.loads(pickle.dumps(impact.run(model="mine-2026", plugins=[law]))).model.key == "mine-2026"
 
 
+def test_a_law_of_a_plug_in_file_is_pickled_as_its_file_and_key(tmp_path: Path) -> None:
+    path = tmp_path / "plug.py"
+    text = "import impact\nabout = {'title': '', 'year': 1, 'equation': '', 'reference': ''}\n"
+    text += "LAW = impact.hysteresis('mine', **about, chi=lambda e: 1 - e)\n"
+    path.write_text(text, encoding="utf-8")
+    pickled = pickle.dumps(impact.run(model="mine", plugins=[path]))
+    assert pickle.loads(pickled).model.coefficients["chi"](0.25) == 0.75
+    path.write_text(text.replace("1 - e", "2 - e"), encoding="utf-8")
+    with pytest.warns(impact.ImpactWarning, match="has changed since the model mine was pickled"):
+        assert pickle.loads(pickled).model.coefficients["chi"](0.25) == 1.75
+
+
 def test_the_text_of_a_result_has_100_columns() -> None:
     for text in map(
         str,
