@@ -37,7 +37,7 @@ LIBRARIES = {
 CLI_IMPORTS = {
     # tables of names
     "completion": {"config", "conformance", "contact", "engine", "exporters", "plots"},
-    # formats of a verdict, the picture of its differences, and functions of which keywords are deprecated for users
+    # formats of a verdict, the picture of its differences, and functions whose keywords are deprecated for users
     "compare": {"comparison.formats", "comparison.bless", "comparison.rerun", "plots"},
     "sensitivity": {"uncertainty.sensitivity"},
     # the executors, which have no public function

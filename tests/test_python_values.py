@@ -176,6 +176,13 @@ def test_the_command_line_names_options(cli: Run, words: list[str]) -> None:
     assert (done.returncode, done.stderr) == (2, f"hertz: cannot be read: No such file or directory; {hint}\n")
 
 
+def test_the_command_line_names_a_wrong_value_of_sel(cli: Run, result: xr.Dataset, tmp_path: Path) -> None:
+    impact.save(result, tmp_path / "r.h5")
+    done = cli("plot", "r.h5", "--kind", "loop", "--sel", "v1=1 kg", cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stderr.startswith('--sel v1=1 kg: sweep.v1: got "1 kg", expected a unit of m/s')
+
+
 def test_public_functions_are_pickled_by_their_name() -> None:
     for name in impact.__all__:
         assert pickle.loads(pickle.dumps(getattr(impact, name))) is getattr(impact, name)
