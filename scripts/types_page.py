@@ -92,6 +92,7 @@ def calls_of_one(result: xr.Dataset, folder: Path) -> dict[str, tuple[float, str
         "`timestep`, `tol`": (0.25, "", lambda tol: impact.timestep("tsuji-1992", **small, tol=tol).needed.dt),  # type: ignore[arg-type, union-attr]
         "`export`, `at`": (0.5, "", lambda e: impact.export("mujoco", "mujoco-solref", at={"e": e}).at_dt.e_mean),
         "`export`, `dt`": (2e-3, "s", lambda dt: impact.export("mujoco", "mujoco-solref", dt=dt).at_dt.dt),
+        "`compare`, `tol`": (0.25, "", lambda tol: impact.compare(result, result, tol=tol).variables[0].tolerance),
         "`recommend`, `tol`": (0.25, "", lambda tol: impact.recommend(result, tol=tol).tol),
         "`recommend`, `target`": (0.5, "", lambda e: impact.recommend(result, target={"e_out": e})[0].max_error),
         "`recommend`, `sel`": (2.0, "m/s", lambda v1: impact.recommend(result, sel={"v1": v1})[0].points),

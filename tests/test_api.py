@@ -36,6 +36,13 @@ def _mine(chi: object = lambda e: (1 - e * e) / e) -> impact.ForceModel:
     return impact.hysteresis("mine-2026", title="Mine", year=2026, equation="", reference="", chi=chi)
 
 
+def test_each_public_function_documents_what_it_returns() -> None:
+    functions = filter(inspect.isfunction, (getattr(impact, name) for name in impact.__all__))
+    returning = [function for function in functions if inspect.signature(function).return_annotation != "None"]
+    assert [f.__name__ for f in returning if "Returns\n    -------\n" not in (f.__doc__ or "")] == []
+    assert "Raises\n    ------\n" in (impact.load.__doc__ or "")
+
+
 def test_all_is_exactly_what_is_public() -> None:
     assert sorted(set(dir(impact)) - {"__version__"}) == sorted(impact.__all__)
     for name in impact.__all__:

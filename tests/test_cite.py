@@ -49,7 +49,8 @@ def test_a_result_cites_all_of_its_laws(tmp_path: Path, cli: Run) -> None:
     cited = json.loads(done.stdout)
     assert [citation["model"] for citation in cited] == ["tsuji-1992", "hertz", "coulomb-1785", "jkr-1971"]
     assert cited[0]["evidence"]["state"] == "seen"
-    assert cited[:3] == impact.cite(result).as_list()
+    assert cited[:3] == impact.cite(result).as_list() == list(impact.cite(result).as_dict().values())
+    assert impact.cite(result).as_dict()["hertz"]["evidence"]["state"] == "seen"
 
 
 def test_an_unknown_law_is_named(cli: Run) -> None:

@@ -37,8 +37,9 @@ LIBRARIES = {
 CLI_IMPORTS = {
     # tables of names
     "completion": {"config", "conformance", "contact", "engine", "exporters", "plots"},
-    # formats of a verdict, and the picture of its differences
-    "compare": {"comparison.formats", "plots"},
+    # formats of a verdict, the picture of its differences, and functions whose keywords are deprecated for users
+    "compare": {"comparison.formats", "comparison.bless", "comparison.rerun", "plots"},
+    "sensitivity": {"uncertainty.sensitivity"},
     # the executors, which have no public function
     "execution": {"engine", "results.sweep"},
     # a value in TOML

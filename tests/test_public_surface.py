@@ -9,14 +9,19 @@ import inspect
 import json
 import re
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+import pytest
+import xarray as xr
+
 import impact
 from impact.cli import main as program
+from impact.config.tables import Output
 
-from .conftest import Run
+from .conftest import ROOT, Run
 from .fork_server import start_fork_server
 
 SURFACE = Path(__file__).parent / "data" / "public_surface.txt"
@@ -162,7 +167,31 @@ def test_help_names_each_public_name_once_by_its_purpose() -> None:
 def test_no_signature_shows_an_object_by_its_address() -> None:
     functions = filter(inspect.isfunction, (getattr(impact, name) for name in impact.__all__))
     signatures = {function.__name__: str(inspect.signature(function)) for function in functions}
-    assert [name for name, signature in signatures.items() if " at 0x" in signature or "[Plan]" in signature] == []
+    shown = ("<", " at 0x", "Plan", "Output(")
+    assert [name for name, signature in signatures.items() if any(text in signature for text in shown)] == []
+
+
+@pytest.mark.parametrize(
+    ("call", "keyword"),
+    [
+        (lambda: impact.bless("", "", reason="", show=print), "bless: show"),
+        (lambda: impact.rerun("no.h5", execute=print), "rerun: execute"),  # type: ignore[arg-type]
+        (lambda: impact.sensitivity({}, execute=print), "sensitivity: execute"),  # type: ignore[arg-type]
+        (lambda: impact.sensitivities({}, [], execute=print), "sensitivities: execute"),  # type: ignore[arg-type]
+        (lambda: impact.save(xr.Dataset(), "r.h5", output=Output()), "save: output"),
+    ],
+)
+def test_a_deprecated_keyword_is_a_warning(call: Callable[[], object], keyword: str) -> None:
+    """Docstrings and docs/stability.md name it."""
+    function, name = keyword.split(": ")
+    assert f"    {name} : deprecated" in getattr(impact, function.replace("sensitivities", "sensitivity")).__doc__
+    assert f"`{name}`" in (ROOT / "docs" / "stability.md").read_text(encoding="utf-8")
+    with (
+        pytest.warns(DeprecationWarning, match=f"^{keyword} is deprecated") as caught,
+        suppress(impact.ImpactError),
+    ):
+        call()
+    assert caught[0].filename == __file__
 
 
 def main() -> None:

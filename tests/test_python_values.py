@@ -88,6 +88,34 @@ def test_another_type_is_named(source: object) -> None:
         (lambda: impact.run(model=["hertz"]), "model: got a list, expected str | None"),
         (lambda: impact.solve("hertz", "K", 0.5), "target: got a float, expected Mapping[str, object]"),
         (
+            lambda: impact.plot(impact.sweep(BASE), models=[1]),  # type: ignore[list-item]
+            "models: got a list with an int, expected Sequence[str] | None",
+        ),
+        (
+            lambda: impact.recommend(impact.sweep(BASE), models=[1]),  # type: ignore[list-item]
+            "models: got a list with an int, expected str | Sequence[str] | None",
+        ),
+        (
+            lambda: impact.plot(impact.sweep(BASE), sel={1: 2}),  # type: ignore[dict-item]
+            "sel: got a dict with an int, expected Mapping[str, object] | None",
+        ),
+        (
+            lambda: impact.solve("hertz", "K", {1: 0.5}),  # type: ignore[dict-item]
+            "target: got a dict with an int, expected Mapping[str, object]",
+        ),
+        (
+            lambda: impact.sweep(BASE, overrides=[1]),  # type: ignore[list-item]
+            "overrides: got a list with an int, expected Sequence[str] | Mapping[str, object]",
+        ),
+        (
+            lambda: impact.plot(impact.sweep(BASE), kind="restitution", labels={"hertz": 3}),  # type: ignore[dict-item]
+            "labels: got a dict with an int, expected Mapping[str, str] | None",
+        ),
+        (
+            lambda: impact.plot(impact.sweep(BASE), kind="loop", sel={"v1": "1 kg"}),
+            'sel["v1"]: sweep.v1: got "1 kg", expected a unit of m/s',
+        ),
+        (
             lambda: impact.cite("hertz", 5),
             "laws: got an int, expected str | Path | xr.Dataset | ForceModel | FrictionLaw",
         ),
@@ -119,6 +147,12 @@ def test_a_message_names_the_argument_as_python_does(call: Callable[[], object],
     assert "--" not in str(refusal.value)
 
 
+@pytest.mark.parametrize("function", [impact.plot, impact.recommend, impact.report, impact.run, impact.prepare])
+def test_a_dataset_of_another_program_is_not_a_result(function: Callable[[xr.Dataset], object]) -> None:
+    with pytest.raises(impact.UsageError, match="not a result of impact: it has no coordinate model"):
+        function(xr.Dataset({"a": ("x", [1.0])}))
+
+
 def test_what_fails_for_another_reason_stays_the_error_that_it_is() -> None:
     with pytest.raises(TypeError, match="unexpected keyword argument 'modle'"):
         impact.run(modle="hertz")  # type: ignore[call-arg]
@@ -140,6 +174,13 @@ def test_the_command_line_names_options(cli: Run, words: list[str]) -> None:
     done = cli(*words)
     hint = "did you mean --model hertz?"
     assert (done.returncode, done.stderr) == (2, f"hertz: cannot be read: No such file or directory; {hint}\n")
+
+
+def test_the_command_line_names_a_wrong_value_of_sel(cli: Run, result: xr.Dataset, tmp_path: Path) -> None:
+    impact.save(result, tmp_path / "r.h5")
+    done = cli("plot", "r.h5", "--kind", "loop", "--sel", "v1=1 kg", cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stderr.startswith('--sel v1=1 kg: sweep.v1: got "1 kg", expected a unit of m/s')
 
 
 def test_public_functions_are_pickled_by_their_name() -> None:
@@ -233,6 +274,18 @@ def test_a_law_of_a_module_is_pickled() -> None:
     assert pickle.loads(pickle.dumps(impact.run(model="mine-2026", plugins=[law]))).model.key == "mine-2026"
 
 
+def test_a_law_of_a_plug_in_file_is_pickled_as_its_file_and_key(tmp_path: Path) -> None:
+    path = tmp_path / "plug.py"
+    text = "import impact\nabout = {'title': '', 'year': 1, 'equation': '', 'reference': ''}\n"
+    text += "LAW = impact.hysteresis('mine', **about, chi=lambda e: 1 - e)\n"
+    path.write_text(text, encoding="utf-8")
+    pickled = pickle.dumps(impact.run(model="mine", plugins=[path]))
+    assert pickle.loads(pickled).model.coefficients["chi"](0.25) == 0.75
+    path.write_text(text.replace("1 - e", "2 - e"), encoding="utf-8")
+    with pytest.warns(impact.ImpactWarning, match="has changed since the model mine was pickled"):
+        assert pickle.loads(pickled).model.coefficients["chi"](0.25) == 1.75
+
+
 def test_the_text_of_a_result_has_100_columns() -> None:
     for text in map(
         str,
@@ -283,7 +336,32 @@ def test_a_step_is_a_number_or_several_with_or_without_a_unit(dt: Any) -> None:
 
 
 def test_a_tolerance_may_be_a_percentage(result: xr.Dataset) -> None:
+    changed = result.assign(v1_post=result["v1_post"] + 0.005)
+    for tol in ("1%", 0.01 * unit.dimensionless, {"all": "1%"}, {"v1_post": np.float32(0.01)}):
+        assert impact.compare(changed, result, tol=tol).equal  # type: ignore[arg-type]
+    assert not impact.compare(changed, result, tol="0.1%").equal
     assert impact.recommend(result, tol="2%").tol == impact.recommend(result, tol=0.02).tol == 0.02
+
+
+def test_a_width_may_be_a_quantity(result: xr.Dataset) -> None:
+    widths = [impact.plot(result, width=width).get_figwidth() for width in ("84mm", 84 * unit.mm, 84 / 25.4)]
+    assert widths == pytest.approx([84 / 25.4] * 3, rel=1e-15)
+
+
+@pytest.mark.parametrize("half", [np.array([0.5]), pd.Series([0.5]), xr.DataArray([0.5], dims="e"), [0.5]])
+def test_an_array_of_one_element_is_a_value(half: object, result: xr.Dataset) -> None:
+    assert impact.run(at={"e": half}).point["e"] == 0.5
+    assert impact.recommend(result, sel={"e": half})[0].points == 1
+    assert impact.solve("mujoco-solref", "dampratio", {"e_out": half}).roots
+
+
+@pytest.mark.parametrize("collect", [np.array, pd.Series, pd.Index, xr.DataArray])
+def test_models_may_be_an_array_of_keys(collect: Callable[[list[str]], Any], result: xr.Dataset) -> None:
+    keys = collect(["tsuji-1992", "hertz"])
+    assert impact.sweep(models=keys)["model"].values.tolist() == ["tsuji-1992", "hertz"]
+    assert len(impact.recommend(result, models=keys)) == 2
+    assert impact.plot(result, models=keys).axes
+    assert "tsuji-1992" in impact.report(result.isel(e=[0]), models=keys, sections=["models"])
 
 
 def test_one_model_may_be_named_without_a_list(result: xr.Dataset) -> None:
@@ -336,6 +414,34 @@ def test_a_radius_replaces_the_mass_of_the_starter_config() -> None:
     swept = impact.sweep(models="hertz", e=0.5, R1=0.01, R2=0.01)
     expected = impact.run(model="hertz", at={"e": 0.5, "R1": 0.01, "R2": 0.01}).values
     assert swept["contact_time"].item() == pytest.approx(expected["contact_time"], rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("inputs", "dims"),
+    [
+        ({"cases": pd.DataFrame({"v1 [cm/s]": [50.0, 100.0], "e": [0.5, 0.6], "m1": 2.0})}, {"case": 2}),
+        ({"cases": {"alpha": [0.1, 0.2]}}, {"case": 2}),
+        ({"cases": {"R1": [0.1, 0.2], "R2": [0.1, 0.1], "e": [0.5, 0.6]}}, {"case": 2}),
+        ({"cases": {"material1": ["steel", "glass"], "e": [0.5, 0.6]}, "material2": "steel"}, {"case": 2}),
+        ({"e": 0.5, "speed": 2.0, "angle": "30 deg", "mu": 0.3, "frictions": "coulomb-1785"}, {"friction": 1}),
+    ],
+    ids=["cases", "alpha", "radii", "materials", "speed"],
+)
+def test_inputs_replace_those_of_the_starter_config(
+    inputs: dict[str, Any], dims: dict[str, int], tmp_path: Path
+) -> None:
+    """Also where the result is repeated from its file."""
+    swept = impact.sweep(models="hertz", output=tmp_path / "r.h5", **inputs)
+    assert dict(swept.sizes) == {"model": 1, **dims}
+    assert impact.rerun(tmp_path / "r.h5").equal
+
+
+def test_cases_of_a_file_replace_inputs_of_the_starter_config(tmp_path: Path) -> None:
+    (tmp_path / "c.csv").write_text("v1 [m/s],e\n0.5,0.5\n1.0,0.6\n", encoding="utf-8")
+    swept = impact.sweep(models="hertz", cases=str(tmp_path / "c.csv"))
+    assert swept["v1"].values.tolist() == [0.5, 1.0]
+    with pytest.raises(impact.ConfigError, match="set together with"):
+        impact.sweep(models="hertz", cases=str(tmp_path / "c.csv"), v1=2.0)
 
 
 @pytest.mark.parametrize(

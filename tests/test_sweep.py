@@ -31,6 +31,7 @@ from impact.errors import ConfigError, StoreError, UsageError
 from impact.progress_display import line, new_bar, update
 from impact.results.summary import summarize
 from impact.results.sweep import read_plan, sweep_in_memory, sweep_into
+from impact.results.xarray_backend import save
 
 from .conftest import PLUGIN, ROOT, WIDE, Run
 from .fork_server import ForkServer, printed_on_terminal
@@ -398,7 +399,7 @@ def test_a_result_is_stored_in_the_format_of_its_config(
     loaded = impact.load(tmp_path / "wide.h5")
     # a sweep in memory, saved afterwards, gives the same file
     in_memory = impact.sweep(config, overrides=overrides)
-    impact.save(in_memory, tmp_path / "saved.h5", output=read_plan(config, overrides).config.output)
+    save(in_memory, tmp_path / "saved.h5", output=read_plan(config, overrides).config.output)
     assert (tmp_path / "saved.h5").read_bytes() == (tmp_path / "wide.h5").read_bytes()
     assert loaded.identical(in_memory)
     assert loaded["v1_post"].values.tobytes() == read_by_h5py.tobytes()

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import ast
 import builtins
 import inspect
 import numbers
-import re
+import warnings
 from collections.abc import Callable
 from functools import wraps
 from types import UnionType
@@ -19,18 +20,30 @@ T = TypeVar("T")
 
 # a number of another library is one as well
 ABSTRACT = {"float": numbers.Real, "int": numbers.Integral, "Any": object, "None": type(None)}
-# between the alternatives of an annotation, not inside of brackets
-ALTERNATIVES = re.compile(r" \| (?![^\[]*\])")
+
+# keywords of public functions for objects that are not public
+DEPRECATED = {
+    "bless": "show",
+    "rerun": "execute",
+    "sensitivity": "execute",
+    "sensitivities": "execute",
+    "save": "output",
+}
 
 
 def name_wrong_types(function: Callable[P, T]) -> Callable[P, T]:
     """Wrap a public function: an unexpected error becomes a UsageError if an argument is not of its type.
 
-    Types are only compared after an error, so that whatever works is taken.
+    Types are only compared after an error, so that whatever works is taken. A deprecated keyword is a warning, but
+    not for this package, which calls the function itself.
     """
+    deprecated = DEPRECATED.get(function.__name__)
 
     @wraps(function)
     def call(*args: P.args, **kwargs: P.kwargs) -> T:
+        if deprecated in kwargs:
+            text = f"{function.__name__}: {deprecated} is deprecated and will be removed in version 2"
+            warnings.warn(text, DeprecationWarning, stacklevel=2)
         try:
             return function(*args, **kwargs)
         except ImpactError:
@@ -57,6 +70,8 @@ def type_problem(function: Callable[..., object], args: Any, kwargs: Any) -> str
     >>> from impact.results.ranking import recommend
     >>> type_problem(recommend, ["r.h5"], {"target": 0.6})
     'target: got a float, expected Mapping[str, object] | None'
+    >>> type_problem(recommend, ["r.h5"], {"models": ["hertz", 1]})
+    'models: got a list with an int, expected str | Sequence[str] | None'
     """
     signature = inspect.signature(function)
     try:
@@ -67,10 +82,49 @@ def type_problem(function: Callable[..., object], args: Any, kwargs: Any) -> str
     for name, value in bound.arguments.items():
         parameter = signature.parameters[name]
         for item in value if parameter.kind is parameter.VAR_POSITIONAL else [value]:
-            alternatives = ALTERNATIVES.split(parameter.annotation)
-            if not any(_is_of(item, text, function.__globals__) for text in alternatives):
-                return f"{name}: got {type_of(item)}, expected {parameter.annotation}"
+            if wrong := _wrong_type(item, parameter.annotation, function.__globals__):
+                return f"{name}: got {wrong}, expected {parameter.annotation}"
     return ""
+
+
+def _wrong_type(value: object, annotation: str, names: dict[str, Any]) -> str:
+    """Name the type of a value that is not of an annotation, with that of its first wrong element; else empty."""
+    wrong = type_of(value)
+    for text in _alternatives(annotation):
+        if _is_of(value, text, names):
+            element = _wrong_element(value, text, names)
+            if not element:
+                return ""
+            wrong = f"{type_of(value)} with {element}"
+    return wrong
+
+
+def _wrong_element(value: Any, text: str, names: dict[str, Any]) -> str:
+    """Name the type of the first wrong element of a sequence, or key or value of a mapping."""
+    kind, _, inner = text.removesuffix("]").partition("[")
+    if kind not in ("Sequence", "Mapping"):
+        return ""
+    columns = (value,) if kind == "Sequence" else (value, value.values())
+    wrong_types = (
+        _wrong_type(element, annotation, names)
+        for column, annotation in zip(columns, inner.split(", ", len(columns) - 1), strict=True)
+        for element in column
+    )
+    return next(filter(None, wrong_types), "")
+
+
+def _alternatives(annotation: str) -> list[str]:
+    """Split an annotation at each | that is not in brackets.
+
+    >>> _alternatives("str | Sequence[str | Path] | None")
+    ['str', 'Sequence[str | Path]', 'None']
+    """
+    union = ast.parse(annotation, mode="eval").body
+    last: list[str] = []
+    while isinstance(union, ast.BinOp):
+        last.insert(0, ast.unparse(union.right))
+        union = union.left
+    return [ast.unparse(union), *last]
 
 
 def _is_of(value: object, text: str, names: dict[str, Any]) -> bool:

@@ -101,6 +101,10 @@ def progress_bar(
     write : prints a line where there is no bar; by default to stderr
     quiet : report nothing
 
+    Returns
+    -------
+    context manager : of the function, which takes a `Progress`
+
     >>> import impact, tempfile
     >>> with tempfile.TemporaryDirectory() as folder, impact.progress_bar() as on_progress:
     ...     outcome = impact.sweep_to_file("configs/figure6.toml", f"{folder}/r.h5", on_progress=on_progress)

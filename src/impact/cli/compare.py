@@ -80,8 +80,10 @@ def bless(
         show(verdict)
         sys.stdout.flush()
 
+    from ..comparison.bless import bless as replace_baseline
+
     try:
-        verdict = impact.bless(
+        verdict = replace_baseline(
             new, baseline, reason=reason, tol=dict(tol or ()) or None, allow_failed=allow_failed, show=show_verdict
         )
     except (BrokenPipeError, SystemExit):
@@ -105,10 +107,11 @@ def rerun(
     """Repeat a sweep or a calibration from its result alone, and compare the new values with the stored ones."""
     with exits.catch_signals() as should_stop:
         from ..comparison import formats
+        from ..comparison.rerun import rerun as repeat
 
         _check_plot(plot, result)
         try:
-            verdict = impact.rerun(
+            verdict = repeat(
                 result,
                 plugins=plugins or (),
                 tol=dict(tol or ()) or None,

@@ -58,7 +58,9 @@ def sensitivity(
     """
     outputs = list(dict.fromkeys(of or ["e_out"]))
     with exits.catch_signals() as should_stop:
-        results = impact.sensitivities(
+        from ..uncertainty.sensitivity import sensitivities
+
+        results = sensitivities(
             config,
             outputs,
             output=output,

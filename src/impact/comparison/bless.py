@@ -26,7 +26,7 @@ def bless(
     baseline: str | Path,
     *,
     reason: str,
-    tol: float | Tolerances | None = None,
+    tol: float | str | Tolerances | None = None,
     allow_failed: bool = False,
     show: Callable[[Verdict], None] | None = None,
 ) -> Verdict | None:
@@ -38,7 +38,7 @@ def bless(
     reason : why the numbers changed
     tol : see `compare`; stored in the new baseline, so that a coarser solver does not loosen later comparisons
     allow_failed : accept a result with failed points
-    show : called with the verdict before anything is written; an exception prevents the replacement
+    show : deprecated; called with the verdict before anything is written; an exception prevents the replacement
 
     Returns
     -------

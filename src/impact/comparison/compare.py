@@ -31,7 +31,7 @@ def compare(
     new: str | Path | xr.Dataset,
     baseline: str | Path | xr.Dataset,
     *,
-    tol: float | Tolerances | None = None,
+    tol: float | str | Tolerances | None = None,
     subset: bool = False,
 ) -> Verdict:
     """Compare a result with a baseline, each variable as docs/schema.md states, at points of equal labels.
@@ -54,9 +54,13 @@ def compare(
     Parameters
     ----------
     new, baseline : results, or their files
-    tol : one tolerance for all variables, relative to the scale of a point, or by name, "all" for the others; by
-        default what the baseline carries, else 10 times its solver's rtol
+    tol : one tolerance for all variables, relative to the scale of a point, such as 1e-8 or "1%", or by name,
+        "all" for the others; by default what the baseline carries, else 10 times its solver's rtol
     subset : compare what both have, and ignore what only one has
+
+    Returns
+    -------
+    Verdict : `equal`, the differences by variable, and what explains them; `print` shows it
 
     Raises
     ------

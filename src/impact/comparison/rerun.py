@@ -27,7 +27,7 @@ def rerun(
     result: str | Path,
     *,
     plugins: Sequence[ForceModel | str | Path] = (),
-    tol: float | Tolerances | None = None,
+    tol: float | str | Tolerances | None = None,
     subset: bool = False,
     max_points: int = MAX_POINTS,
     execute: Callable[..., xr.Dataset] | None = None,
@@ -42,7 +42,11 @@ def rerun(
     plugins : the plug-in models that it was computed with; a note of the verdict names a changed one
     tol, subset : see `compare`
     max_points : the largest number of points
-    execute : function that runs a plan; by default it is run in this process
+    execute : deprecated; function that runs a plan, by default it is run in this process
+
+    Returns
+    -------
+    Verdict : see `compare`
 
     Raises
     ------

@@ -9,13 +9,15 @@ from typing import Any, TypeGuard
 
 import numpy as np
 
+from ..config.files import read_number
+from ..config.quantities import Quantity
 from ..contact.variables import OUTPUTS
 from ..errors import ResultError, UsageError, did_you_mean
 from ..formatting import argument
 from ..results.attributes import read_attribute
 from ..results.schema import DEFAULT_RTOL_FACTOR
 
-Tolerances = Mapping[str, float]
+Tolerances = Mapping[str, float | str]
 
 # name of the tolerance for variables that have none of their own
 ALL_VARIABLES = "all"
@@ -24,11 +26,13 @@ CALIBRATION_TOLERANCE = 1e-5
 TOLERANCE_VARIABLES = [name for name, variable in OUTPUTS.items() if variable.has_tolerance]
 
 
-def effective_tolerances(tol: float | Tolerances | None, attributes: Mapping[str, Any]) -> dict[str, float]:
+def effective_tolerances(tol: float | str | Tolerances | None, attributes: Mapping[str, Any]) -> dict[str, float]:
     """Find the tolerances by variable, "all" for the others: the caller's, else the baseline's, else its solver's.
 
     >>> effective_tolerances({"e_out": 1e-6}, {"rtol": 1e-10, "tolerances": '{"all": 1e-8}'})
     {'all': 1e-08, 'e_out': 1e-06}
+    >>> effective_tolerances("1%", {"rtol": 1e-10})
+    {'all': 0.01}
     >>> effective_tolerances(1e-7, {"rtol": 1e-10, "tolerances": '{"v1_post": 1e-8}'})
     {'all': 1e-07}
     >>> effective_tolerances(None, {"rtol": 1e-10})
@@ -49,7 +53,7 @@ def effective_tolerances(tol: float | Tolerances | None, attributes: Mapping[str
     return {ALL_VARIABLES: DEFAULT_RTOL_FACTOR * float(rtol), **stored, **requested}
 
 
-def calibration_tolerances(tol: float | Tolerances | None) -> dict[str, float]:
+def calibration_tolerances(tol: float | str | Tolerances | None) -> dict[str, float]:
     """Choose the tolerance of all variables of a calibration or a board, relative to their scales."""
     requested = _by_variable(tol)
     for name, value in requested.items():
@@ -61,9 +65,18 @@ def calibration_tolerances(tol: float | Tolerances | None) -> dict[str, float]:
     return {ALL_VARIABLES: CALIBRATION_TOLERANCE} | requested
 
 
-def _by_variable(tol: float | Tolerances | None) -> dict[str, float]:
+def _by_variable(tol: float | str | Tolerances | None) -> dict[str, float]:
     """Convert what a caller passed to tolerances by name."""
-    return dict(tol or {}) if isinstance(tol, Mapping | None) else {ALL_VARIABLES: tol}
+    by_name = dict(tol or {}) if isinstance(tol, Mapping) or tol is None else {ALL_VARIABLES: tol}
+    return {name: _as_number(value) for name, value in by_name.items()}
+
+
+def _as_number(value: Any) -> Any:
+    """Convert a text, which may be in percent, or a value of another library; what is no number is unchanged."""
+    try:
+        return read_number(value, Quantity("1", ""), "tol")
+    except UsageError:
+        return value
 
 
 def _check_tolerances(tolerances: Mapping[str, Any]) -> None:

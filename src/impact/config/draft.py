@@ -249,10 +249,10 @@ def _library_setting(name: str, without: Iterable[str] = ()) -> Setting:
 def open_config(source: Path | Mapping[str, object] | None, plugins: Sequence[ForceModel] = ()) -> Draft:
     """Open the config of a TOML file or a mapping, in which names of files are relative to its folder.
 
-    None is the starter config.
+    None is the starter config, for which they are relative to the working directory.
     """
     if source is None:
-        return open_text(STARTER_CONFIG.read_text(encoding="utf-8"), "starter", plugins)
+        return replace(open_text(STARTER_CONFIG.read_text(encoding="utf-8"), "starter", plugins), folder=Path())
     if not isinstance(source, Mapping):
         if not isinstance(source, str | Path):
             raise UsageError(f"source: got {type_of(source)}, expected a mapping, or the name of a TOML file")
@@ -274,21 +274,6 @@ def open_text(text: str, name: str, plugins: Sequence[ForceModel] = ()) -> Draft
     """Open a TOML text, or a JSON text, which starts with a brace; no file is read for it."""
     data, problems = to_plain_data(parse_document(text, name))
     return Draft(data, text, name, catalogue(plugins), problems=tuple(problems))
-
-
-def without_default_masses(draft: Draft, fixed: Mapping[str, object]) -> Draft:
-    """Leave out the mass of Table 1 of a ball whose radius is given: it follows from that and the density.
-
-    The draft is that of the starter config; `fixed` has inputs that are set after its settings.
-    """
-    given = {**{str(path[1]): setting.value for path, setting in draft.origins.items() if len(path) > 1}, **fixed}
-    derived = [
-        f"m{ball}"
-        for ball in (1, 2)
-        if f"m{ball}" not in given and str(given.get(f"R{ball}", "inf")).strip() != "inf"
-    ]
-    sweep = {name: value for name, value in draft.table("sweep").items() if name not in derived}
-    return replace(draft, data={**draft.data, "sweep": sweep})
 
 
 def add_library_materials(draft: Draft) -> Draft:

@@ -184,6 +184,17 @@ def _from_library(value: Any) -> object:
     return float(value) if isinstance(value, Fraction | Decimal) else value
 
 
+def to_plain_value(value: object) -> Any:
+    """Convert a value of which one is expected: an array of one element is that element.
+
+    >>> import numpy as np
+    >>> to_plain_value(np.array([0.5])), to_plain_value(np.arange(2))
+    (0.5, [0, 1])
+    """
+    plain, _ = to_plain_data(value)
+    return plain[0] if isinstance(plain, list) and len(plain) == 1 else plain
+
+
 def read_number(value: object, quantity: Quantity, origin: str) -> float:
     """Read an argument that is one number, bare, with a unit, or of another library.
 
@@ -191,7 +202,7 @@ def read_number(value: object, quantity: Quantity, origin: str) -> float:
     >>> read_number("2 us", time, "--dt"), read_number("1e-3", time, "--dt")
     (2e-06, 0.001)
     """
-    plain, _ = to_plain_data(value)
+    plain = to_plain_value(value)
     if isinstance(plain, str):
         with contextlib.suppress(ValueError):
             plain = float(plain)

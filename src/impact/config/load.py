@@ -18,7 +18,7 @@ from ..contact.model import ForceModel
 from ..contact.numba.dispatch import is_installed
 from ..contact.variables import OUTPUTS, default_variables
 from . import measurements, quantities, tables
-from .columns import expand_cases, named_files, read_files
+from .columns import expand_cases, named_files, read_files, without_replaced_inputs
 from .design import design_problems, distribution_paths, draw_columns, unit_samples
 from .draft import (
     Draft,
@@ -29,7 +29,6 @@ from .draft import (
     open_config,
     open_text,
     settings_of,
-    without_default_masses,
 )
 from .files import as_table, override_text, set_value
 from .grid import MAX_POINTS, Axis, build_grid, chunk_problems
@@ -85,8 +84,8 @@ def read_config(
 ) -> Config:
     """Read the config of a TOML file or a mapping, with overrides such as "sweep.e.linspace=[0,1,11]".
 
-    Without a source it is the starter config. Names of CSV files are relative to the folder of the TOML file, or
-    for a mapping to the working directory.
+    Without a source it is the starter config, without inputs that the overrides replace by others. Names of CSV
+    files are relative to the folder of the TOML file, else to the working directory.
 
     >>> steel = {"E": "210 GPa", "nu": 0.3, "rho": 7850}
     >>> sweep = {"e": [0.5, 1], "v1": 1, "m1": 1, "m2": 1, "material": "steel"}
@@ -94,7 +93,9 @@ def read_config(
     (Axis(columns={'e': (0.5, 1.0)}, numbered='', numbers=()),)
     """
     draft = open_config(source, plugins).with_settings(settings_of(overrides))
-    return build(without_default_masses(draft, {}) if source is None else draft, max_points, purpose)
+    if source is None:
+        draft = without_replaced_inputs(inline_files(draft), {})
+    return build(draft, max_points, purpose)
 
 
 def parse_config(

@@ -523,6 +523,10 @@ def schema(output: str | Path | None = None, *, overwrite: bool = False) -> dict
     output : file to write it to as well
     overwrite : replace the output if it exists
 
+    Returns
+    -------
+    dict : the schema
+
     Raises
     ------
     UsageError : the output exists, or cannot be written there

@@ -222,6 +222,10 @@ def conform_engines(program: str | None = None) -> Engines:
     ----------
     program : the Python interpreter to ask; by default this one
 
+    Returns
+    -------
+    Engines : one for each engine; `print` shows a table
+
     >>> import impact
     >>> impact.conform_engines().records()[0]["install"]
     'pip install pymunk'

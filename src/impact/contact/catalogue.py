@@ -51,14 +51,17 @@ def look_up(laws: Mapping[str, Law], key: str, noun: str) -> Law:
 
 
 def pickle_by_key(kind: type[Law], find: Callable[[str], Law]) -> None:
-    """Let laws of a catalogue be pickled as their keys: their formulas are no functions of a module."""
+    """Let laws of a catalogue be pickled as their keys: their formulas are no functions of a module.
+
+    A law that is read from a file has an attribute `read_again`, the function that does so and its arguments.
+    """
 
     def reduce(law: Law) -> tuple[Any, ...]:
         try:
             is_declared = find(law.key) is law
         except ModelError:
             is_declared = False
-        state = (find, (law.key,)) if is_declared else object.__reduce_ex__(law, 2)
+        state = (find, (law.key,)) if is_declared else getattr(law, "read_again", object.__reduce_ex__(law, 2))
         assert isinstance(state, tuple)
         return state
 

@@ -22,6 +22,10 @@ def power(base: Array, exponent: float) -> Array:
     base : array of any shape, >= 0
     exponent : float
 
+    Returns
+    -------
+    array : of the shape of the base
+
     >>> power(np.array([4.0, 16.0]), 1.5)
     array([ 8., 64.])
     >>> power(np.array([16.0]), 0.25)

@@ -118,6 +118,10 @@ def frictions(*, pattern: str = "*", search: str | None = None) -> Frictions:
     pattern : pattern of the keys, such as "lammps-*"
     search : words that all have to occur in the key, title, year, equation, reference or DOI, in any case
 
+    Returns
+    -------
+    Frictions : a mapping of keys to laws (`FrictionLaw`); `print` shows a table
+
     Raises
     ------
     UsageError : no friction law matches the pattern or the words

@@ -236,6 +236,10 @@ def models(
     family : name of the family; by default all families
     search : words that all have to occur in the key, title, year, equation, reference or DOI, in any case
 
+    Returns
+    -------
+    Models : a mapping of keys to laws (`ForceModel`); `print` shows a table
+
     Raises
     ------
     UsageError : no model matches the pattern or the words, or there is no such family

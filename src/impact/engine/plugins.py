@@ -16,7 +16,7 @@ import re
 import sys
 import traceback
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
@@ -24,9 +24,10 @@ from types import ModuleType
 from typing import NamedTuple
 
 from ..config.quantities import as_text
+from ..contact.catalogue import look_up
 from ..contact.model import ForceModel
 from ..contact.models import catalogue
-from ..errors import NOT_OF_A_PLUGIN, ImpactError, MissingFileError, ModelError, UsageError
+from ..errors import NOT_OF_A_PLUGIN, ImpactError, MissingFileError, ModelError, UsageError, warn
 from ..formatting import safe_text
 
 ENTRY_POINT_GROUP = "impact.models"
@@ -198,7 +199,19 @@ def _plugins_of_file(source: PythonFile) -> list[Plugin]:
     models = _models_among(vars(_execute_module(source, sha256)).values())
     if not models:
         raise ModelError(f"{source.name}: contains no model, expected a ForceModel at its top level")
+    file = str(Path(source.name).absolute())
+    for model in models:
+        # no field: it does not belong to the law
+        object.__setattr__(model, "read_again", (law_of_file, (file, sha256, model.key)))
     return [Plugin(model, sha256, source) for model in models]
+
+
+def law_of_file(file: str, sha256: str, key: str) -> ForceModel:
+    """Read a law that was pickled from its file again."""
+    plugins = _plugins_of_file(_read_source(Path(file)))
+    if plugins[0].sha256 != sha256:
+        warn(f"{file}: has changed since the model {key} was pickled")
+    return look_up({plugin.model.key: plugin.model for plugin in plugins}, key, "model")
 
 
 def _read_source(path: Path) -> PythonFile:
@@ -267,7 +280,7 @@ def value_hash(model: ForceModel) -> str | None:
     True
     """
     digest = hashlib.sha256()
-    for name, value in vars(model).items():
+    for name, value in ((field.name, getattr(model, field.name)) for field in fields(model)):
         parts = value.values() if isinstance(value, Mapping) else value if isinstance(value, tuple) else (value,)
         formulas = [part for part in parts if callable(part)]
         if not formulas:

@@ -63,6 +63,10 @@ class Environment(Displayed):
 def doctor() -> Environment:
     """Find the versions of this program, of its packages and of the simulation codes that are installed.
 
+    Returns
+    -------
+    Environment : versions by name, None for what is not installed
+
     >>> import impact
     >>> found = impact.doctor()
     >>> found.impact == impact.__version__ and found.packages["numpy"] is not None

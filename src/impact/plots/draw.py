@@ -71,8 +71,8 @@ def plot(
     log : which axes are logarithmic, such as "x" or "xy"; axes with logarithmic spacing are in any case
     points : measured points over the curves: a CSV file, or a table of pandas or xarray, whose columns have names
         such as "v1 [m/s]", "e_out" and "sigma"
-    width : width of the figure [in], or a length such as "84mm", "single" or "double"; by default that of rcParams
-        if it was changed, else "double"
+    width : width of the figure [in], or a length such as "84mm", a quantity of pint, "single" or "double"; by
+        default that of rcParams if it was changed, else "double"
     height : height of the figure [in], or a length; by default it depends on the kind
     style : a style sheet of matplotlib, or the name of one; rcParams changed by the user are respected in any case
     title : write the title and the conditions; by default unless `ax` is set

@@ -6,7 +6,6 @@ the kind is needed.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
@@ -55,8 +54,7 @@ LEGENDS = ("full", "short", "keys", "none")
 DEFAULT_LEGENDS = ("full", "short", "keys")
 # limits of the width and height of a picture
 MIN_SIZE_INCHES, MAX_SIZE_INCHES = 1.0, 60.0
-LENGTH_PATTERN = re.compile(r"\s*([0-9]*\.?[0-9]+(?:[eE][-+]?[0-9]+)?)\s*(mm|cm|in)\s*")
-INCHES_PER_UNIT = {"mm": 1.0 / 25.4, "cm": 1.0 / 2.54, "in": 1.0}
+METERS_PER_INCH = 0.0254
 
 
 @dataclass(frozen=True)
@@ -73,6 +71,11 @@ class Choice:
     frictions: Sequence[str] | None = None
 
     def __post_init__(self) -> None:
+        # imported here: every command reads the kinds
+        from ..config.files import to_plain_data
+
+        for name in ("models", "frictions"):
+            object.__setattr__(self, name, to_plain_data(getattr(self, name))[0])
         if self.log not in ("", *LOG_AXES):
             raise UsageError(f"{argument('log')}: got {self.log}, expected {', '.join(LOG_AXES)}")
 
@@ -132,11 +135,17 @@ def length(size: str | float | None, origin: str) -> float | None:
     >>> round(length("84mm", "width"), 4), length("single", "width"), length(7.1, "width")
     (3.3071, 3.5, 7.1)
     """
-    if size is None or size in WIDTHS:
-        return None if size is None else WIDTHS[str(size)]
-    parts = LENGTH_PATTERN.fullmatch(size) if isinstance(size, str) else None
-    inches = float(parts[1]) * INCHES_PER_UNIT[parts[2]] if parts else size
-    if isinstance(inches, str) or not MIN_SIZE_INCHES <= inches <= MAX_SIZE_INCHES:
+    from ..config.files import to_plain_value
+    from ..config.quantities import number_in
+
+    plain = to_plain_value(size)
+    if plain is None:
+        return None
+    if isinstance(plain, str) and plain in WIDTHS:
+        return WIDTHS[plain]
+    meters = number_in("m", plain) if isinstance(plain, str) else None
+    inches = plain if meters is None else meters / METERS_PER_INCH
+    if not isinstance(inches, float | int) or not MIN_SIZE_INCHES <= inches <= MAX_SIZE_INCHES:
         expected = f"a length from 26mm to {MAX_SIZE_INCHES:g}in, such as 84mm, 8.4cm or 3.3in"
         names = f", or {' or '.join(WIDTHS)}" if origin.endswith("width") else ""
         raise UsageError(f"{origin}: got {size}, expected {expected}{names}")

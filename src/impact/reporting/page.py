@@ -18,6 +18,7 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from ..atomic import check_outputs, write_file
+from ..config.files import to_plain_data
 from ..config.input_names import InputName, is_input
 from ..config.tables import MATERIAL_QUANTITIES
 from ..contact.evidence import Evidence
@@ -85,6 +86,10 @@ def report(
     sections : names of SECTIONS, of which those are written that the result has; by default all. Figures of
         friction are in the section friction
 
+    Returns
+    -------
+    str : the page, as HTML
+
     Raises
     ------
     UsageError, ResultError : it is a time history, or its attributes are not those of a result; there is no such
@@ -124,6 +129,7 @@ def page(
     if "model" not in dataset.dims:
         raise UsageError("got a time history, expected the result of a sweep")
     model_count, part_notes = dataset.sizes["model"], []
+    models, _ = to_plain_data(models)
     if models:
         dataset = dataset.isel(model=law_positions(models, dataset))
         part_notes = [f"this page shows {dataset.sizes['model']} of the {model_count} models of the result"]

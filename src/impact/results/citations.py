@@ -59,8 +59,8 @@ class Citations(tuple[Citation, ...], Displayed):
         return [dict(vars(citation)) for citation in self]
 
     def as_dict(self) -> dict[str, Any]:
-        """The BibTeX of each law by its key."""
-        return {citation.model: citation.bibtex for citation in self}
+        """The objects of the JSON by the keys of their laws."""
+        return {citation.model: dict(vars(citation)) for citation in self}
 
     def records(self) -> Sequence[dict[str, Any]]:
         """A row for each law."""
@@ -78,6 +78,10 @@ def cite(*laws: str | Path | xr.Dataset | ForceModel | FrictionLaw, plugins: Seq
     ----------
     laws : keys of models and friction laws, laws, or results, of which every law is cited
     plugins : Python files with user-defined models, or their models
+
+    Returns
+    -------
+    Citations : one for each law, with its BibTeX and its evidence; `print` shows BibTeX
 
     Raises
     ------

@@ -131,6 +131,10 @@ def describe(
 ) -> Fits | Studies | Board | ModelDescription | FrictionDescription:
     """Describe a calibration, a sensitivity study, a board or a law, as its command prints it and a notebook does.
 
+    Returns
+    -------
+    Fits, Studies, Board, ModelDescription or FrictionDescription : with `records`, `as_dict` and `to_dataframe`
+
     Raises
     ------
     UsageError : the dataset is another result

@@ -151,6 +151,10 @@ def estimate(
     jobs : number of processes or threads that integrate
     on_note : called with a sentence about each implausible value; by default an `ImpactWarning`
 
+    Returns
+    -------
+    Estimate : counts of points and trajectories, bytes and seconds
+
     Raises
     ------
     ConfigError, UsageError, ModelError : see `sweep`

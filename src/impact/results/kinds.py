@@ -22,6 +22,12 @@ def kind_of(dataset: xr.Dataset) -> Kind:
     return "sensitivity study" if "input" in dataset.dims else "sweep"
 
 
+def require_result(dataset: xr.Dataset) -> None:
+    """Raise a UsageError for a dataset of another program, which has no laws."""
+    if kind_of(dataset) == "sweep" and "model" not in dataset.coords:
+        raise UsageError("this dataset is not a result of impact: it has no coordinate model")
+
+
 def is_calibration(dataset: xr.Dataset) -> bool:
     """Whether a dataset is the result of a calibration."""
     return kind_of(dataset) == "calibration"

@@ -14,7 +14,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ..array_types import Mask
-from ..config.files import read_number
+from ..config.files import read_number, to_plain_data
 from ..config.input_names import InputName
 from ..config.quantities import Quantity
 from ..config.tables import TOLERANCE
@@ -304,6 +304,7 @@ def recommend(
     dataset = result_of(dataset)
     require_sweep(dataset, "recommend")
     tol = read_number(tol, TOLERANCE, "tol")
+    models, frictions = (to_plain_data(keys)[0] for keys in (models, frictions))
     criterion = BY_ERROR if target is None else _criterion_of(target)
     if frictions and not OUTPUTS[criterion.names[0]].of_friction:
         origin, of = argument("frictions"), argument("target")

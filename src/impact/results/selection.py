@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..array_types import Mask
-from ..config.files import to_plain_data
+from ..config.files import to_plain_value
 from ..config.quantities import number_in
 from ..errors import UsageError, did_you_mean
 from ..formatting import argument, label, safe_text
@@ -55,7 +55,7 @@ def select(dataset: xr.Dataset, sel: Mapping[str, object]) -> xr.Dataset:
             raise UsageError(f'no axis "{name}" in this result; {did_you_mean(name, axes)}')
         (dim,) = dataset[name].dims
         values = dataset[name].values
-        plain, _ = to_plain_data(value)
+        plain = to_plain_value(value)
         if not isinstance(plain, float | int | str):
             raise UsageError(f"{argument('sel', {name: value})}: got no single value, expected one")
         number = in_si(dataset[name], plain)

@@ -15,6 +15,7 @@ import numpy as np
 import xarray as xr
 
 from .._version import __version__
+from ..config.columns import without_replaced_inputs
 from ..config.design import distribution_paths
 from ..config.draft import (
     Draft,
@@ -25,9 +26,8 @@ from ..config.draft import (
     open_text,
     reject_law_key,
     settings_of,
-    without_default_masses,
 )
-from ..config.files import as_table, to_plain_data
+from ..config.files import as_table, to_plain_value
 from ..config.grid import Axis
 from ..config.input_names import SWEEP_INPUTS, InputName, input_values
 from ..config.load import Config, build, inline_files
@@ -54,7 +54,7 @@ from ..engine.plugins import Plugins, read_plugins
 from ..errors import ConfigError, UsageError, did_you_mean, warn
 from ..formatting import argument, number, prefixed, safe_text
 from .calibration import fitted_config, position_of_law
-from .kinds import is_calibration, require_sweep
+from .kinds import is_calibration, require_result, require_sweep
 from .plausibility import input_notes
 from .provenance import changed_plugins, stored_config, stored_draft, unknown_plugins
 from .schema import DEFAULT_RTOL_FACTOR, SCHEMA_VERSION, attributes_of, is_case, plain_unit, scale_of
@@ -311,6 +311,11 @@ def run(
     times : number of points of the history, uniform from first contact to release; by default the steps of the
         integrator
 
+    Returns
+    -------
+    Impact : `values` has the outputs of docs/schema.md, one number each, in SI, `history` the motion as a dataset
+        over the time t [s], or None where there is none; a failed impact is a `status`, not an error
+
     Raises
     ------
     ConfigError, UsageError, ModelError, ResultError : the source, a plug-in, a name or a value is invalid
@@ -468,7 +473,7 @@ def histories(
     integrator = str(dataset.attrs.get("integrator", EXACT))
     if integrator != EXACT:
         raise UsageError(f"no motion to draw in this result: {no_motion(integrator)}")
-    source = open_source(dataset, (), plugins)
+    source = replace(open_source(dataset, (), plugins), at_name="sel")
     for changed in changed_plugins(dataset.attrs, plugins, "the result"):
         # a changed law has another motion than the result
         raise UsageError(changed)
@@ -554,6 +559,7 @@ class PointSource:
     labels: Mapping[str, float | str] = field(default_factory=dict)  # at which a part of a result was selected
     has_selection: bool = True  # selects models, unlike the starter config
     is_starter: bool = False
+    at_name: str = "at"  # the argument with the values of the point, for messages
     calibration: Calibration | None = None
 
     @property
@@ -587,9 +593,9 @@ def open_source(source: ConfigSource, overrides: Overrides, plugins: Plugins) ->
     if isinstance(source, xr.Dataset):
         return _open_stored(source, overrides, plugins, "the result")
     if source is None:
-        draft = open_config(None, plugins.models).with_settings(
-            [Setting.parse(STARTER_E), *settings_of(overrides)]
-        )
+        starter = open_config(None, plugins.models).with_settings([Setting.parse(STARTER_E)])
+        # that setting is no input of the user
+        draft = replace(starter, origins={}).with_settings(settings_of(overrides))
         return PointSource(draft, plugins, has_selection=("models",) in draft.origins, is_starter=True)
     reject_law_key(source, "model", plugins.models)
     draft = open_config(Path(source) if isinstance(source, str) else source, plugins.models)
@@ -597,6 +603,7 @@ def open_source(source: ConfigSource, overrides: Overrides, plugins: Plugins) ->
 
 
 def _open_stored(dataset: xr.Dataset, overrides: Overrides, plugins: Plugins, name: str) -> PointSource:
+    require_result(dataset)
     calibration, settings = None, tuple(settings_of(overrides))
     if is_calibration(dataset):
         config = stored_config(dataset.attrs, (), plugins, name, allow_changed_plugins=True, purpose="calibrate")
@@ -635,12 +642,12 @@ def single_point(
     law = None if model is None else find(model, source.plugins.models)
     friction_law = None if friction is None else find_friction(friction)
     laws = (law or next(iter(draft.models), None), friction_law or next(iter(draft.frictions), None))
-    fixed = {str(_input_name(name, *laws)): to_plain_data(value)[0] for name, value in (at or {}).items()}
+    fixed = {str(_input_name(name, *laws)): to_plain_value(value) for name, value in (at or {}).items()}
     for name, value in fixed.items():
         if isinstance(value, dict | list):
-            raise UsageError(f"{argument('at', {name: value})}: got several values, expected one")
+            raise UsageError(f"{argument(source.at_name, {name: value})}: got several values, expected one")
     if {"e", "alpha"} <= fixed.keys():
-        raise UsageError(f"{argument('at', key='alpha')}: got alpha and e, expected one of the two")
+        raise UsageError(f"{argument(source.at_name, key='alpha')}: got alpha and e, expected one of the two")
     settings = [] if law is None else [Setting(("models",), [law.key], argument("model", law.key))]
     if friction_law is not None:
         settings.append(Setting(("frictions",), [friction_law.key], argument("friction", friction)))
@@ -649,18 +656,18 @@ def single_point(
         Setting(InputName.parse(name).path, values, argument("over", key=name)) for name, values in over.items()
     ]
     draft = draft.with_settings(settings)
-    if source.is_starter:
-        draft = without_default_masses(draft, fixed)
     if isinstance(draft.table("sweep").get("cases"), str):
         # the inputs that vary together are the columns of the file
         draft = inline_files(draft)
+    if source.is_starter:
+        draft = without_replaced_inputs(draft, fixed)
     joint = _joint_inputs(draft)
     varying = {str(name) for name, value in input_values(draft.data) if isinstance(value, list | dict)}
     labels = {name: value for name, value in source.labels.items() if name in varying | joint or is_case(name)}
     # the exponent n decides whose stiffness K is
     for name, value in sorted({**labels, **fixed}.items(), key=lambda item: item[0] == "K"):
         if name not in joint and not is_case(name):
-            draft = draft.with_settings([_setting_at(draft, name, value, law)])
+            draft = draft.with_settings([_setting_at(draft, name, value, law, source.at_name)])
     config = build(draft)
     for name in fixed:
         if is_case(name) and name not in {axis.numbered for axis in config.axes}:
@@ -693,7 +700,7 @@ def _joint_inputs(draft: Draft) -> set[str]:
     return names
 
 
-def _setting_at(draft: Draft, name: str, value: float | str, law: ForceModel | None) -> Setting:
+def _setting_at(draft: Draft, name: str, value: float | str, law: ForceModel | None, at_name: str) -> Setting:
     """Fix an input at a value; K of a model with another exponent than [sweep] is that of its own table."""
     if not _has_input(draft, InputName.parse(name)):
         raise _unknown_input(draft, name)
@@ -701,7 +708,7 @@ def _setting_at(draft: Draft, name: str, value: float | str, law: ForceModel | N
     path, value = parsed.path, parsed.word(value)
     if name == "K" and law is not None and has_other_stiffness(draft, law):
         path = ("model", law.key, "K")
-    return Setting(path, value, argument("at", value, key=name))
+    return Setting(path, value, argument(at_name, value, key=name))
 
 
 def _has_input(draft: Draft, name: InputName) -> bool:

@@ -94,7 +94,8 @@ def sweep(
     source : path of a TOML file, or a mapping of the same shape; by default the starter config, the two balls of
         Table 1 of the paper
     models, frictions : keys of laws, in place of those of the source
-    inputs : of `[sweep]`, in place of those of the source, such as `e=[0.1, 0.9]` or `v1="50 cm/s"`
+    inputs : of `[sweep]`, in place of those of the source, such as `e=[0.1, 0.9]`, `v1="50 cm/s"` or `cases=table`
+        with a column for each input
     output : file to write; by default the result stays in memory
     overrides : changes to the config, such as `"sweep.e=0.5"`
     plugins : plug-in models, which the config may name, and paths of Python files with such models, which are

@@ -14,14 +14,14 @@ import xarray as xr
 from xarray.backends import BackendEntrypoint
 
 from ..atomic import Sink, atomic_write, check_output, check_outputs
-from ..config.files import RESULT_MAGIC
+from ..config.files import RESULT_MAGIC, to_plain_data
 from ..config.grid import MAX_POINTS
 from ..config.tables import Output
 from ..contact.variables import OUTPUTS
 from ..errors import ResultError, UnfinishedError, UsageError
 from ..formatting import argument, safe_text, type_of
 from .hdf5_structure import byte_reader, check_root
-from .kinds import kind_of, require_sweep
+from .kinds import kind_of, require_result, require_sweep
 from .layouts import LAYOUTS
 from .netcdf import RegionValues, encode_attribute, read_variables, write_dataset
 from .schema import MODEL_METADATA
@@ -53,7 +53,7 @@ def save(
     path: str | Path,
     *,
     overwrite: bool = False,
-    output: Output = DEFAULT_OUTPUT,
+    output: Output | None = None,
     should_stop: Callable[[], bool] | None = None,
 ) -> None:
     """Store a dataset as a sealed netCDF-4 file, with all of its values.
@@ -63,8 +63,12 @@ def save(
     dataset : a result, or a part of one; a lazy one is read slab by slab
     path : the file
     overwrite : replace a file that exists
-    output : dtype, compression and chunks
+    output : deprecated; dtype, compression and chunks, which `[output]` of a config sets
     should_stop : called before each slab; writing stops if it returns True
+
+    Returns
+    -------
+    None : the file is complete; after an error it is as it was before
 
     Raises
     ------
@@ -94,7 +98,7 @@ def save(
                 yield str(name), tuple(slab.values()), variable.isel(slab).values
 
     with atomic_write(path, overwrite=overwrite) as sink:
-        write_sealed(sink, dataset, parts(), output)
+        write_sealed(sink, dataset, parts(), output or DEFAULT_OUTPUT)
         check_readable(sink, path)
 
 
@@ -169,8 +173,20 @@ def _named_errors(path: str | Path) -> Iterator[None]:
 def load(path: str | Path) -> xr.Dataset:
     """Open a result, and read or compute all of its values if they take at most 512 MB.
 
-    The values of a larger result are read or computed when they are indexed; see `open_result`, also for
-    exceptions and warnings.
+    The values of a larger result are read or computed when they are indexed. Variables that are not part of a
+    result are ignored with a warning.
+
+    Parameters
+    ----------
+    path : the file
+
+    Returns
+    -------
+    xarray.Dataset : variables, dimensions and units of docs/schema.md, with coordinates for the axes
+
+    Raises
+    ------
+    ResultError : the file is not a readable result, or does not exist, which is a FileNotFoundError as well
 
     >>> import impact
     >>> impact.load("README.md")  # doctest: +ELLIPSIS
@@ -191,6 +207,7 @@ def result_of(result: xr.Dataset | str | Path) -> xr.Dataset:
     if not isinstance(result, xr.Dataset):
         # the public function names its argument
         raise TypeError(f"got {type_of(result)}, expected a dataset, or the file of a result")
+    require_result(result)
     for dim in ("friction", "model"):
         if dim in result.coords and result[dim].ndim == 0 and kind_of(result) == "sweep":
             metadata = ("exponent", *MODEL_METADATA) if dim == "model" else ()
@@ -245,6 +262,7 @@ def expand(
     dataset = select(opened, sel or {})
     if "model" not in dataset.dims:
         raise UsageError(f"{shown}: is a time history, expected a result of a sweep")
+    models, _ = to_plain_data(models)
     if models:
         dataset = dataset.isel(model=law_positions(models, dataset))
     points = math.prod(dataset.sizes.values())

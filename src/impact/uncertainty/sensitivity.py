@@ -59,7 +59,7 @@ def sensitivity(
     overwrite : replace it if it exists
     overrides, plugins : see `sweep`
     max_points : the largest number of points
-    execute : function that runs a plan; by default it is run in this process
+    execute : deprecated; function that runs a plan, by default it is run in this process
 
     Returns
     -------
@@ -111,6 +111,10 @@ def sensitivities(
     ----------
     of : names of the outputs; of one alone the result can be written
     source, output, overwrite, overrides, plugins, max_points, execute : see `sensitivity`
+
+    Returns
+    -------
+    list of Dataset : one for each output, in their order, see `sensitivity`
 
     Raises
     ------

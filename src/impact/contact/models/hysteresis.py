@@ -23,6 +23,14 @@ def hysteresis(key: str, *, chi: Formula, **about: Unpack[About]) -> ForceModel:
     key, about : see `ForceModel`
     chi : formula of χ [-], such as `lambda e: 1 / e`
 
+    Returns
+    -------
+    ForceModel : a law of the force F = K δⁿ (1 + χ v/v0) [N], for arrays of any shape
+
+    Raises
+    ------
+    ModelError : the law is not valid, see `ForceModel`
+
     >>> law = hysteresis("mine", title="Mine", year=2026, equation="χ = 1 − e", reference="", chi=lambda e: 1 - e)
     >>> law.force(elastic=1.0, v=0.5, v0=1.0, chi=1.0)
     1.5
