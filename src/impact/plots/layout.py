@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -203,7 +204,9 @@ class Picture(Figure):
         """Leave out the conditions beyond MAX_CONDITION_LINES lines, and say how many they are."""
         whole, _ = self.fitted[conditions]
         parts = whole.split(", ")
-        for count in range(len(parts) - 1, 0, -1):
+        # those of the first lines, of which the end may have no room for the number of the others
+        shown = "\n".join(conditions.get_text().split("\n")[:MAX_CONDITION_LINES])
+        for count in range(min(len(parts) - 1, len(re.findall(r",\s|,$", shown))), 0, -1):
             if conditions.get_text().count("\n") < MAX_CONDITION_LINES:
                 break
             conditions.set_text(f"{', '.join(parts[:count])}, and {len(parts) - count} more")
