@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import impact
@@ -20,6 +21,7 @@ from impact.exporters.problem import prepare_export
 from impact.exporters.programs import run_program
 from impact.exporters.registry import CODES
 from impact.exporters.releases import first_law, installed_version
+from impact.exporters.verification import extrapolate
 
 from .conftest import Run, assert_refused, assert_same_output, default_law, examples_of, write_program
 
@@ -614,6 +616,23 @@ def test_verify_exits_with_1_and_names_the_phase_of_a_restitution_that_is_no_num
     lammps_that_prints(tmp_path, [predicted[0], "nan", "nan", "nan"])
     data = json.loads(cli(*LAMMPS, program, "--json").stdout)["verification"]
     assert (data["agrees"], data["rows"][1]["measured"]) == (False, None)
+
+
+@pytest.mark.parametrize(
+    ("means", "exact"),
+    [
+        *(
+            [[0.5 + 0.016 * 2.0 ** (-order * halved) for halved in range(3)], 0.5]
+            for order in (0.7, 1.0, 1.5, 2.0, 3.0)
+        ),
+        # EXUDYN, exudyn-carvalho-gonthier at e = 0.2 and 0.25: another order from h to h/2 than from h/2 to h/4
+        ([0.20468863, 0.2046397, 0.20461688], 0.20460905),
+        ([0.25538557, 0.25528339, 0.25524083], 0.25522753),
+    ],
+)
+def test_the_uncertainty_of_an_extrapolation_covers_its_error(means: list[float], exact: float) -> None:
+    value, uncertainty = extrapolate(np.array(means)[:, None])
+    assert abs(value - exact) <= uncertainty <= 2.0 * abs(means[0] - exact)
 
 
 def test_a_code_without_a_scheme_that_measures_no_number_differs(tmp_path: Path) -> None:
