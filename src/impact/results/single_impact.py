@@ -666,7 +666,7 @@ def single_point(
         if is_case(name) and name not in {axis.numbered for axis in config.axes}:
             raise _unknown_input(draft, name)
     config, defaulted = _without_axes(config, {**labels, **fixed}, over)
-    for note in input_notes(Plan(config).inputs):
+    for note in (*config.notes, *input_notes(Plan(config).inputs)):
         warn(note)
     return config, defaulted
 
