@@ -198,7 +198,7 @@ def _defaults(source: PointSource, at: Mapping[str, object], config: Config) -> 
     """List the values of Table 1 of the paper that enter, since neither the user nor a config gives them."""
     given = {str(path[1]) for path in source.config_draft.origins if len(path) > 1} | at.keys()
     has_stiffness = any(name.split(".")[-1] == "K" for name in config.scalars)
-    material = () if has_stiffness or {"material1", "material2"} <= given else ("material",)
+    material = () if has_stiffness else ("material", "material1", "material2")
     names = [name for name in ("v1", "m1", "m2", *material) if name in config.scalars.keys() - given]
     units = {name: SWEEP_QUANTITIES[name].unit for name in ("v1", "m1", "m2")}
     return tuple(f"{name} = {quantity(config.scalars[name], units.get(name, ''))}" for name in names)
