@@ -50,6 +50,38 @@ def source(*materials: str, **values: float) -> dict[str, object]:
     }
 
 
+def test_materials_of_the_user_replace_that_of_table_1() -> None:
+    """Each ball keeps the default until it has its own; a material of both replaces those of each."""
+    at, key = {"material1": "glass", "material2": "steel"}, "lammps-coeff-restitution-hertz"
+    for fields in ({"at": at}, {"overrides": {f"sweep.{ball}": name for ball, name in at.items()}}):
+        export = impact.export("lammps", key, code_version="22Jul2025", **fields)
+        assert "defaults of Table 1 of the paper: v1 = 1 m/s, m1 = 1 kg, m2 = 1 kg" in export.header
+        assert {name: impact.run(model="hertz", **fields).point[name] for name in at} == at
+    export = impact.export("lammps", key, at={"material2": "steel"}, code_version="22Jul2025")
+    assert (
+        "defaults of Table 1 of the paper: v1 = 1 m/s, m1 = 1 kg, m2 = 1 kg, material1 = table1" in export.header
+    )
+    point = impact.run(
+        model="hertz", overrides={f"sweep.{ball}": name for ball, name in at.items()}, at={"material": "steel"}
+    ).point
+    assert {name for name in point if "material" in name} == {"material"}
+
+
+def test_a_parameter_that_cannot_be_found_is_reported() -> None:
+    at, fields = {"e": 0.7, "v1": 1.0}, {"code_version": "3.8.0", "dt": "20 us"}
+    with pytest.raises(UsageError, match="parameter: e does not set the contact time of liggghts-hertz"):
+        impact.export("liggghts", at=at, parameter="e", **fields)
+    missing = impact.export(
+        "lammps",
+        "lammps-tsuji-without-root",
+        at=at,
+        dt="20 us",
+        code_version="29Sep2021",
+        parameter="materials.table1.E",
+    )
+    assert "no value of materials.table1.E keeps every phase within 1 % at the step" in missing.header
+
+
 def test_the_law_is_the_first_of_the_source_that_the_code_has() -> None:
     hooke, hertz = "lammps-coeff-restitution-hooke", "lammps-coeff-restitution-hertz"
     config = source("soft", "soft") | {"models": ["gonthier-2004", hooke, hertz]}
