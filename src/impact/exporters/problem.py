@@ -18,7 +18,7 @@ from ..engine.plan import Plan
 from ..engine.plugins import Plugins
 from ..errors import UsageError, did_you_mean
 from ..formatting import argument, number, quantity
-from ..inverse.solve import PointWithE, point_with_e
+from ..inverse.solve import PointWithE, point_with_e, warn_of_point
 from ..inverse.timestep import FixedStepLaw, ObliqueLaw, fixed_step_law
 from ..results.calibration import position_of_law, unidentified_notes
 from ..results.single_impact import Calibration, ConfigSource, PointSource, open_source
@@ -151,6 +151,7 @@ def prepare_export(
         Plan(point.config).pair_notes("frictions")
     scheme = (find_friction(chosen).scheme if chosen else "") or code.scheme
     fixed, outputs = fixed_step_law(point.config, PHASES, scheme, of_friction=chosen is not None)
+    warn_of_point(point_source, point, outputs["e_out"])
     if fixed.oblique is not None:
         _check_limit(code, fixed.oblique)
     calibration = point_source.calibration

@@ -59,7 +59,7 @@ from ..engine.plugins import Plugins, read_plugins
 from ..errors import UsageError
 from ..formatting import argument, decimals, number, quantity
 from ..results.single_impact import open_source
-from .solve import PointWithE, config_name, point_with_e, solve_damping, unknown_of
+from .solve import PointWithE, config_name, point_with_e, solve_damping, unknown_of, warn_of_point
 
 # steps per contact if none are given
 STEPS_PER_CONTACT = (10.0, 20.0, 50.0, 100.0)
@@ -351,6 +351,7 @@ def timestep(
     if point.config.frictions:
         Plan(point.config, plugin_set).pair_notes("frictions")
     law, collision = fixed_step_law(point.config, phases, scheme, of_friction=True)
+    warn_of_point(point_source, point, collision["e_out"])
     steps = time_steps(law.contact_time, counts or (() if given else STEPS_PER_CONTACT), given)
     return TimestepResult(
         model=law.model.key,

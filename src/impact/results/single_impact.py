@@ -40,7 +40,7 @@ from ..contact.frictions import find_friction
 from ..contact.history import History, SlipHistory, integrate_history, integrate_slip
 from ..contact.impacts import Impacts
 from ..contact.materials import Material
-from ..contact.model import ForceModel
+from ..contact.model import ForceModel, with_base_quantities
 from ..contact.models import find
 from ..contact.output_formulas import collide
 from ..contact.rigid import ObliqueImpacts
@@ -323,8 +323,23 @@ def run(
     if times is not None and times < 2:
         raise UsageError(f"times: got {times}, expected a whole number >= 2")
     plugin_set = read_plugins(plugins)
-    config, first = single_point(open_source(source, overrides, plugin_set), model, at, friction=friction)
-    return run_single_impact(Plan(config, plugin_set.of(config.models)), first, times)
+    opened = open_source(source, overrides, plugin_set)
+    config, first = single_point(opened, model, at, friction=friction)
+    impact = run_single_impact(Plan(config, plugin_set.of(config.models)), first, times)
+    if "e" not in first and (opened.has_own_e or "e" in (at or {})):
+        warn_of_ignored_e(config, impact.values["e_out"])
+    return impact
+
+
+def warn_of_ignored_e(config: Config, e_out: float) -> None:
+    """Warn if the law of a config without axes ignores its e, and delivers another restitution."""
+    law, e = config.models[0], config.scalars.get("e", math.nan)
+    is_used = "e" in with_base_quantities(law.quantities) or any(law.may_use_e for law in config.frictions)
+    if is_used or not isinstance(e, float) or e != e or e_out != e_out or number(e_out) == number(e):
+        return
+    way = f"impact solve --model {law.key} --for {law.damping} --target e_out={number(e)} finds the parameter"
+    delivered = f"e = {number(e)} is not an input of {law.key}, which delivers {number(e_out)}"
+    warn(f"{delivered}; {way}" if law.damping else delivered)
 
 
 def no_motion(integrator: str) -> str:
@@ -555,6 +570,12 @@ class PointSource:
     has_selection: bool = True  # selects models, unlike the starter config
     is_starter: bool = False
     calibration: Calibration | None = None
+
+    @property
+    def has_own_e(self) -> bool:
+        """Whether the user chose the e of the config: that of the starter config is a default."""
+        chosen = [setting for setting in self.config_draft.settings if setting.path[:2] == ("sweep", "e")]
+        return len(chosen) > 1 if self.is_starter else "e" in self.config_draft.table("sweep")
 
     @property
     def models(self) -> tuple[str, ...]:
