@@ -321,12 +321,12 @@ def test_flight_times_of_one_ball_give_a_restitution_for_each_impact(folder: Pat
     [
         (
             "flight_time [ms]\n500\n900\n",
-            "a.csv:3: flight_time: got 0.9 s after 0.5 s, expected an e_out of at most 1.5, got 1.8; a column "
+            "a.csv:3: flight_time: got 0.9 s after 0.5 s, an e_out of 1.8, expected at most 1.5; a column "
             "specimen separates balls",
         ),
         (
             "drop_height [cm],rebound_height [cm]\n10,8\n10,30\n10,40\n",
-            "a.csv:3: rebound_height: got 0.3 m after 0.1 m, expected an e_out of at most 1.5, got 1.73205; "
+            "a.csv:3: rebound_height: got 0.3 m after 0.1 m, an e_out of 1.73205, expected at most 1.5; "
             "also in 1 other row",
         ),
         (
@@ -346,14 +346,26 @@ def test_flight_times_of_one_ball_give_a_restitution_for_each_impact(folder: Pat
         ("drop_height [cm],rebound_height [cm]\n0,0\n", "a.csv:2: drop_height: got"),
         (
             "v1 [cm/s],e_out\n1,0.8\n-10,0.8\n0,0.8\n",
-            "a.csv:3: v1: got -0.1 m/s, expected more than v2 = 0 m/s",
+            "a.csv:3: v1: got -0.1 m/s with v2 = 0 m/s, expected v1 > v2; also",
         ),
-        ("v1 [m/s],v2 [m/s],e_out\n-1,-2,0.8\n1,2,0.8\n", "a.csv:3: v1: got 1 m/s, expected more than v2 = 2 m/s"),
+        (
+            "v1 [m/s],v2 [m/s],e_out\n-1,-2,0.8\n1,2,0.8\n",
+            "a.csv:3: v1: got 1 m/s with v2 = 2 m/s, expected v1 > v2",
+        ),
     ],
 )
 def test_rows_without_a_restitution_that_can_be_fitted_are_one_line(folder: Path, text: str, line: str) -> None:
     (found,) = refused(text)
     assert found.startswith(line), found
+
+
+def test_a_wrong_row_is_named_by_the_header_of_the_file(folder: Path) -> None:
+    columns = {"flight_time": "Flug [ms]"}
+    (line,) = refused("Flug [ms],mu\n500,0\n900,0\n", columns=columns)
+    assert line.startswith("a.csv:3: Flug [ms]: got 0.9 s after 0.5 s, ")
+    # it may be any file, of which messages contain nothing
+    (line,) = refused("Flug [ms]\n500\n900\n", columns=columns)
+    assert line == "a.csv:3: Flug [ms]: expected at most 1.5; a column specimen separates balls"
 
 
 def test_a_ball_that_does_not_rebound_has_a_restitution_of_0(folder: Path) -> None:

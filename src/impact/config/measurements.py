@@ -206,8 +206,8 @@ def _approach_problems(columns: Mapping[str, _Column], rows: Sequence[int], draf
     v2 = inputs["v2"][1] if "v2" in inputs else (at_rest,) * len(rows)
     apart = [index for index in range(len(rows)) if v1[index] <= v2[index]]
     if apart:
-        got, least = quantity(v1[apart[0]], "m/s"), quantity(v2[apart[0]], "m/s")
-        yield header, rows[apart[0]], f"got {got}, expected more than v2 = {least}{also(len(apart) - 1)}"
+        got = f"got {quantity(v1[apart[0]], 'm/s')} with v2 = {quantity(v2[apart[0]], 'm/s')}"
+        yield header, rows[apart[0]], f"{got}, expected v1 > v2{also(len(apart) - 1)}"
 
 
 def _gravity(table: Mapping[str, Any]) -> float:
@@ -307,8 +307,8 @@ def _derived_problems(
         got = f"got {quantity(values[after][second], unit)} after {quantity(values[before][first], unit)}"
         # flights of two balls follow each other only without a column that separates them
         hint = f"; a column {SPECIMEN} separates balls" if is_flight else ""
-        expected = f"expected an e_out of at most {most}, got {number(derived['e_out'][large[0]])}"
-        yield after, rows[second], f"{got}, {expected}{hint}{also(len(large) - 1)}"
+        got += f", an e_out of {number(derived['e_out'][large[0]])}"
+        yield after, rows[second], f"{got}, expected at most {most}{hint}{also(len(large) - 1)}"
     undefined = [index for index, sigma in enumerate(derived.get(f"{SIGMA}_e_out", ())) if sigma != sigma]
     if undefined:
         got = "got 0 next to a standard deviation, from which none of e_out follows"
@@ -400,7 +400,9 @@ def read_data_file(draft: Draft) -> tuple[dict[KeyPath, object], list[str], list
         # it may be any file, of which messages contain nothing
         problems = [(header, row, text[max(text.find("expected"), 0) :]) for header, row, text in problems]
     if problems:
-        return {}, [columns.problem(text, header, row) for header, row, text in problems[:MAX_PROBLEMS]], []
+        # a row is under the header of the file, which may have another name in [data]
+        named = [(name if row is None else headers.get(name, name), row, text) for name, row, text in problems]
+        return {}, [columns.problem(text, header, row) for header, row, text in named[:MAX_PROBLEMS]], []
     values = {column.header: list(column.values) for column in points.columns}
     return {("data", "columns"): values, ("data", "lines"): list(points.lines)}, [], list(points.notes)
 
