@@ -316,6 +316,74 @@ def test_flight_times_of_one_ball_give_a_restitution_for_each_impact(folder: Pat
     assert found.noise == "excess"
 
 
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        (
+            "flight_time [ms]\n500\n900\n",
+            "a.csv:3: flight_time: got 0.9 s after 0.5 s, an e_out of 1.8, expected at most 1.5; a column "
+            "specimen separates balls",
+        ),
+        (
+            "drop_height [cm],rebound_height [cm]\n10,8\n10,30\n10,40\n",
+            "a.csv:3: rebound_height: got 0.3 m after 0.1 m, an e_out of 1.73205, expected at most 1.5; "
+            "also in 1 other row",
+        ),
+        (
+            "specimen,flight_time [ms]\na,500\nb,400\n",
+            "a.csv:2: flight_time: got no two successive flights of one ball, expected at least two rows of it",
+        ),
+        (
+            "drop_height [cm],rebound_height [cm]\n10 cm,8\n9 cm,8\n",
+            'a.csv:2: drop_height: got "10 cm", expected a number without a unit: the column is in cm; also in 1 '
+            "other row",
+        ),
+        (
+            "drop_height [cm],rebound_height [cm],sigma_drop_height [mm]\n10,8,1\n10,0,1\n",
+            "a.csv:3: rebound_height: got 0 next to a standard deviation, from which none of e_out follows, "
+            "expected a column sigma_e_out in place of those of heights",
+        ),
+        ("drop_height [cm],rebound_height [cm]\n0,0\n", "a.csv:2: drop_height: got"),
+        (
+            "v1 [cm/s],e_out\n1,0.8\n-10,0.8\n0,0.8\n",
+            "a.csv:3: v1: got -0.1 m/s with v2 = 0 m/s, expected v1 > v2; also",
+        ),
+        (
+            "v1 [m/s],v2 [m/s],e_out\n-1,-2,0.8\n1,2,0.8\n",
+            "a.csv:3: v1: got 1 m/s with v2 = 2 m/s, expected v1 > v2",
+        ),
+    ],
+)
+def test_rows_without_a_restitution_that_can_be_fitted_are_one_line(folder: Path, text: str, line: str) -> None:
+    (found,) = refused(text)
+    assert found.startswith(line), found
+
+
+def test_a_wrong_row_is_named_by_the_header_of_the_file(folder: Path) -> None:
+    columns = {"flight_time": "Flug [ms]"}
+    (line,) = refused("Flug [ms],mu\n500,0\n900,0\n", columns=columns)
+    assert line.startswith("a.csv:3: Flug [ms]: got 0.9 s after 0.5 s, ")
+    # it may be any file, of which messages contain nothing
+    (line,) = refused("Flug [ms]\n500\n900\n", columns=columns)
+    assert line == "a.csv:3: Flug [ms]: expected at most 1.5; a column specimen separates balls"
+
+
+def test_a_ball_that_does_not_rebound_has_a_restitution_of_0(folder: Path) -> None:
+    text = "drop_height [cm],rebound_height [cm],sigma_e_out\n10,8,.1\n10,0,.1\n"
+    (folder / "a.csv").write_text(text, encoding="utf-8")
+    found = measurements({"file": "a.csv"})
+    assert found.outputs == {"e_out": pytest.approx((math.sqrt(0.8), 0.0))}
+
+
+@pytest.mark.parametrize("unit", ["", " [%]"])
+def test_a_standard_deviation_without_a_unit_has_that_of_its_output_with_a_note(folder: Path, unit: str) -> None:
+    (folder / "a.csv").write_text(f"v1 [m/s],e_out [%],sigma{unit}\n1,80,1\n", encoding="utf-8")
+    config = read({"file": "a.csv"})
+    assert config.notes == (() if unit else ("a.csv: sigma: got no unit, read in [%] as e_out",))
+    assert config.data is not None
+    assert config.data.sigma == {"e_out": (0.01,)}
+
+
 def test_propagated_deviations_are_those_of_random_errors() -> None:
     import numpy as np
 

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import impact
@@ -20,6 +21,7 @@ from impact.exporters.problem import prepare_export
 from impact.exporters.programs import run_program
 from impact.exporters.registry import CODES
 from impact.exporters.releases import first_law, installed_version
+from impact.exporters.verification import extrapolate
 
 from .conftest import Run, assert_refused, assert_same_output, default_law, examples_of, write_program
 
@@ -46,6 +48,38 @@ def source(*materials: str, **values: float) -> dict[str, object]:
         "materials": {"soft": SOFT, "hard": HARD},
         "sweep": BALLS | {"e": 0.5} | named | values,
     }
+
+
+def test_materials_of_the_user_replace_that_of_table_1() -> None:
+    """Each ball keeps the default until it has its own; a material of both replaces those of each."""
+    at, key = {"material1": "glass", "material2": "steel"}, "lammps-coeff-restitution-hertz"
+    for fields in ({"at": at}, {"overrides": {f"sweep.{ball}": name for ball, name in at.items()}}):
+        export = impact.export("lammps", key, code_version="22Jul2025", **fields)
+        assert "defaults of Table 1 of the paper: v1 = 1 m/s, m1 = 1 kg, m2 = 1 kg" in export.header
+        assert {name: impact.run(model="hertz", **fields).point[name] for name in at} == at
+    export = impact.export("lammps", key, at={"material2": "steel"}, code_version="22Jul2025")
+    assert (
+        "defaults of Table 1 of the paper: v1 = 1 m/s, m1 = 1 kg, m2 = 1 kg, material1 = table1" in export.header
+    )
+    point = impact.run(
+        model="hertz", overrides={f"sweep.{ball}": name for ball, name in at.items()}, at={"material": "steel"}
+    ).point
+    assert {name for name in point if "material" in name} == {"material"}
+
+
+def test_a_parameter_that_cannot_be_found_is_reported() -> None:
+    at, fields = {"e": 0.7, "v1": 1.0}, {"code_version": "3.8.0", "dt": "20 us"}
+    with pytest.raises(UsageError, match="parameter: e does not set the contact time of liggghts-hertz"):
+        impact.export("liggghts", at=at, parameter="e", **fields)
+    missing = impact.export(
+        "lammps",
+        "lammps-tsuji-without-root",
+        at=at,
+        dt="20 us",
+        code_version="29Sep2021",
+        parameter="materials.table1.E",
+    )
+    assert "no value of materials.table1.E keeps every phase within 1 % at the step" in missing.header
 
 
 def test_the_law_is_the_first_of_the_source_that_the_code_has() -> None:
@@ -614,6 +648,23 @@ def test_verify_exits_with_1_and_names_the_phase_of_a_restitution_that_is_no_num
     lammps_that_prints(tmp_path, [predicted[0], "nan", "nan", "nan"])
     data = json.loads(cli(*LAMMPS, program, "--json").stdout)["verification"]
     assert (data["agrees"], data["rows"][1]["measured"]) == (False, None)
+
+
+@pytest.mark.parametrize(
+    ("means", "exact"),
+    [
+        *(
+            [[0.5 + 0.016 * 2.0 ** (-order * halved) for halved in range(3)], 0.5]
+            for order in (0.7, 1.0, 1.5, 2.0, 3.0)
+        ),
+        # EXUDYN, exudyn-carvalho-gonthier at e = 0.2 and 0.25: another order from h to h/2 than from h/2 to h/4
+        ([0.20468863, 0.2046397, 0.20461688], 0.20460905),
+        ([0.25538557, 0.25528339, 0.25524083], 0.25522753),
+    ],
+)
+def test_the_uncertainty_of_an_extrapolation_covers_its_error(means: list[float], exact: float) -> None:
+    value, uncertainty = extrapolate(np.array(means)[:, None])
+    assert abs(value - exact) <= uncertainty <= 2.0 * abs(means[0] - exact)
 
 
 def test_a_code_without_a_scheme_that_measures_no_number_differs(tmp_path: Path) -> None:

@@ -78,6 +78,10 @@ def test_a_law_that_was_not_fitted_is_refused_with_those_that_were(cli: Run, fit
     assert 'fit.h5: no fit of "lammps-tsuji-without-root"; did you mean "lammps-tsuji"?' in done.stderr
     with pytest.raises(UsageError, match="YADE has none of the laws kuwabara-kono-1987; fit one of its own, see"):
         impact.export("yade", source=impact.load(fit).isel(model=[0]), code_version="2023.02a")
+    # a release before September 2013 has the law of tsuji-1992
+    with pytest.raises(UsageError, match=r"YADE 2023.02a has none of the laws .* and 1 more; fit one of its own"):
+        impact.export("yade", source=fit, code_version="2023.02a")
+    assert impact.export("yade", source=fit, at={"v1": 1.0}, code_version="2012.01").model == "yade-en-pulling"
 
 
 def test_every_command_of_one_impact_takes_a_calibration(cli: Run, fit: Path) -> None:

@@ -708,7 +708,7 @@ def test_measured_points_are_drawn_over_the_curves(speeds: xr.Dataset, tmp_path:
         ("v1 [kg], e_out\n1, 2\n", "data.csv:1: v1: got [kg], expected a unit of m/s"),
         ("v1, e_out\n1, 2\n2, high\n", 'data.csv:3: e_out: got "high", expected a'),
         ("m1, e_out\n1, 2\n", "data.csv: the picture shows v1 and e_out, and the points have m1, e_out"),
-        ("v1, e_out\n", "data.csv: got 1 lines, expected a line of names"),
+        ("v1, e_out\n", "data.csv: got one line, expected a line of names"),
     ],
 )
 def test_wrong_points_are_an_error_of_one_line(

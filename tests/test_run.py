@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -332,3 +333,40 @@ def test_several_values_of_an_input_are_refused_in_one_line(values: Any) -> None
 def test_a_property_of_no_material_is_an_unknown_input(name: str) -> None:
     with pytest.raises(UsageError, match=f'^no input "{name}" here'):
         impact.run(model="hertz", at={name: 0.3})
+
+
+SPHERES: dict[str, Any] = {"v1": 1.0, "m1": 1.0, "m2": 1.0, "material": "steel"}
+IGNORED = "e = 0.6 is not an input of mujoco-solref, which delivers 0.135335; impact solve --model mujoco-solref "
+LINEAR_LAW = "anagnostopoulos-1988"
+
+
+@pytest.mark.parametrize(
+    ("law", "sweep", "at", "notes"),
+    [
+        ("mujoco-solref", {"e": 0.6}, {}, 3),
+        # --at e is solved for by export and timestep
+        ("mujoco-solref", {"e": [0.1, 0.6]}, {"e": 0.6}, 1),
+        ("mujoco-solref", {}, {}, 0),
+        ("mujoco-solref", {"e": [0.1, 0.6]}, {}, 0),
+        (LINEAR_LAW, {"e": 0.6}, {}, 0),
+        # the e of the starter config is the choice of nobody
+        ("mujoco-solref", None, {}, 0),
+    ],
+)
+def test_an_e_of_the_user_that_a_law_ignores_is_a_note(
+    law: str, sweep: dict[str, Any] | None, at: dict[str, float], notes: int
+) -> None:
+    source = None if sweep is None else {"models": [law], "sweep": {**SPHERES, **sweep}}
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        impact.run(source, model=law, at=at)
+        impact.timestep(law, source=source, at=at, phases=4)
+        if law != LINEAR_LAW:
+            impact.export("mujoco", source=source, at=at, code_version="3.3.0")
+    shown = [str(warning.message) for warning in caught if "not an input" in str(warning.message)]
+    assert shown == [f"{IGNORED}--for dampratio --target e_out=0.6 finds the parameter"] * notes
+
+
+def test_an_e_that_is_set_without_a_config_is_the_choice_of_the_user() -> None:
+    with pytest.warns(impact.ImpactWarning, match="e = 0.4 is not an input of hertz, which delivers 1$"):
+        impact.run(model="hertz", overrides=["sweep.e=0.4"])

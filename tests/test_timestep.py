@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import shlex
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -269,6 +270,28 @@ def test_a_softer_contact_lasts_long_enough(
         assert f"with C = {number(constant * (needed.value / value) ** 0.5, 4)} N s/m" in str(needed)
 
 
+def test_the_relaxation_time_of_drakes_sap_is_named_beside_a_stiffness() -> None:
+    """Drake takes C/K in place of C; other schemes have no such parameter."""
+    result = impact.timestep(
+        "kelvin-voigt-no-tension",
+        at={"e": 0.8, "K": 1e6, "n": 1.0},
+        dt=[1e-3],
+        tol=0.02,
+        parameter="K",
+        phases=50,
+        scheme="drake-sap",
+    )
+    needed = result.needed_parameter
+    assert needed is not None
+    assert result.solved is not None
+    # e is kept: C falls with the root of K
+    relaxation_time = result.solved["C"] / math.sqrt(1e6 * needed.value)
+    assert needed.as_dict()["relaxation_time"] == pytest.approx(relaxation_time, rel=1e-6)
+    assert str(needed).endswith(f", relaxation_time = C/K = {number(relaxation_time, 4)} s")
+    other = replace(needed, relaxation_time=math.nan)
+    assert "relaxation_time" not in {*other.as_dict(), *str(other).split()}
+
+
 def test_a_parameter_that_does_not_set_the_time_scale_is_refused(cli: Run) -> None:
     words = ("timestep", "--model", "mujoco-solref", "--at", "dampratio=0.1", "--dt", "2ms")
     for parameter, tol, message in (
@@ -279,6 +302,11 @@ def test_a_parameter_that_does_not_set_the_time_scale_is_refused(cli: Run) -> No
         assert_refused(done, message)
     with pytest.raises(UsageError, match="parameter: dampratio does not set the contact time of mujoco-solref"):
         impact.timestep("mujoco-solref", at={"e": 0.7}, dt=[2e-3], tol=0.01, parameter="dampratio")
+    # e changes the contact time of a law of Hertz
+    with pytest.raises(UsageError, match="parameter: e does not set the contact time of liggghts-hertz"):
+        impact.timestep("liggghts-hertz", at={"e": 0.7}, dt=[2e-5], tol=0.01, parameter="e", phases=9)
+    with pytest.raises(UsageError, match=r'got E, expected that of a material: "materials\.table1\.E"'):
+        impact.timestep("liggghts-hertz", dt=[2e-5], tol=0.01, parameter="E", phases=9)
     refused = cli("timestep", "--model", "mujoco-solref", "--dt", "2 m")
     assert (refused.returncode, refused.stderr) == (2, '--dt: got "2 m", expected a unit of s, such as "1 s"\n')
 

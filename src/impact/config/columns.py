@@ -20,6 +20,7 @@ from typing import Any
 
 from pydantic_core import PydanticCustomError
 
+from ..contact.model import ForceModel
 from ..contact.variables import OUTPUTS
 from ..errors import ConfigError, did_you_mean
 from ..formatting import safe_text
@@ -87,6 +88,12 @@ class Columns:
         line = self.header if row is None else self.lines[row]
         place = f"{self.source}:{line}" if line else self.source
         return ": ".join(part for part in (place, safe_text(column, 60), message) if part)
+
+    def notes(self, text: str, unused: Sequence[str] = ()) -> tuple[str, ...]:
+        """Write notes: a text, such as that of `complete_rows`, and the columns without use."""
+        names = ", ".join(safe_text(header, 60) for header in unused[:MAX_PROBLEMS])
+        texts = (text, f"columns without use: {names}" if names else "")
+        return tuple(f"{self.source}: {text}".removeprefix(": ") for text in texts if text)
 
     def take(self, rows: Sequence[int]) -> Columns:
         """Keep some rows."""
@@ -172,7 +179,9 @@ def _read_cell(
         except ValueError:
             # a cell may have its own unit where its column has none
             if unit:
-                raise mismatch_error(cell, quantity.expected) from None
+                has_own = re.fullmatch(r"[-+.0-9]+(?:[eE][-+]?[0-9]+)?\s*[^\s0-9.].*", cell)
+                alone = f"a number without a unit: the column is in {safe_text(unit)}"
+                raise mismatch_error(cell, alone if has_own else quantity.expected) from None
     return quantity.read(f"{cell} {unit}" if unit else number, n)
 
 
@@ -210,9 +219,8 @@ def read_csv(
     if separator is not None:
         form, numbered = replace(form, separator=form.separator or separator[1]), numbered[1:]
     if len(numbered) < 2:
-        raise ConfigError(
-            f"{path}: got {len(numbered)} lines, expected a line of names and at least one of values"
-        )
+        got = "one line" if numbered else "none"
+        raise ConfigError(f"{path}: got {got}, expected a line of names and at least one of values")
     looked_for = {split_header(name)[0] for name in wanted or ()} | {*(wanted or ())}
 
     def is_looked_for(header: str) -> bool:
@@ -369,6 +377,16 @@ def _letters(header: str) -> str:
     return re.sub(r"[^a-z0-9]", "", re.sub(r"[(\[].*", "", header).lower())
 
 
+def misspelt_column(header: str, known: Iterable[str], models: Mapping[str, ForceModel], what: str) -> str:
+    """Describe a header that is nearly a known name, or a parameter that does not exist; empty for others."""
+    name = InputName.parse(header)
+    # a header such as "No. 1" has a dot as well
+    if header.startswith(("materials.", "model.", "friction.")) or near_miss(name.owner, models):
+        return name.unknown_message(models)
+    meant = near_miss(header, known)
+    return f'no such {what}; did you mean "{meant}"?' if meant else ""
+
+
 def complete_rows(
     columns: Columns, names: Iterable[str], *, refuse: bool = False
 ) -> tuple[list[int], str, list[tuple[str, int, str]]]:
@@ -400,8 +418,8 @@ def _length_problems(path: Path, rows: Mapping[int, Sequence[str]], n_columns: i
             lines_by_length.setdefault(len(row), []).append(line)
     hint = "; a decimal comma needs another separator, or quotes" if separator == "," else ""
     return [
-        f"{path}:{line}: got {n_values} values, expected {n_columns}, one for each column{also(len(others))}"
-        + (hint if n_values > n_columns else "")
+        f"{path}:{line}: got {n_values} value{'s' * (n_values > 1)}, expected {n_columns}, one for each column"
+        f"{also(len(others))}{hint if n_values > n_columns else ''}"
         for n_values, (line, *others) in lines_by_length.items()
     ]
 
@@ -461,20 +479,18 @@ def csv_form(table: Mapping[Any, Any]) -> CsvForm:
 
 
 def read_files(draft: Draft) -> tuple[dict[KeyPath, object], list[str], list[str]]:
-    """Read the CSV files of cases and of single columns: the values that replace their names, problems, notes.
-
-    Every column of cases is an input, and every cell has a value: a point that is left out would be another sweep.
-    """
+    """Read the CSV files of cases and of single columns: the values that replace their names, problems, notes."""
     open_csv = cache(partial(read_csv_of, draft))
     values: dict[KeyPath, object] = {}
     problems: list[str] = []
+    notes: tuple[str, ...] = ()
     cases, form = draft.table("sweep").get("cases"), CsvForm()
     table = as_table(cases)
     if isinstance(table.get("file"), str) and table.keys() <= FILE_KEYS:
         cases, form = table["file"], csv_form(table)
     if isinstance(cases, str):
         try:
-            values["sweep", "cases"] = _read_cases(open_csv(cases, form), draft)
+            values["sweep", "cases"], notes = _read_cases(open_csv(cases, form), draft)
         except ConfigError as error:
             problems += error.problems
     for name, file, column, form in _file_columns(draft.data):
@@ -487,7 +503,7 @@ def read_files(draft: Draft) -> tuple[dict[KeyPath, object], list[str], list[str
             problems += error.problems
         except KeyError:
             continue  # an unknown key is reported with the others
-    return values, list(dict.fromkeys(problems)), []
+    return values, list(dict.fromkeys(problems)), list(notes)
 
 
 def _find_column(columns: Columns, name: str, *, is_only: bool) -> tuple[str, str]:
@@ -497,24 +513,33 @@ def _find_column(columns: Columns, name: str, *, is_only: bool) -> tuple[str, st
     return columns.find(name)
 
 
-def _read_cases(columns: Columns, draft: Draft) -> dict[str, list[float | str]]:
-    """Convert all columns of a table of cases to SI units."""
+def _read_cases(columns: Columns, draft: Draft) -> tuple[dict[str, list[float | str]], tuple[str, ...]]:
+    """Convert the columns of a table of cases to SI units, without incomplete rows; also returns notes."""
     problems: list[str] = []
-    values: dict[str, list[float | str]] = {}
-    # n may be one of the columns
-    n = None if "n" in columns.units else draft.exponent
+    unused: list[str] = []
+    quantities: dict[str, Quantity | None] = {}
     for name in columns.units:
         try:
-            values[name] = columns.values(name, InputName.parse(name).quantity(draft.known_models), n)
+            quantities[name] = InputName.parse(name).quantity(draft.known_models)
+        except KeyError:
+            meant = misspelt_column(name, SWEEP_INPUTS, draft.known_models, "input")
+            problems += [columns.problem(meant, name)] if meant else []
+            unused.append(name)
+    if not quantities and not problems:
+        problems.append(columns.problem("got no column of an input, expected one, such as v1 [m/s]"))
+    rows, count, gaps = complete_rows(columns, quantities)
+    problems += [columns.problem(message, name, row) for name, row, message in gaps]
+    complete, values = columns.take(rows), {}
+    # n may be one of the columns
+    n = None if "n" in columns.units else draft.exponent
+    for name, quantity in quantities.items():
+        try:
+            values[name] = complete.values(name, quantity, n)
         except ConfigError as error:
             problems += error.problems
-        except KeyError:
-            meant = near_miss(name, SWEEP_INPUTS)
-            unknown = InputName.parse(name).unknown_message(draft.known_models)
-            problems.append(columns.problem(f'no such input; did you mean "{meant}"?' if meant else unknown, name))
     if problems:
         raise ConfigError(*problems)
-    return values
+    return values, columns.notes(count, unused)
 
 
 def _file_columns(data: Mapping[str, Any]) -> Iterator[tuple[InputName, str, str | None, CsvForm]]:
@@ -571,7 +596,8 @@ def expand_cases(draft: Draft) -> Draft:
             problems.append((path, f"set together with {name.config_key}, expected one of the two"))
         if len(values) != n_cases or not values:
             expected = f"{n_cases or 'at least one'}, as in the first column"
-            problems.append((path, f"got {len(values)} values, expected {expected}"))
+            count = f"{len(values)} value{'s' * (len(values) != 1)}"
+            problems.append((path, f"got {count}, expected {expected}"))
         if name.owner:
             data, _ = set_value(data, name.path, values)
         paths[name.path] = path

@@ -39,6 +39,14 @@ from .tables import MATERIAL_KEYS, SWEEP_DEFAULTS, SWEEP_QUANTITIES, Loss, Noise
 
 # keys of [sweep] that arrange inputs
 NO_INPUTS = (("sweep", "zip"), ("sweep", "cases"))
+# inputs that a setting of another one replaces
+EXCLUDED_BY = {
+    "e": ("alpha",),
+    "alpha": ("e",),
+    "material": ("material1", "material2"),
+    "material1": ("material",),
+    "material2": ("material",),
+}
 
 
 @dataclass(frozen=True)
@@ -185,11 +193,14 @@ class Draft:
         is_input = path[0] in ("sweep", "model", "materials", "friction") and len(path) > 2
         data, start = set_value(data, path, setting.value, new_range=is_input and path[-1] in VALUE_FORMS)
         replaced = [start]
-        if path[:2] in (("sweep", "e"), ("sweep", "alpha")):
-            # e and alpha exclude each other: a setting of one removes the other
-            other = "alpha" if path[1] == "e" else "e"
-            replaced.append(("sweep", other))
-            data = {**data, "sweep": {key: value for key, value in data["sweep"].items() if key != other}}
+        others = EXCLUDED_BY.get(str(path[1]), ()) if path[0] == "sweep" and len(path) > 1 else ()
+        if others:
+            replaced += [("sweep", other) for other in others]
+            sweep = data["sweep"]
+            if others == ("material",) and "material" in sweep:
+                # the other ball keeps it
+                sweep = {**{f"material{ball}": sweep["material"] for ball in "12"}, **sweep}
+            data = {**data, "sweep": {key: value for key, value in sweep.items() if key not in others}}
         origins = {
             old: origin
             for old, origin in self.origins.items()

@@ -15,7 +15,7 @@ from ..contact.friction import FrictionLaw
 from ..contact.model import ForceModel, with_base_quantities
 from ..contact.variables import OUTPUTS
 from ..errors import ConfigError
-from ..formatting import number, safe_text
+from ..formatting import number, quantity, safe_text
 from .columns import (
     Columns,
     also,
@@ -23,7 +23,7 @@ from .columns import (
     complete_rows,
     contains_path,
     csv_form,
-    near_miss,
+    misspelt_column,
     read_cells,
     read_csv_of,
     split_header,
@@ -106,28 +106,33 @@ def purpose_problems(data: Mapping[str, Any]) -> list[ConfigProblem]:
 
 def _read_columns(columns: Columns, draft: Draft) -> tuple[_Points, list[_Problem]]:
     """Read columns of a file, which are text and have units, or lists of a config, and report all problems."""
-    kinds, note, problems = _used_columns(columns, draft)
+    kinds, unused, problems = _used_columns(columns, draft)
     rows, count, gaps = complete_rows(columns, kinds, refuse=draft.table("data").get("missing") == "error")
     if problems or gaps:
         return _Points(), [*problems, *gaps]
     complete = columns.take(rows)
     n = None if any(column.name == "n" for column in kinds.values()) else draft.exponent
     read: list[_Column] = []
+    notes = [*columns.notes(count, unused)]
     for header, column in kinds.items():
-        # a standard deviation has the unit of what it is one of
-        unit = columns.units.get(header) or (columns.units.get(column.name, "") if column.kind == SIGMA else "")
+        unit = columns.units.get(header, "")
+        if column.kind == SIGMA and not unit and columns.units.get(column.name):
+            # a standard deviation has the unit of what it is one of
+            unit = columns.units[column.name]
+            notes += columns.notes(f"{safe_text(header, 60)}: got no unit, read in [{unit}] as {column.name}")
         values, found = _read_column(complete, column, header, unit, n)
         problems += [(header, None if index is None else rows[index], message) for index, message in found]
         read.append(replace(column, values=tuple(values)))
-    notes = tuple(f"{columns.source}: {text}".removeprefix(": ") for text in (count, note) if text)
-    points = _Points(tuple(read), tuple(complete.lines), notes)
+    points = _Points(tuple(read), tuple(complete.lines), tuple(notes))
+    if not problems:
+        problems = list(_approach_problems(dict(zip(kinds, read, strict=True)), rows, draft))
     if not problems and points.of_kind("laboratory"):
-        points = _with_derived(points, rows, _gravity(draft.table("data")))
+        points, problems = _with_derived(points, rows, _gravity(draft.table("data")))
     return points, problems
 
 
-def _used_columns(columns: Columns, draft: Draft) -> tuple[dict[str, _Column], str, list[_Problem]]:
-    """Find what columns hold, by header; also returns a note of those without use, and problems."""
+def _used_columns(columns: Columns, draft: Draft) -> tuple[dict[str, _Column], list[str], list[_Problem]]:
+    """Find what columns hold, by header; also returns the headers of those without use, and problems."""
     kinds: dict[str, _Column] = {}
     problems: list[_Problem] = []
     unused: list[str] = []
@@ -137,7 +142,7 @@ def _used_columns(columns: Columns, draft: Draft) -> tuple[dict[str, _Column], s
         try:
             column = _column_of(header, outputs, draft.known_models)
             if column is None:
-                unused.append(safe_text(header, 60))
+                unused.append(header)
                 continue
             twin = next((key for key, c in kinds.items() if (c.kind, c.name) == (column.kind, column.name)), None)
             if twin is not None:
@@ -151,8 +156,7 @@ def _used_columns(columns: Columns, draft: Draft) -> tuple[dict[str, _Column], s
     of_lab = [column.name for column in kinds.values() if column.kind == "laboratory"]
     if of_lab:
         problems += _laboratory_problems(of_lab, kinds, draft)
-    note = f"columns without use: {', '.join(unused[:MAX_PROBLEMS])}" if unused else ""
-    return kinds, note, problems
+    return kinds, unused, problems
 
 
 def _check_conflict(column: _Column, derived: Mapping[str, str], draft: Draft) -> None:
@@ -188,6 +192,24 @@ def _laboratory_problems(of_lab: Sequence[str], kinds: Mapping[str, _Column], dr
             yield of_lab[0], None, f"{got} in [sweep]: heights and times are those of a ball on a body at rest"
 
 
+def _approach_problems(columns: Mapping[str, _Column], rows: Sequence[int], draft: Draft) -> Iterator[_Problem]:
+    """Refuse rows in which the balls do not meet."""
+    inputs = {column.name: (header, column.values) for header, column in columns.items() if column.kind == "input"}
+    if "v1" not in inputs:
+        return
+    header, v1 = inputs["v1"]
+    try:
+        at_rest = SWEEP_QUANTITIES["v2"].read(draft.table("sweep").get("v2", SWEEP_DEFAULTS["v2"]))
+    except PydanticCustomError:
+        # the validation of [sweep] reports it
+        return
+    v2 = inputs["v2"][1] if "v2" in inputs else (at_rest,) * len(rows)
+    apart = [index for index in range(len(rows)) if v1[index] <= v2[index]]
+    if apart:
+        got = f"got {quantity(v1[apart[0]], 'm/s')} with v2 = {quantity(v2[apart[0]], 'm/s')}"
+        yield header, rows[apart[0]], f"{got}, expected v1 > v2{also(len(apart) - 1)}"
+
+
 def _gravity(table: Mapping[str, Any]) -> float:
     """Read the key g; the validation of [data] reports an invalid one."""
     try:
@@ -214,7 +236,8 @@ def derive_impacts(
 
     Returns
     -------
-    v1, e_out and sigma_e_out, as far as they follow, and the position of the row to which each value belongs
+    v1, e_out and sigma_e_out, as far as they follow, and the position of the row to which each value belongs; NaN
+    for the deviation of a ball that does not rebound
 
     >>> derive_impacts({"flight_time": [0.5, 0.4, 0.2]}, [0, 1, 2], ["", "", ""], 10.0)
     ({'v1': [2.5, 2.0], 'e_out': [0.8, 0.5]}, [0, 1])
@@ -235,16 +258,21 @@ def derive_impacts(
         derived["e_out"] = (end / start) ** power
         deviations = [f"{SIGMA}_{first}", f"{SIGMA}_{second}"]
         if not values.keys().isdisjoint(deviations):
-            relative = np.hypot(column(deviations[0], before) / start, column(deviations[1], after) / end)
-            derived[f"{SIGMA}_e_out"] = power * derived["e_out"] * relative
+            # without a rebound there is none of first order
+            with np.errstate(divide="ignore", invalid="ignore"):
+                relative = np.hypot(column(deviations[0], before) / start, column(deviations[1], after) / end)
+                derived[f"{SIGMA}_e_out"] = power * derived["e_out"] * relative
     return {name: array.tolist() for name, array in derived.items()}, before
 
 
-def _with_derived(points: _Points, rows: Sequence[int], g: float) -> _Points:
-    """Replace heights and times of flight by what follows from them."""
+def _with_derived(points: _Points, rows: Sequence[int], g: float) -> tuple[_Points, list[_Problem]]:
+    """Replace heights and times of flight by what follows from them, and report what cannot."""
     values = {column.header: column.values for column in points.columns if column.name in LABORATORY}
     specimens = points.of_kind(SPECIMEN).get(SPECIMEN, ("",) * len(rows))
     derived, kept = derive_impacts(values, rows, specimens, g)
+    problems = list(_derived_problems(values, derived, kept, rows))
+    if problems:
+        return points, problems
     columns = [_Column("input", "v1", SWEEP_QUANTITIES["v1"], tuple(derived["v1"]))]
     if "e_out" in derived:
         columns.append(_Column("output", "e_out", MEASURED_OUTPUTS["e_out"], tuple(derived["e_out"])))
@@ -255,7 +283,37 @@ def _with_derived(points: _Points, rows: Sequence[int], g: float) -> _Points:
         for column in points.columns
         if column.name not in LABORATORY
     ]
-    return replace(points, columns=tuple(columns), lines=tuple(points.lines[i] for i in kept))
+    return replace(points, columns=tuple(columns), lines=tuple(points.lines[i] for i in kept)), []
+
+
+def _derived_problems(
+    values: Mapping[str, Sequence[float]],
+    derived: Mapping[str, Sequence[float]],
+    kept: Sequence[int],
+    rows: Sequence[int],
+) -> Iterator[_Problem]:
+    """Refuse a lone flight, a rebound that no noise explains, and a deviation that does not follow."""
+    is_flight = "flight_time" in values
+    if is_flight and not kept:
+        yield "flight_time", rows[0], "got no two successive flights of one ball, expected at least two rows of it"
+    before, after, unit = (
+        ("flight_time", "flight_time", "s") if is_flight else ("drop_height", "rebound_height", "m")
+    )
+    most = MEASURED_OUTPUTS["e_out"].most
+    large = [index for index, e in enumerate(derived.get("e_out", ())) if e > most]
+    if large:
+        first = kept[large[0]]
+        second = first + is_flight
+        got = f"got {quantity(values[after][second], unit)} after {quantity(values[before][first], unit)}"
+        # flights of two balls follow each other only without a column that separates them
+        hint = f"; a column {SPECIMEN} separates balls" if is_flight else ""
+        got += f", an e_out of {number(derived['e_out'][large[0]])}"
+        yield after, rows[second], f"{got}, expected at most {most}{hint}{also(len(large) - 1)}"
+    undefined = [index for index, sigma in enumerate(derived.get(f"{SIGMA}_e_out", ())) if sigma != sigma]
+    if undefined:
+        got = "got 0 next to a standard deviation, from which none of e_out follows"
+        expected = f"expected a column {SIGMA}_e_out in place of those of heights"
+        yield after, rows[kept[undefined[0]]], f"{got}, {expected}{also(len(undefined) - 1)}"
 
 
 def _read_column(
@@ -294,7 +352,9 @@ def _column_of(header: str, outputs: Sequence[str], models: Mapping[str, ForceMo
         return _Column("specimen", header, Quantity("1", "name of a specimen"))
     if header.removeprefix(f"{SIGMA}_") in LABORATORY:
         measured = header.removeprefix(f"{SIGMA}_")
-        return _Column("sigma", measured, replace(LABORATORY[measured][0], meaning="standard deviation"))
+        return _Column(
+            "sigma", measured, replace(LABORATORY[measured][0], meaning="standard deviation", above=True)
+        )
     if header == SIGMA or header.removeprefix(f"{SIGMA}_") in MEASURED_OUTPUTS:
         if header == SIGMA and len(outputs) > 1:
             expected = " or ".join(f"{SIGMA}_{output}" for output in outputs)
@@ -307,14 +367,11 @@ def _column_of(header: str, outputs: Sequence[str], models: Mapping[str, ForceMo
     try:
         quantity = name.quantity(models)
     except KeyError:
-        # a header such as "No. 1" has a dot as well
-        if header.startswith(("materials.", "model.", "friction.")) or near_miss(name.owner, models):
-            raise value_error(name.unknown_message(models)) from None
         of_sigma = [*MEASURED_OUTPUTS, *LABORATORY]
         known = [*of_sigma, SIGMA, SPECIMEN, *SWEEP_QUANTITIES, *(f"{SIGMA}_{output}" for output in of_sigma)]
-        meant = near_miss(header, known)
+        meant = misspelt_column(header, known, models, "input or output")
         if meant:
-            raise value_error(f'no such input or output; did you mean "{meant}"?') from None
+            raise value_error(meant) from None
         return None
     if quantity is None:
         raise value_error("got names of materials, expected numbers; all points have the materials of [sweep]")
@@ -343,7 +400,9 @@ def read_data_file(draft: Draft) -> tuple[dict[KeyPath, object], list[str], list
         # it may be any file, of which messages contain nothing
         problems = [(header, row, text[max(text.find("expected"), 0) :]) for header, row, text in problems]
     if problems:
-        return {}, [columns.problem(text, header, row) for header, row, text in problems[:MAX_PROBLEMS]], []
+        # a row is under the header of the file, which may have another name in [data]
+        named = [(name if row is None else headers.get(name, name), row, text) for name, row, text in problems]
+        return {}, [columns.problem(text, header, row) for header, row, text in named[:MAX_PROBLEMS]], []
     values = {column.header: list(column.values) for column in points.columns}
     return {("data", "columns"): values, ("data", "lines"): list(points.lines)}, [], list(points.notes)
 

@@ -301,7 +301,7 @@ MIN_SIGMA, MAX_MEASURED = 1e-30, 1e100
 # what is measured of a ball that falls on a body at rest, and what follows from it
 LABORATORY = {
     "drop_height": (Quantity("m", "height of the drop", 0.0, MAX_MEASURED, above=True), ("v1",)),
-    "rebound_height": (Quantity("m", "height of the rebound", 0.0, MAX_MEASURED, above=True), ("e_out",)),
+    "rebound_height": (Quantity("m", "height of the rebound", 0.0, MAX_MEASURED), ("e_out",)),
     "flight_time": (Quantity("s", "time between two impacts", 0.0, MAX_MEASURED, above=True), ("v1", "e_out")),
 }
 

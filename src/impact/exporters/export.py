@@ -22,6 +22,7 @@ from ..inverse.timestep import (
     NeededParameter,
     NeededSteps,
     TimestepRow,
+    missing_parameter,
     needed_parameter,
     needed_steps,
     time_parameter,
@@ -243,7 +244,8 @@ def export(
         needed = needed_parameter(
             problem.point, Plugins(), parameter, dt, ADVISED_TOL, problem.law, problem.outputs
         )
-    header = _header(problem, collision, at_dt, advised, needed)
+    needed_text = str(needed or (missing_parameter(parameter, ADVISED_TOL) if parameter else ""))
+    header = _header(problem, collision, at_dt, advised, needed_text)
     lines = [*comment_lines(header), code.script(collision, parameters)] if script else []
     result = Export(
         code=code.name,
@@ -333,7 +335,7 @@ def _header(
     collision: Collision,
     row: TimestepRow,
     advised: NeededSteps | None,
-    needed: NeededParameter | None,
+    needed: str,
 ) -> list[str]:
     """Write what a comment above the lines says."""
     code, law = problem.code, problem.law
@@ -381,6 +383,6 @@ def _header(
         if advised is not None:
             within = f"within {number(100.0 * ADVISED_TOL)} % of {number(problem.requested_e)}"
             header.append(f"recommended: dt <= {quantity(advised.dt, 's', 3)} keeps e {within} whatever the phase")
-        if needed is not None:
-            header.append(str(needed))
+        if needed:
+            header.append(needed)
     return [*header, *code.notes(collision), code.tested]

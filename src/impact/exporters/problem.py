@@ -18,7 +18,7 @@ from ..engine.plan import Plan
 from ..engine.plugins import Plugins
 from ..errors import UsageError, did_you_mean
 from ..formatting import argument, number, quantity
-from ..inverse.solve import PointWithE, point_with_e
+from ..inverse.solve import PointWithE, point_with_e, warn_of_point
 from ..inverse.timestep import FixedStepLaw, ObliqueLaw, fixed_step_law
 from ..results.calibration import position_of_law, unidentified_notes
 from ..results.single_impact import Calibration, ConfigSource, PointSource, open_source
@@ -151,6 +151,7 @@ def prepare_export(
         Plan(point.config).pair_notes("frictions")
     scheme = (find_friction(chosen).scheme if chosen else "") or code.scheme
     fixed, outputs = fixed_step_law(point.config, PHASES, scheme, of_friction=chosen is not None)
+    warn_of_point(point_source, point, outputs["e_out"])
     if fixed.oblique is not None:
         _check_limit(code, fixed.oblique)
     calibration = point_source.calibration
@@ -198,7 +199,7 @@ def _defaults(source: PointSource, at: Mapping[str, object], config: Config) -> 
     """List the values of Table 1 of the paper that enter, since neither the user nor a config gives them."""
     given = {str(path[1]) for path in source.config_draft.origins if len(path) > 1} | at.keys()
     has_stiffness = any(name.split(".")[-1] == "K" for name in config.scalars)
-    material = () if has_stiffness or {"material1", "material2"} <= given else ("material",)
+    material = () if has_stiffness else ("material", "material1", "material2")
     names = [name for name in ("v1", "m1", "m2", *material) if name in config.scalars.keys() - given]
     units = {name: SWEEP_QUANTITIES[name].unit for name in ("v1", "m1", "m2")}
     return tuple(f"{name} = {quantity(config.scalars[name], units.get(name, ''))}" for name in names)

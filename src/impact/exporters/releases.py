@@ -99,13 +99,15 @@ def first_law(code: Code, models: Sequence[str], version: str, *, is_fitted: boo
     """
     laws = {original_key(key) for key in code.laws}
     common = [key for key in models if original_key(key) in laws]
-    if not common:
-        shown = ", ".join(models[:3]) + (f" and {len(models) - 3} more" if len(models) > 3 else "")
-        way = "fit one of its own" if is_fitted else f"{argument('model')} names one of its own"
-        raise UsageError(f"{code.title} has none of the laws {shown}; {way}, see impact export --list")
     for key in common:
         with contextlib.suppress(UsageError):
             law = law_of_code(code, key, version)
             if not is_fitted or has_law(code, key, version):
                 return law
-    return law_of_code(code, common[0], version)
+    if common and not is_fitted:
+        return law_of_code(code, common[0], version)
+    shown = ", ".join(models[:3]) + (f" and {len(models) - 3} more" if len(models) > 3 else "")
+    way = "fit one of its own" if is_fitted else f"{argument('model')} names one of its own"
+    # another release may have one of them
+    title = f"{code.title} {version}" if common else code.title
+    raise UsageError(f"{title} has none of the laws {shown}; {way}, see impact export --list")

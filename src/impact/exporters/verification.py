@@ -150,8 +150,7 @@ def verify_scripts(problem: ExportProblem, program: str, dt: float, n_phases: in
     """Run scripts at `n_phases` phases of a step and compare them with the map of the code's scheme.
 
     Without a scheme, they are run at dt, dt/2 and dt/4, the mean over the phases is extrapolated to a step of
-    zero, and compared with the continuous law. The uncertainty is then the difference of the extrapolations from
-    dt and dt/2, and from dt/2 and dt/4, and half the spread over the phases at dt/4. Where a script measures no
+    zero, and compared with the continuous law, with the uncertainty of `extrapolate`. Where a script measures no
     number, nothing is extrapolated.
     """
     problem = replace(problem, law=replace(problem.law, phases=n_phases))
@@ -211,10 +210,23 @@ def _with_friction(
 
 
 def extrapolate(restitutions: Array) -> tuple[float, float]:
-    """Extrapolate to a step of zero, with the uncertainty, from runs at h, h/2 and h/4, of shape (3, phases)."""
+    """Extrapolate to a step of zero, with the uncertainty, from runs at h, h/2 and h/4, of shape (3, phases).
+
+    The mean over the phases is extrapolated as if its error were of first order. If the error is of order p at h/2
+    and h/4, that of the extrapolation is (2^p - 2)/(2^p - 1) of the last correction, less than all of it for any
+    p > 0.6; if it has parts of first and second order, it is a third of the difference of the two extrapolations.
+    The uncertainty is the larger one, and half the spread over the phases at h/4.
+
+    A code of second order, whose restitution is 0.5 at a step of zero:
+
+    >>> value, uncertainty = extrapolate(np.array([[0.516], [0.504], [0.501]]))
+    >>> round(value, 6), round(uncertainty, 6)
+    (0.498, 0.006)
+    """
     coarse, middle, fine = restitutions.mean(axis=1)
     first, second = 2.0 * middle - coarse, 2.0 * fine - middle
-    return float(second), float(abs(second - first) + np.ptp(restitutions[2]) / 2)
+    uncertainty = max(abs(fine - middle), abs(second - first)) + np.ptp(restitutions[2]) / 2.0
+    return float(second), float(uncertainty)
 
 
 def _measure(problem: ExportProblem, program: str, dt: float, phase: float) -> dict[str, float]:

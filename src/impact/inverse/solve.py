@@ -45,7 +45,7 @@ from ..engine.plugins import Plugins, read_plugins
 from ..errors import UsageError, did_you_mean
 from ..formatting import argument, number, quantity
 from ..results.ranking import target_value
-from ..results.single_impact import PointSource, open_source, single_point
+from ..results.single_impact import PointSource, open_source, single_point, warn_of_ignored_e
 from ..results.sweep import sweep_in_memory
 
 # values that are tried before roots are refined: powers of ten times the contact's own unit of the parameter
@@ -284,6 +284,12 @@ def point_with_e(
     config = solve_damping(config, source.plugins, float(config.scalars["e"]))
     solved = {law.damping: float(config.scalars[f"{law.key}.{law.damping}"])}
     return PointWithE(config, defaulted_axes, solved, replaced)
+
+
+def warn_of_point(source: PointSource, point: PointWithE, e_out: float) -> None:
+    """Warn of an e of the source that the law ignores; one that the caller gives is solved for."""
+    if point.solved is None and source.has_own_e and "e" not in point.defaulted_axes:
+        warn_of_ignored_e(point.config, e_out)
 
 
 def solve_damping(config: Config, plugins: Plugins, e: float) -> Config:

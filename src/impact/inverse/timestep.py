@@ -29,6 +29,7 @@ from ..config.load import Config
 from ..config.tables import DEFAULT_RTOL, SWEEP_QUANTITIES, TOLERANCE
 from ..contact.dimensionless import dimensionless_values
 from ..contact.fixed_step import (
+    DRAKE_SAP,
     MAX_CONTACTS,
     MAX_STEPS_PER_CONTACT,
     MUJOCO_CONE,
@@ -58,7 +59,7 @@ from ..engine.plugins import Plugins, read_plugins
 from ..errors import UsageError
 from ..formatting import argument, decimals, number, quantity
 from ..results.single_impact import open_source
-from .solve import PointWithE, config_name, point_with_e, solve_damping, unknown_of
+from .solve import PointWithE, config_name, point_with_e, solve_damping, unknown_of, warn_of_point
 
 # steps per contact if none are given
 STEPS_PER_CONTACT = (10.0, 20.0, 50.0, 100.0)
@@ -161,6 +162,7 @@ class NeededParameter:
     damping : the damping parameter there with its value, where it was solved for; else ""
     dt, contact_time : [s]
     peak_indentation : [m]
+    relaxation_time : C/K [s], what Drake's SAP takes in place of C; NaN for other schemes
     """
 
     parameter: str
@@ -172,20 +174,24 @@ class NeededParameter:
     contact_time: float
     peak_indentation: float
     tol: float
+    relaxation_time: float = math.nan
 
     def as_dict(self) -> dict[str, Any]:
-        """Convert to plain data."""
-        names = ("parameter", "value", "contact_time", "peak_indentation", "tol")
+        """Convert to plain data; without a relaxation time if the scheme has none."""
+        names = ["parameter", "value", "contact_time", "peak_indentation", "tol"]
+        names += [] if math.isnan(self.relaxation_time) else ["relaxation_time"]
         return {name: getattr(self, name) for name in names}
 
     def __str__(self) -> str:
         side = "from" if self.is_least else "up to"
         damping = f" with {self.damping}" if self.damping else ""
         contact_time, indentation = quantity(self.contact_time, "s", 4), quantity(self.peak_indentation, "m", 4)
+        relaxation = quantity(self.relaxation_time, "s", 4)
+        relaxation = "" if math.isnan(self.relaxation_time) else f", relaxation_time = C/K = {relaxation}"
         return (
             f"at dt = {quantity(self.dt, 's')} every phase is within {number(100.0 * self.tol)} % {side} "
             f"{self.parameter} = {quantity(self.value, self.unit, 4)}{damping}: contact of {contact_time}, "
-            f"indentation of {indentation}"
+            f"indentation of {indentation}{relaxation}"
         )
 
 
@@ -275,8 +281,7 @@ class TimestepResult(Displayed):
             steps, dt = self.needed.steps_per_contact, quantity(self.needed.dt, "s")
             yield f"within {percent} at every phase: {steps} steps per contact, dt <= {dt}"
         if self.parameter:
-            missing = f"no value of {self.parameter} keeps every phase within {percent} at the step"
-            yield str(self.needed_parameter or missing)
+            yield str(self.needed_parameter or missing_parameter(self.parameter, self.tol))
 
 
 def timestep(
@@ -346,6 +351,7 @@ def timestep(
     if point.config.frictions:
         Plan(point.config, plugin_set).pair_notes("frictions")
     law, collision = fixed_step_law(point.config, phases, scheme, of_friction=True)
+    warn_of_point(point_source, point, collision["e_out"])
     steps = time_steps(law.contact_time, counts or (() if given else STEPS_PER_CONTACT), given)
     return TimestepResult(
         model=law.model.key,
@@ -542,6 +548,11 @@ def needed_steps(
     return NeededSteps(tol, upper, law.contact_time / upper)
 
 
+def missing_parameter(name: str, tol: float) -> str:
+    """Say that no value of a parameter is enough."""
+    return f"no value of {name} keeps every phase within {number(100.0 * tol)} % at the step"
+
+
 def needed_parameter(
     point: PointWithE,
     plugins: Plugins,
@@ -578,8 +589,11 @@ def needed_parameter(
         changed = solve_damping(changed, plugins, e)
         return changed, *law_of(changed)
 
-    nearby = collide_at(NEARBY * value)[1]
-    slope = math.log(nearby.contact_time / law.contact_time) / math.log(NEARBY)
+    slope = 0.0
+    # e is what the tolerance is of
+    if name != "e":
+        nearby = collide_at(NEARBY * value)[1]
+        slope = math.log(nearby.contact_time / law.contact_time) / math.log(NEARBY)
     if abs(slope) < MIN_SLOPE:
         raise UsageError(f"{argument('parameter')}: {name} does not set the contact time of {model.key}")
     changed = config
@@ -599,6 +613,7 @@ def needed_parameter(
                 contact_time=law.contact_time,
                 peak_indentation=collision["peak_indentation"],
                 tol=tol,
+                relaxation_time=_relaxation_time(law),
             )
         logarithm = -distance / slope
         if not abs(logarithm) < MAX_LOGARITHM or not unknown.least <= value * math.exp(logarithm) <= unknown.most:
@@ -613,6 +628,13 @@ def needed_parameter(
     return None
 
 
+def _relaxation_time(law: FixedStepLaw) -> float:
+    """Compute C/K [s], which Drake's SAP takes; NaN for other schemes and laws."""
+    if law.scheme != DRAKE_SAP or "C" not in law.impact.parameters:
+        return math.nan
+    return float(law.impact.parameters["C"][0] / law.impact.K[0])
+
+
 def _named(model: ForceModel, damping: float) -> str:
     """Write the damping parameter of a law with a value."""
     unit = with_numbers(model.unit_of(model.damping), {"n": model.exponent or math.nan})
@@ -625,6 +647,9 @@ def _seek(config: Config, law: FixedStepLaw, name: str) -> tuple[Parameter, str,
     if parsed.material in config.materials and parsed.key == "E":
         modulus = config.materials[parsed.material].E
         return Parameter(name, "Pa", "Young's modulus"), name, float(config.scalars.get(name, modulus))
+    moduli = [f'"materials.{material}.E"' for material in _materials(config) if _takes_moduli(config, law.model)]
+    if name == "E" and moduli:
+        raise UsageError(f"{argument('parameter')}: got E, expected that of a material: {' or '.join(moduli)}")
     unknown = unknown_of(law.model, name)
     path = config_name(law.model, unknown)
     return unknown, path, float(law.impact.K[0] if name == "K" else config.scalars[path])
@@ -639,8 +664,15 @@ def time_parameter(config: Config, model: ForceModel) -> str:
         return names[0]
     if not _takes_moduli(config, model):
         return "K"
-    materials = {str(config.scalars.get(f"material{ball}", config.scalars.get("material"))) for ball in "12"}
-    return f"materials.{materials.pop()}.E" if len(materials) == 1 else ""
+    materials = _materials(config)
+    return f"materials.{materials[0]}.E" if len(materials) == 1 else ""
+
+
+def _materials(config: Config) -> list[str]:
+    """List the names of the materials of both balls, each once."""
+    return list(
+        dict.fromkeys(str(config.scalars.get(f"material{ball}", config.scalars.get("material"))) for ball in "12")
+    )
 
 
 def _takes_moduli(config: Config, model: ForceModel) -> bool:

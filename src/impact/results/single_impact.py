@@ -40,7 +40,7 @@ from ..contact.frictions import find_friction
 from ..contact.history import History, SlipHistory, integrate_history, integrate_slip
 from ..contact.impacts import Impacts
 from ..contact.materials import Material
-from ..contact.model import ForceModel
+from ..contact.model import ForceModel, with_base_quantities
 from ..contact.models import find
 from ..contact.output_formulas import collide
 from ..contact.rigid import ObliqueImpacts
@@ -328,8 +328,23 @@ def run(
     if times is not None and times < 2:
         raise UsageError(f"times: got {times}, expected a whole number >= 2")
     plugin_set = read_plugins(plugins)
-    config, first = single_point(open_source(source, overrides, plugin_set), model, at, friction=friction)
-    return run_single_impact(Plan(config, plugin_set.of(config.models)), first, times)
+    opened = open_source(source, overrides, plugin_set)
+    config, first = single_point(opened, model, at, friction=friction)
+    impact = run_single_impact(Plan(config, plugin_set.of(config.models)), first, times)
+    if "e" not in first and (opened.has_own_e or "e" in (at or {})):
+        warn_of_ignored_e(config, impact.values["e_out"])
+    return impact
+
+
+def warn_of_ignored_e(config: Config, e_out: float) -> None:
+    """Warn if the law of a config without axes ignores its e, and delivers another restitution."""
+    law, e = config.models[0], config.scalars.get("e", math.nan)
+    is_used = "e" in with_base_quantities(law.quantities) or any(law.may_use_e for law in config.frictions)
+    if is_used or not isinstance(e, float) or e != e or e_out != e_out or number(e_out) == number(e):
+        return
+    way = f"impact solve --model {law.key} --for {law.damping} --target e_out={number(e)} finds the parameter"
+    delivered = f"e = {number(e)} is not an input of {law.key}, which delivers {number(e_out)}"
+    warn(f"{delivered}; {way}" if law.damping else delivered)
 
 
 def no_motion(integrator: str) -> str:
@@ -563,6 +578,12 @@ class PointSource:
     calibration: Calibration | None = None
 
     @property
+    def has_own_e(self) -> bool:
+        """Whether the user chose the e of the config: that of the starter config is a default."""
+        chosen = [setting for setting in self.config_draft.settings if setting.path[:2] == ("sweep", "e")]
+        return len(chosen) > 1 if self.is_starter else "e" in self.config_draft.table("sweep")
+
+    @property
     def models(self) -> tuple[str, ...]:
         """Keys of the selected models, or none; other values of the config need not be valid yet."""
         if self.calibration is not None:
@@ -673,7 +694,7 @@ def single_point(
         if is_case(name) and name not in {axis.numbered for axis in config.axes}:
             raise _unknown_input(draft, name)
     config, defaulted = _without_axes(config, {**labels, **fixed}, over)
-    for note in input_notes(Plan(config).inputs):
+    for note in (*config.notes, *input_notes(Plan(config).inputs)):
         warn(note)
     return config, defaulted
 

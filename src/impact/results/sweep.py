@@ -249,7 +249,7 @@ def read_plan(
     plan = Plan(config, plugin_set.of(config.models))
     name = str(source) if isinstance(source, Path) else "config"
     plan.check_count(run.max_points, name)
-    for note in (*input_notes(plan.inputs), *plan.pair_notes(f"{name}: frictions")):
+    for note in (*config.notes, *input_notes(plan.inputs), *plan.pair_notes(f"{name}: frictions")):
         run.on_note(note)
     return plan
 
