@@ -608,20 +608,27 @@ def without_replaced_inputs(draft: Draft, fixed: Mapping[str, object]) -> Draft:
     """Leave out the inputs of the starter config that a user replaces by others.
 
     They are columns of cases; e beside a column alpha; the mass of a ball whose radius is given, which follows
-    from that and the density; v1 beside the speed of an oblique impact; and the material of both beside that of
-    one. The draft is that of the starter config; `fixed` has inputs that are set after its settings.
+    from that and the density; v1 beside the speed of an oblique impact; and the material of both beside a column
+    of one: the other ball keeps it. The draft is that of the starter config; `fixed` has inputs that are set after
+    its settings.
     """
     given = {**{str(path[1]): setting.value for path, setting in draft.origins.items() if len(path) > 1}, **fixed}
     cases = as_table(draft.table("sweep").get("cases"))
     columns = {split_header(header)[0]: values for header, values in cases.items()}
     inputs = {**given, **columns}
-    replacing = {"alpha": "e", "speed": "v1", "material1": "material", "material2": "material"}
+    replacing = {"alpha": "e", "speed": "v1"}
     replaced = {*columns, *(old for new, old in replacing.items() if new in inputs)}
     replaced |= {f"m{ball}" for ball in (1, 2) if str(inputs.get(f"R{ball}", "inf")).strip() != "inf"}
     replaced -= given.keys()
     sweep = {name: value for name, value in draft.table("sweep").items() if name not in replaced}
     # also in the text, from which a stored result is repeated
     text = re.sub(r"(?m)^(?=(\w+) = )", lambda key: "# " if key[1] in replaced else "", draft.text)
+    balls = {"material1", "material2"}
+    if balls & columns.keys():
+        material = sweep.pop("material", None)
+        others = balls - columns.keys() - given.keys()
+        sweep |= dict.fromkeys(others, material)
+        text = re.sub(r"(?m)^material(?= = )", others.pop() if others else "# material", text)
     return replace(draft, data={**draft.data, "sweep": sweep}, text=text)
 
 
