@@ -655,6 +655,25 @@ def test_a_legend_names_laws_as_asked_for_in_own_and_in_foreign_axes(legend: str
     assert "mine" in [text.get_text() for text in own.legends[0].get_texts()]
 
 
+@pytest.mark.parametrize(
+    ("legend", "end"),
+    [
+        ("full", ""),
+        ("short", ", A = 10 µs of Kuwabara and Kono (1987)"),
+        ("keys", ", A = 10 µs of kuwabara-kono-1987"),
+    ],
+)
+def test_parameters_of_laws_are_in_the_conditions_if_the_legend_lacks_them(legend: str, end: str) -> None:
+    """Two pictures of the same law with other parameters can be told apart."""
+    options = {"model.kuwabara-kono-1987.A": 1e-5}
+    result = impact.sweep(models=["hertz", "kuwabara-kono-1987"], v1=[1.0, 2.0], overrides=options)
+    text = impact.plot(result, kind="restitution", legend=legend).texts[1].get_text()
+    for old, new in (("\N{NO-BREAK SPACE}", " "), ("$", ""), ("\n", " ")):
+        text = text.replace(old, new)
+    assert text.endswith(end)
+    assert ("A = " in text) == bool(end)
+
+
 def test_a_picture_without_legend_and_foreign_axes_without_title(coarse: xr.Dataset) -> None:
     axes = Figure((4.0, 4.0)).subplots(1, 2)
     impact.plot(coarse, kind="restitution", ax=axes[0], legend="none")

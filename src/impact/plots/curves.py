@@ -125,9 +125,9 @@ class CurveData:
         }
 
     @property
-    def laws(self) -> set[str]:
-        """The models and pairs that have a curve."""
-        return {curve.law for panel in self.panels for curve in panel.curves if curve.law}
+    def laws(self) -> dict[str, str]:
+        """The models and pairs that have a curve: their labels by key."""
+        return {curve.law: curve.label for panel in self.panels for curve in panel.curves if curve.law}
 
     def long_table(self) -> pd.DataFrame:
         """Make a row for each point of a curve, and for each measured point."""

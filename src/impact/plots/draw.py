@@ -21,7 +21,15 @@ from ..results.single_impact import Impact, histories
 from ..results.xarray_backend import result_of
 from .data import PlotData, Points, read_points
 from .kinds import DEFAULT_LEGENDS, STUDIES, Choice, Look, default_kind, find_kind
-from .labels import check_labels, escape_mathtext, legend_labels, pretty_conditions, tick_with_comma, with_comma
+from .labels import (
+    check_labels,
+    escape_mathtext,
+    legend_labels,
+    parameters_of_laws,
+    pretty_conditions,
+    tick_with_comma,
+    with_comma,
+)
 from .layout import LEGEND_PART, Picture
 from .style import default_size, styled
 
@@ -178,11 +186,15 @@ def _new_picture(
     with styled(look.style):
         (width, height), (default_width, default_height) = look.size, default_size()
         width, height = width or default_width, height or default_height
-        texts = (heading, pretty_conditions(plot_data.conditions)) if look.title else ()
+        names = _labels(plot_data, look)
+        # names with parameters are those of the legend alone
+        parameters = parameters_of_laws(plot_data.laws, names) if look.legend not in (None, "full") else ""
+        conditions = ", ".join(filter(None, (pretty_conditions(plot_data.conditions), parameters)))
+        texts = (heading, conditions) if look.title else ()
         picture = Picture(width, *texts)
         picture.has_legend_rows = legend_rows
         all_axes, panels_height = plot_data.place_panels(picture, width)
-        entries = _draw_panels(plot_data, all_axes, _labels(plot_data, look), measured, look)
+        entries = _draw_panels(plot_data, all_axes, names, measured, look)
         if look.decimal == "comma":
             for text in picture.header:
                 text.set_text(with_comma(text.get_text()))

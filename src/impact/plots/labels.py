@@ -166,6 +166,23 @@ def legend_labels(laws: Collection[str], legend: str) -> dict[str, str]:
     return {law: escape_mathtext(WITH.join(map(short, parts))) for law, parts in keys.items()}
 
 
+def parameters_of_laws(laws: Mapping[str, str], names: Mapping[str, str]) -> str:
+    """Write the parameters in the labels of laws, for a picture with other names that lack them.
+
+    >>> labels = {"kuwabara-kono-1987": f"Kuwabara and Kono (1987), A{NO_BREAK}={NO_BREAK}10 µs", "hertz": "Hertz"}
+    >>> parameters_of_laws(labels, {}).replace(NO_BREAK, " ")
+    '$A$ = 10 µs of kuwabara-kono-1987'
+    """
+    owners: dict[str, list[str]] = {}
+    for law, label in laws.items():
+        parameters = [part for part in re.split(", | with ", label) if f"{NO_BREAK}={NO_BREAK}" in part]
+        name = names.get(law, escape_mathtext(law))
+        owners.setdefault(pretty_conditions(" and ".join(parameters)), []).append(name)
+    return ", ".join(
+        text if len(owners) == 1 else f"{text} of {' and '.join(of)}" for text, of in owners.items() if text
+    )
+
+
 class LawPart(NamedTuple):
     """What a result has for one model, or for one pair: its label, the keys of both laws, and the data."""
 

@@ -115,9 +115,9 @@ class MapData:
         return {self.x, self.y, *variable, *(panel.key for panel in self.panels)}
 
     @property
-    def laws(self) -> set[str]:
-        """The models and pairs that have a panel."""
-        return {panel.key for panel in self.panels if panel.model}
+    def laws(self) -> dict[str, str]:
+        """The models and pairs that have a panel: their labels by key."""
+        return {panel.key: panel.label for panel in self.panels if panel.model}
 
     def long_table(self) -> pd.DataFrame:
         """Make a row for each point of each model; x varies more slowly than y."""
