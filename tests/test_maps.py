@@ -13,6 +13,7 @@ from matplotlib.axis import Axis
 from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch
+from matplotlib.text import Text
 
 import impact
 from impact.errors import UsageError
@@ -433,3 +434,15 @@ def test_a_map_of_many_points_is_stored_as_an_image(many: xr.Dataset, tmp_path: 
     for get_map_data in (field_map, validity):
         save_figure(draw(get_map_data(fine), Look(3.5)), tmp_path / f"large.{form}")
         assert (tmp_path / f"large.{form}").stat().st_size < 400_000
+
+
+def test_the_name_above_a_panel_has_at_most_three_lines() -> None:
+    sweep = {"v1": [1.0, 2.0], "e": [0.5, 0.9], "m1": 1.0, "m2": 1.0, "K": 6e9}
+    keys = ["lammps-coeff-restitution-hertz", "hertz"]
+    figure = draw(field_map(impact.sweep({"models": keys, "sweep": sweep})), Look(width="84mm"))
+    figure.draw_without_rendering()
+    long, short = (axes.get_children() for axes in figure.axes[:2])
+    (name,) = (text for text in long if isinstance(text, Text) and "coeff" in text.get_text())
+    assert name.get_text().count("\n") <= 2
+    (other,) = (text for text in short if isinstance(text, Text) and "Hertz" in text.get_text())
+    assert name.get_fontsize() < other.get_fontsize()

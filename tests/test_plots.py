@@ -624,6 +624,15 @@ def test_a_wrong_option_is_an_error_of_one_line(
         impact.plot(coarse, **options)  # type: ignore[arg-type]
 
 
+def test_a_height_without_room_for_panels_names_the_least_height(coarse: xr.Dataset) -> None:
+    with pytest.raises(UsageError, match=r"height: got 60mm, expected at least \d+mm at this width") as error:
+        impact.plot(coarse, kind="history", sel={"e": 0.5}, width="84mm", height="60mm")
+    (least,) = re.findall(r"least (\d+mm)", str(error.value))
+    figure = impact.plot(coarse, kind="history", sel={"e": 0.5}, width="84mm", height=least)
+    heights = [axes.get_position().height * float(least[:-2]) for axes in figure.axes]
+    assert all(12.0 <= height < 14.0 for height in heights)
+
+
 def test_a_plot_is_drawn_into_axes_of_the_user(coarse: xr.Dataset) -> None:
     figure = Figure((8.0, 4.0))
     axes = figure.subplots(1, 2)

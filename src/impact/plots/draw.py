@@ -162,6 +162,14 @@ def draw(
         figure = all_axes[0].get_figure(root=True)
         assert figure is not None
         return figure
+    picture = _picture_with_room(plot_data, look, measured, heading)
+    with styled(look.style):
+        picture.check_panels()
+    return picture
+
+
+def _picture_with_room(plot_data: PlotData, look: Look, measured: Points | None, heading: str) -> Picture:
+    """Draw a picture in a new figure, with the longest names with which the legend has room if none are chosen."""
     if look.legend is not None or not plot_data.laws:
         return _new_picture(plot_data, look, measured, heading)
     shares = {}
@@ -198,6 +206,7 @@ def _new_picture(
         if look.decimal == "comma":
             for text in picture.header:
                 text.set_text(with_comma(text.get_text()))
+        picture.panels = all_axes
         picture.add_legend(panels_height, height, [] if look.legend == "none" else entries)
     return picture
 

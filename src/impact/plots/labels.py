@@ -173,11 +173,15 @@ def parameters_of_laws(laws: Mapping[str, str], names: Mapping[str, str]) -> str
     >>> parameters_of_laws(labels, {}).replace(NO_BREAK, " ")
     '$A$ = 10 µs of kuwabara-kono-1987'
     """
-    owners: dict[str, list[str]] = {}
-    for law, label in laws.items():
-        parameters = [part for part in re.split(", | with ", label) if f"{NO_BREAK}={NO_BREAK}" in part]
-        name = names.get(law, escape_mathtext(law))
-        owners.setdefault(pretty_conditions(" and ".join(parameters)), []).append(name)
+    owners: dict[str, dict[str, None]] = {}
+    for pair, label in laws.items():
+        keys = pair.split(WITH)
+        parts = label.rsplit(WITH, len(keys) - 1)
+        # the label of a pair may lack its model, which then is in the conditions
+        for law, part in zip(keys[-len(parts) :], parts, strict=True):
+            parameters = " and ".join(word for word in part.split(", ") if f"{NO_BREAK}={NO_BREAK}" in word)
+            name = names.get(law, escape_mathtext(law))
+            owners.setdefault(pretty_conditions(parameters), {})[name] = None
     return ", ".join(
         text if len(owners) == 1 else f"{text} of {' and '.join(of)}" for text, of in owners.items() if text
     )
