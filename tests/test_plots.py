@@ -267,7 +267,11 @@ def test_the_impulse_diagram_ends_where_impulse_and_momentum_say(figure6: xr.Dat
     ("kind", "choice", "words"),
     [
         ("lop", {}, 'no kind "lop"; did you mean "loop"?'),
-        ("loop", {"models": ["gharib-hurmuzlu-2012"]}, "no motion to draw at e = 0.0: closed-form limit"),
+        (
+            "loop",
+            {"models": ["gharib-hurmuzlu-2012"], "sel": {"e": 0.0}},
+            "no motion to draw at e = 0.0: closed-form limit",
+        ),
         ("loop", {"sel": {"e": 0.5}, "models": ["herz"]}, 'no model "herz" in this result'),
         ("loop", {"sel": {"m3": 0.5}}, 'no input "m3" here'),
     ],
@@ -277,6 +281,17 @@ def test_a_motion_that_cannot_be_drawn_is_an_error_of_one_line(
 ) -> None:
     with pytest.raises(UsageError, match=one_line(words)):
         get_curve_data(coarse, kind, **choice)
+
+
+def test_a_motion_is_at_the_middle_of_e_and_names_laws_without_one(coarse: xr.Dataset) -> None:
+    middle = get_curve_data(coarse, "loop")
+    assert "e = 0.5" in conditions_of(middle)
+    assert (len(single_panel(middle).curves), middle.not_drawn) == (3, ())
+    at_zero = get_curve_data(coarse, "loop", sel={"e": 0.0})
+    assert [curve.model for curve in single_panel(at_zero).curves] == ["lankarani-nikravesh-1990"]
+    assert [text.partition(",")[0] for text in at_zero.not_drawn] == [
+        f"{key} (closed-form limit" for key in ("lankarani-nikravesh-1994", "gharib-hurmuzlu-2012")
+    ]
 
 
 def test_an_axis_label_has_one_prefix_of_its_unit(coarse: xr.Dataset) -> None:

@@ -74,7 +74,7 @@ def plot(
     y : second axis of a map, or of the kind validity; by default the next one
     variable : name of the variable that a map or a band shows; by default e_error for a map, e_out for a band
     sel : values of the other axes, such as `{"m2": 1.0}`; the default is the first value. A loop, a history
-        or an impulse may be at a point that is not on the grid
+        or an impulse may be at a point that is not on the grid, and is at the middle of an axis of e by default
     models : keys of the models to show; by default all
     log : which axes are logarithmic, such as "x" or "xy"; axes with logarithmic spacing are in any case
     points : measured points over the curves: a CSV file, or a table of pandas or xarray, whose columns have names
@@ -130,7 +130,9 @@ def get_plot_data(
         frictions = choice.frictions
         if found.of_friction and "friction" in dataset.dims:
             frictions = frictions or dataset["friction"].values.tolist()
-        return found.data(histories(dataset, choice.models, choice.sel or {}, plugin_set, frictions), choice)
+        motions, left_out = histories(dataset, choice.models, choice.sel or {}, plugin_set, frictions)
+        plot_data = found.data(motions, choice)
+        return replace(plot_data, not_drawn=(*left_out, *plot_data.not_drawn))
     return found.data(dataset, choice)
 
 
