@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import warnings
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -90,7 +91,9 @@ class Picture(Figure):
         # a notebook shows it even if no backend of matplotlib is selected; `alt` is the text for screen readers
         panels = [f"{axes.get_ylabel()} over {axes.get_xlabel()}" for axes in self.axes if axes.get_ylabel()]
         words = [*(text.get_text() for text in self.header), *panels]
-        return encoded(self, "png"), {"alt": " ".join("; ".join(words).split())}
+        # a screen reader would read the signs of mathtext
+        plain = re.sub(r"\\(?:mathrm|dot)\b|[$\\{}]", "", "; ".join(words))
+        return encoded(self, "png"), {"alt": " ".join(plain.split())}
 
     def set_size_inches(self, w: Any, h: Any = None, forward: bool = True) -> None:
         before = self.get_figwidth()
