@@ -119,6 +119,9 @@ def config_page() -> str:
             quantity = quantities.get(key)
             meaning = quantity.description if quantity else field["description"]
             values = quantity.expected if quantity else _values(field, schemas)
+            # the schema is that of any text
+            if name == "sweep" and key.startswith("material"):
+                values = "a `NAME` of `[materials.NAME]` or of `impact materials`, or a list of them"
             default = defaults.get(key, field.get("default"))
             if default not in (None, []):
                 values += f"; default `{json.dumps(default)}`"
@@ -233,6 +236,8 @@ def move_links(app: Any, document: str, source: list[str]) -> None:
     laws = {"models": catalogue(), "frictions": frictions()}.get(document, {})
     for key in laws:
         source[0] = source[0].replace(f"](#{key})", f"](reference/{document}/{key}.md)")
+    # GitHub shows the name of a page as it is; the site has its title
+    source[0] = re.sub(r"\[(?:docs/)?[\w/]+\.md\]\((?!http)", "[](", source[0])
     # files of the repository are not part of the site
     source[0] = re.sub(r"\[([^\]]*)\]\(\.\./((?:configs|tests|src)/[^)]*)\)", r"`\2`", source[0])
 

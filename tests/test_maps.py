@@ -313,7 +313,10 @@ def test_models_beyond_the_largest_number_of_panels_are_reported(many: xr.Datase
         ({"x": "v1", "y": "v1"}, "map needs two axes; v1 and v1 vary together"),
         ({"sel": {"v1": 6.0, "m2": 1.0}, "y": "e", "x": "alpha"}, "map needs two axes; alpha and e vary together"),
         ({"sel": {"m3": 1.0}}, 'no axis "m3" in this result'),
-        ({"sel": {"v1": 0.5, "m2": 1.0}}, "map needs two axes; this result has e alone; sweep a second, or"),
+        (
+            {"sel": {"v1": 0.5, "m2": 1.0}},
+            "map needs two axes; this result has e alone left beside the selected values; sweep a second, or",
+        ),
         ({"models": ["herz"]}, 'no model "herz" in this result'),
     ],
 )

@@ -850,6 +850,18 @@ def test_kinds_that_do_not_apply_are_reported_and_others_drawn(
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a-restitution.svg"]
 
 
+def test_a_picture_without_a_second_axis_names_the_first_beside_one_at_a_value(
+    coarse_file: Path, tmp_path: Path
+) -> None:
+    kinds = ("loop", "validity")
+    files = impact.plot_to_files(coarse_file, tmp_path / "a.svg", kinds=kinds, sel={"e": 0.5})
+    assert files.left_out["validity"].startswith(
+        "validity needs two axes; this result has e alone; sweep a second"
+    )
+    with pytest.raises(UsageError, match="has none left beside the selected values"):
+        get_plot_data(impact.load(coarse_file), "validity", Choice(sel={"e": 0.5}))
+
+
 @pytest.mark.slow
 def test_a_value_for_one_picture_leaves_the_axes_of_others(
     cli: Run, coarse: xr.Dataset, coarse_file: Path, wide: xr.Dataset, tmp_path: Path

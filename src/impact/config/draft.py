@@ -233,9 +233,14 @@ class Draft:
             is_replaced = any(path[:start] in self.origins for start in range(end))
             if path[:end] in key_line and not is_replaced:
                 return (0, key_line[path[:end]]), f"{self.name}:{key_line[path[:end]]}"
-        # a parameter of a law without a table is required by the key `models` or `frictions`
-        required_by = {"model": "models", "friction": "frictions"}.get(str(path[0])) if path else None
-        return self._locate((required_by,), key_line) if required_by else ((0, 0), self.name)
+        # a parameter of a law without a table is required by the key `models` or `frictions`, and a property of a
+        # material of the library by the key that names it
+        named = [("sweep", key) for key in ("material", "material1", "material2")]
+        required_by = {"model": [("models",)], "friction": [("frictions",)], "materials": named}
+        for key in required_by.get(str(path[0]), []) if path else ():
+            if key in key_line or key in self.origins:
+                return self._locate(key, key_line)
+        return (0, 0), self.name
 
 
 def _library_setting(name: str, without: Iterable[str] = ()) -> Setting:
