@@ -236,10 +236,14 @@ def move_links(app: Any, document: str, source: list[str]) -> None:
     laws = {"models": catalogue(), "frictions": frictions()}.get(document, {})
     for key in laws:
         source[0] = source[0].replace(f"](#{key})", f"](reference/{document}/{key}.md)")
-    # GitHub shows the name of a page as it is; the site has its title
-    source[0] = re.sub(r"\[(?:docs/)?[\w/]+\.md\]\((?!http)", "[](", source[0])
+    name_titles(app, "", document, source)
     # files of the repository are not part of the site
     source[0] = re.sub(r"\[([^\]]*)\]\(\.\./((?:configs|tests|src)/[^)]*)\)", r"`\2`", source[0])
+
+
+def name_titles(app: Any, path: Any, document: str, source: list[str]) -> None:
+    """Replace links whose text is the path of a page, as GitHub shows it, by the title of the page."""
+    source[0] = re.sub(r"\[(?:docs/)?[\w/]+\.md\]\((?!http)", "[](", source[0])
 
 
 def escape_docstring(app: Any, what: str, name: str, thing: Any, options: Any, lines: list[str]) -> None:
@@ -274,3 +278,4 @@ def setup(app: Any) -> None:
     # before napoleon reads the sections
     app.connect("autodoc-process-docstring", escape_docstring, priority=400)
     app.connect("source-read", move_links)
+    app.connect("include-read", name_titles)
