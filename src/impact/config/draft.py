@@ -235,12 +235,12 @@ class Draft:
                 return (0, key_line[path[:end]]), f"{self.name}:{key_line[path[:end]]}"
         # a parameter of a law without a table is required by the key `models` or `frictions`, and a property of a
         # material of the library by the key that names it
-        named = [("sweep", key) for key in ("material", "material1", "material2")]
-        required_by = {"model": [("models",)], "friction": [("frictions",)], "materials": named}
-        for key in required_by.get(str(path[0]), []) if path else ():
-            if key in key_line or key in self.origins:
-                return self._locate(key, key_line)
-        return (0, 0), self.name
+        named = {key: self.table("sweep").get(key) for key in ("material", "material1", "material2")}
+        required_by = {"model": "models", "friction": "frictions"}.get(str(path[0])) if path else None
+        if required_by:
+            return self._locate((required_by,), key_line)
+        keys = [key for key, name in named.items() if path[:2] == ("materials", name)]
+        return self._locate(("sweep", keys[0]), key_line) if keys else ((0, 0), self.name)
 
 
 def _library_setting(name: str, without: Iterable[str] = ()) -> Setting:
