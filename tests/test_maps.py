@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -449,3 +450,15 @@ def test_the_name_above_a_panel_has_at_most_three_lines() -> None:
     assert name.get_text().count("\n") <= 2
     (other,) = (text for text in short if isinstance(text, Text) and "Hertz" in text.get_text())
     assert name.get_fontsize() < other.get_fontsize()
+
+
+def test_a_name_of_three_lines_keeps_its_letters(over_speed: xr.Dataset) -> None:
+    map_data = field_map(over_speed)
+    long = replace(
+        map_data.panels[0], label="Modia3D (v0.6.0 to v0.12.3, since February 2022), with a limit of 1 m/s"
+    )
+    figure = draw(replace(map_data, panels=(long, *map_data.panels[1:])), Look(width=7.1))
+    figure.draw_without_rendering()
+    first, second = (next(t for t in axes.get_children() if t is axes._left_title) for axes in figure.axes[:2])
+    assert first.get_text().count("\n") == 2
+    assert first.get_fontsize() == second.get_fontsize()

@@ -268,8 +268,11 @@ class Picture(Figure):
             left = gap + y_label.get_window_extent(self.renderer).width
         return left / width, below / height, above / height
 
-    def fit_labels(self, height: float) -> list[str]:
-        """Break the labels and titles of all axes to the length of their axis; returns their texts."""
+    def fit_labels(self, height: float, *, may_shrink: bool) -> list[str]:
+        """Break the labels and titles of all axes to the length of their axis; returns their texts.
+
+        Before the first layout the lengths are not those of the picture: no title may shrink.
+        """
         labels = []
         # in a single row of panels of a height [px] a vertical label may be longer than its axis
         rows = len({round(axes.get_position().y0, 1) for axes in self.axes})
@@ -281,7 +284,7 @@ class Picture(Figure):
                 across = LABEL_SHARE_OF_AXIS * box.width
                 up = max(LABEL_SHARE_OF_AXIS * box.height, least)
                 self.fit(text, up if text is axes.yaxis.label else across)
-                if text in titles and text.get_text().count("\n") >= MAX_LINES:
+                if may_shrink and text in titles and text.get_text().count("\n") >= MAX_LINES:
                     text.set_fontsize("x-small")
                     self.fit(text, box.width)
                     if text.get_text().count("\n") >= MAX_LINES and text in self.short_names:
@@ -332,7 +335,7 @@ class Layout(ConstrainedLayoutEngine):
         # axes become shorter where a label gets another line, which may change the lines again
         before: list[str] = []
         for _ in range(MAX_LAYOUT_PASSES):
-            labels = fig.fit_labels((1.0 - above - below) * fig.bbox.height)
+            labels = fig.fit_labels((1.0 - above - below) * fig.bbox.height, may_shrink=bool(before))
             if labels == before:
                 break
             with warnings.catch_warnings(record=True) as caught:
