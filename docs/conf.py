@@ -119,6 +119,9 @@ def config_page() -> str:
             quantity = quantities.get(key)
             meaning = quantity.description if quantity else field["description"]
             values = quantity.expected if quantity else _values(field, schemas)
+            # the schema is that of any text
+            if name == "sweep" and key.startswith("material"):
+                values = "a `NAME` of `[materials.NAME]` or of `impact materials`, or a list of them"
             default = defaults.get(key, field.get("default"))
             if default not in (None, []):
                 values += f"; default `{json.dumps(default)}`"
@@ -235,8 +238,14 @@ def move_links(app: Any, document: str, source: list[str]) -> None:
     laws = {"models": catalogue(), "frictions": frictions()}.get(document, {})
     for key in laws:
         source[0] = source[0].replace(f"](#{key})", f"](reference/{document}/{key}.md)")
+    name_titles(app, "", document, source)
     # files of the repository are not part of the site
     source[0] = re.sub(r"\[([^\]]*)\]\(\.\./((?:configs|tests|src)/[^)]*)\)", r"`\2`", source[0])
+
+
+def name_titles(app: Any, path: Any, document: str, source: list[str]) -> None:
+    """Replace links whose text is the path of a page, as GitHub shows it, by the title of the page."""
+    source[0] = re.sub(r"\[(?:docs/)?[\w/]+\.md\]\((?!http)", "[](", source[0])
 
 
 def escape_docstring(app: Any, what: str, name: str, thing: Any, options: Any, lines: list[str]) -> None:
@@ -271,3 +280,4 @@ def setup(app: Any) -> None:
     # before napoleon reads the sections
     app.connect("autodoc-process-docstring", escape_docstring, priority=400)
     app.connect("source-read", move_links)
+    app.connect("include-read", name_titles)

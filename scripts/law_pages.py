@@ -139,13 +139,16 @@ def closed_form(oracle: Formula | None) -> str:
         return "none: e_out is integrated"
     assert isinstance(oracle, FunctionType)
     code = oracle.__code__
-    (source,) = (
+    sources = (
         ast.unparse(node.body)
         for node in ast.walk(parsed(code.co_filename))
         if isinstance(node, ast.Lambda)
         and (node.lineno, len(node.args.args)) == (code.co_firstlineno, code.co_argcount)
     )
-    functions = (oracle.__globals__.get(name) for name in code.co_names)
+    names = code.co_names if code.co_name == "<lambda>" else (code.co_name,)
+    # a function with a name says itself what it is
+    source = next(sources, f"{code.co_name}({', '.join(code.co_varnames[: code.co_argcount])})")
+    functions = (oracle.__globals__.get(name) for name in names)
     meanings = (
         f"`{function.__name__}`: {cell(prose(function))}"
         for function in functions

@@ -66,12 +66,18 @@ def _text(output: NotebookNode) -> str:
 
 
 def as_stored(notebook: NotebookNode) -> NotebookNode:
-    """The notebook without controls, and with pictures of few colours, a fourth of their size."""
+    """The notebook without controls, and with pictures of few colours, a fourth of their size.
+
+    MyST-NB reads the text for screen readers from the cell, and not from the picture.
+    """
     for cell in notebook.cells:
         if "outputs" in cell:
             cell.outputs = [output for output in cell.outputs if CONTROLS not in output.get("data", {})]
-        for data in (output.get("data", {}) for output in cell.get("outputs", ())):
+        for output in cell.get("outputs", ()):
+            data = output.get("data", {})
             if "image/png" in data:
+                if alt := output.metadata.get("image/png", {}).get("alt"):
+                    cell.metadata["mystnb"] = {"image": {"alt": alt}}
                 small = BytesIO()
                 picture = Image.open(BytesIO(b64decode(data["image/png"]))).convert("RGB")
                 picture.quantize(COLOURS, dither=Image.Dither.NONE).save(small, "png", optimize=True)

@@ -24,9 +24,22 @@ def test_the_bibtex_of_the_catalogue_has_each_law_once_and_balanced_braces() -> 
     assert len(set(keys)) == len(keys)
     assert set(laws) <= set(keys)
     for _, key, fields in entries:
-        shown = re.sub(r"\\[{}&%$#_]", "", fields)
+        shown = re.sub(r"\\[{}&%$#_]|\$[^$]+\$", "", fields)
         assert shown.count("{") == shown.count("}"), key
         assert not re.search(r"[&%$#_]", shown), key
+
+
+def test_bibtex_has_no_character_that_pdflatex_refuses() -> None:
+    text = str(impact.cite(*impact.models(), *impact.frictions()))
+    assert not re.findall(r"[^\n -~À-ž]", text)
+    assert r"the damping exponents m$_2$ = 1" in text
+    assert r"whose $\alpha$ has 2 in the place of $\surd$5" in text
+
+
+def test_the_evidence_is_in_a_field_that_styles_do_not_print() -> None:
+    text = str(impact.cite("hertz"))
+    assert "  annote = {formula seen in Gharib" in text
+    assert "  note" not in text
 
 
 def test_a_doi_stands_in_the_entry_of_its_paper() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from matplotlib.axis import Axis
 from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch
+from matplotlib.text import Text
 
 import impact
 from impact.errors import UsageError
@@ -312,7 +314,10 @@ def test_models_beyond_the_largest_number_of_panels_are_reported(many: xr.Datase
         ({"x": "v1", "y": "v1"}, "map needs two axes; v1 and v1 vary together"),
         ({"sel": {"v1": 6.0, "m2": 1.0}, "y": "e", "x": "alpha"}, "map needs two axes; alpha and e vary together"),
         ({"sel": {"m3": 1.0}}, 'no axis "m3" in this result'),
-        ({"sel": {"v1": 0.5, "m2": 1.0}}, "map needs two axes; this result has e alone; sweep a second, or"),
+        (
+            {"sel": {"v1": 0.5, "m2": 1.0}},
+            "map needs two axes; this result has e alone left beside the selected values; sweep a second, or",
+        ),
         ({"models": ["herz"]}, 'no model "herz" in this result'),
     ],
 )
@@ -433,3 +438,27 @@ def test_a_map_of_many_points_is_stored_as_an_image(many: xr.Dataset, tmp_path: 
     for get_map_data in (field_map, validity):
         save_figure(draw(get_map_data(fine), Look(3.5)), tmp_path / f"large.{form}")
         assert (tmp_path / f"large.{form}").stat().st_size < 400_000
+
+
+def test_the_name_above_a_panel_has_at_most_three_lines() -> None:
+    sweep = {"v1": [1.0, 2.0], "e": [0.5, 0.9], "m1": 1.0, "m2": 1.0, "K": 6e9}
+    keys = ["lammps-coeff-restitution-hertz", "hertz"]
+    figure = draw(field_map(impact.sweep({"models": keys, "sweep": sweep})), Look(width="84mm"))
+    figure.draw_without_rendering()
+    long, short = (axes.get_children() for axes in figure.axes[:2])
+    (name,) = (text for text in long if isinstance(text, Text) and "coeff" in text.get_text())
+    assert name.get_text().count("\n") <= 2
+    (other,) = (text for text in short if isinstance(text, Text) and "Hertz" in text.get_text())
+    assert name.get_fontsize() < other.get_fontsize()
+
+
+def test_a_name_of_three_lines_keeps_its_letters(over_speed: xr.Dataset) -> None:
+    map_data = field_map(over_speed)
+    long = replace(
+        map_data.panels[0], label="Modia3D (v0.6.0 to v0.12.3, since February 2022), with a limit of 1 m/s"
+    )
+    figure = draw(replace(map_data, panels=(long, *map_data.panels[1:])), Look(width=7.1))
+    figure.draw_without_rendering()
+    first, second = (next(t for t in axes.get_children() if t is axes._left_title) for axes in figure.axes[:2])
+    assert first.get_text().count("\n") == 2
+    assert first.get_fontsize() == second.get_fontsize()

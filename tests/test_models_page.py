@@ -172,6 +172,12 @@ def test_the_restitution_depends_on_the_speed_where_a_parameter_has_a_scale() ->
     assert plastic <= dependent | {key for key in plastic if laws[key].same_as}
 
 
+def test_the_closed_form_of_a_law_is_a_formula_or_a_function() -> None:
+    exact, approach = (law_pages.closed_form(catalogue()[key].oracle) for key in ("flores-2011", "kelvin-voigt"))
+    assert exact.startswith("`e_out = delivered_restitution(chi)`<br>`delivered_restitution`: ")
+    assert approach.startswith("`e_out = ")
+
+
 @pytest.mark.slow
 def test_the_example_of_every_page_of_a_law_runs() -> None:
     pages = law_pages.law_pages()

@@ -4,19 +4,22 @@ from __future__ import annotations
 
 import re
 import sys
+from base64 import b64encode
 from pathlib import Path
 
 import nbformat
 import pytest
 import xarray as xr
 from matplotlib.colors import same_color
+from nbformat.v4 import new_code_cell, new_notebook, new_output
 
 import impact
+from impact.plots.layout import Picture
 
 from .conftest import ROOT
 
 sys.path.insert(0, str(ROOT / "scripts"))
-from notebooks import NOTEBOOKS, executed, texts
+from notebooks import NOTEBOOKS, as_stored, executed, texts
 
 PATHS = sorted(NOTEBOOKS.glob("*.ipynb"))
 
@@ -35,6 +38,15 @@ def test_there_is_a_notebook_for_each_question_and_each_has_its_pictures() -> No
         shown = texts(nbformat.read(path, as_version=4))
         assert ["picture"] in shown, path.name
         assert path.stat().st_size < 500_000, path.name
+
+
+def test_a_cell_has_the_text_of_its_picture_for_screen_readers() -> None:
+    figure = Picture(1.0, "Loop")
+    png, metadata = figure._repr_png_()
+    data = {"image/png": b64encode(png).decode()}
+    output = new_output("display_data", data, metadata={"image/png": metadata})
+    (cell,) = as_stored(new_notebook(cells=[new_code_cell(outputs=[output])])).cells
+    assert cell.metadata == {"mystnb": {"image": {"alt": "Loop"}}}
 
 
 def test_a_notebook_calls_the_controls_and_shows_a_picture_of_them() -> None:

@@ -154,7 +154,9 @@ def test_labels_name_what_differs(beads: xr.Dataset) -> None:
     hooke = model_label(beads.isel(model=1, mu=0, angle=0))
     assert conditions_of(alone).startswith(f"Beads: {hooke}, ".replace("\N{NO-BREAK SPACE}", " "))
     assert hooke not in curves_of(beads, "beta").conditions
-    assert names_of(draw(alone, Look(legend="keys"))) == [CONSTANT, COULOMB]
+    keys = draw(alone, Look(legend="keys"))
+    assert names_of(keys) == [CONSTANT, COULOMB]
+    assert keys.texts[1].get_text().replace("\N{NO-BREAK SPACE}", " ").endswith(f"$k_t$ = 1 MN/m of {CONSTANT}")
     assert "angle" not in conditions_of(alone)
     assert "mu = 0.1" in conditions_of(alone)
     assert "angle = 1°" in conditions_of(curves_of(beads, "beta", x="mu"))
@@ -213,7 +215,7 @@ def test_conditions_of_84_mm_have_three_lines(config: str) -> None:
 def test_more_conditions_have_smaller_letters_and_at_most_three_lines(beads: xr.Dataset) -> None:
     plot_data = curves_of(beads, "beta")
     figures = [
-        draw(replace(plot_data, conditions=", ".join(["e = 0.5"] * count)), Look(width="84mm"))
+        draw(replace(plot_data, conditions=", ".join(["e = 0.5"] * count)), Look(width="84mm", legend="full"))
         for count in (1, 23, 60)
     ]
     one, many, most = (figure.texts[1] for figure in figures)

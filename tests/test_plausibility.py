@@ -81,6 +81,14 @@ def test_the_command_prints_notes_unless_it_is_quiet(cli: Run, tmp_path: Path) -
     assert (quiet.returncode, quiet.stderr) == (0, "")
 
 
+def test_what_a_material_of_the_library_lacks_is_named_with_the_line_of_its_name(tmp_path: Path) -> None:
+    (tmp_path / "c.toml").write_text(
+        'models = "johnson-1985"\n[sweep]\nv1 = 1.0\nR1 = 0.01\nR2 = 0.01\nmaterial = "glass"\n', encoding="utf-8"
+    )
+    with pytest.raises(impact.ConfigError, match=r"c\.toml:6: materials\.glass\.yield_strength: missing"):
+        impact.sweep(tmp_path / "c.toml")
+
+
 def test_plausible_values_of_an_axis_give_no_note(tmp_path: Path) -> None:
     text = SWEEP.replace('E = "210 GPa"', 'E = ["70 GPa", "210 GPa"]')
     assert sweep_with_notes(text, tmp_path / "results.h5")[0] == []

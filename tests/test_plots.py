@@ -192,9 +192,12 @@ def test_restitution_and_its_error_are_the_stored_values(figure6: xr.Dataset) ->
         assert out.model == off.model == size.model == key
         np.testing.assert_array_equal(out.y, figure6["e_out"].sel(model=key))
         np.testing.assert_array_equal(off.y, figure6["e_error"].sel(model=key))
-        # smaller errors are errors of the solver, and a logarithmic axis ends there
-        np.testing.assert_array_equal(size.y, np.maximum(np.abs(off.y), 1e-9))
+        np.testing.assert_array_equal(size.y, np.abs(off.y))
     assert absolute.y_log
+    # smaller errors are errors of the solver, and are drawn at the end of the logarithmic axis
+    assert min(min(size.y) for size in absolute.curves) < 1e-9
+    drawn = draw(get_curve_data(figure6, "error")).axes[1].lines
+    assert min(np.min(np.asarray(line.get_ydata(), float)) for line in drawn) == 1e-9
     assert (signed.bands, absolute.bands) == ((0.05, 0.01), (0.05, 0.01))
 
 
@@ -264,7 +267,11 @@ def test_the_impulse_diagram_ends_where_impulse_and_momentum_say(figure6: xr.Dat
     ("kind", "choice", "words"),
     [
         ("lop", {}, 'no kind "lop"; did you mean "loop"?'),
-        ("loop", {"models": ["gharib-hurmuzlu-2012"]}, "no motion to draw at e = 0.0: closed-form limit"),
+        (
+            "loop",
+            {"models": ["gharib-hurmuzlu-2012"], "sel": {"e": 0.0}},
+            "no motion to draw at e = 0.0: closed-form limit",
+        ),
         ("loop", {"sel": {"e": 0.5}, "models": ["herz"]}, 'no model "herz" in this result'),
         ("loop", {"sel": {"m3": 0.5}}, 'no input "m3" here'),
     ],
@@ -274,6 +281,17 @@ def test_a_motion_that_cannot_be_drawn_is_an_error_of_one_line(
 ) -> None:
     with pytest.raises(UsageError, match=one_line(words)):
         get_curve_data(coarse, kind, **choice)
+
+
+def test_a_motion_is_at_the_middle_of_e_and_names_laws_without_one(coarse: xr.Dataset) -> None:
+    middle = get_curve_data(coarse, "loop")
+    assert "e = 0.5" in conditions_of(middle)
+    assert (len(single_panel(middle).curves), middle.not_drawn) == (3, ())
+    at_zero = get_curve_data(coarse, "loop", sel={"e": 0.0})
+    assert [curve.model for curve in single_panel(at_zero).curves] == ["lankarani-nikravesh-1990"]
+    assert [text.partition(",")[0] for text in at_zero.not_drawn] == [
+        f"{key} (closed-form limit" for key in ("lankarani-nikravesh-1994", "gharib-hurmuzlu-2012")
+    ]
 
 
 def test_an_axis_label_has_one_prefix_of_its_unit(coarse: xr.Dataset) -> None:
@@ -621,6 +639,15 @@ def test_a_wrong_option_is_an_error_of_one_line(
         impact.plot(coarse, **options)  # type: ignore[arg-type]
 
 
+def test_a_height_without_room_for_panels_names_the_least_height(coarse: xr.Dataset) -> None:
+    with pytest.raises(UsageError, match=r"height: got 60mm, expected at least \d+mm at this width") as error:
+        impact.plot(coarse, kind="history", sel={"e": 0.5}, width="84mm", height="60mm")
+    (least,) = re.findall(r"least (\d+mm)", str(error.value))
+    figure = impact.plot(coarse, kind="history", sel={"e": 0.5}, width="84mm", height=least)
+    heights = [axes.get_position().height * float(least[:-2]) for axes in figure.axes]
+    assert all(12.0 <= height < 14.0 for height in heights)
+
+
 def test_a_plot_is_drawn_into_axes_of_the_user(coarse: xr.Dataset) -> None:
     figure = Figure((8.0, 4.0))
     axes = figure.subplots(1, 2)
@@ -652,6 +679,25 @@ def test_a_legend_names_laws_as_asked_for_in_own_and_in_foreign_axes(legend: str
     assert "mine" in [text.get_text() for text in own.legends[0].get_texts()]
 
 
+@pytest.mark.parametrize(
+    ("legend", "end"),
+    [
+        ("full", ""),
+        ("short", ", A = 10 µs of Kuwabara and Kono (1987)"),
+        ("keys", ", A = 10 µs of kuwabara-kono-1987"),
+    ],
+)
+def test_parameters_of_laws_are_in_the_conditions_if_the_legend_lacks_them(legend: str, end: str) -> None:
+    """Two pictures of the same law with other parameters can be told apart."""
+    options = {"model.kuwabara-kono-1987.A": 1e-5}
+    result = impact.sweep(models=["hertz", "kuwabara-kono-1987"], v1=[1.0, 2.0], overrides=options)
+    text = impact.plot(result, kind="restitution", legend=legend).texts[1].get_text()
+    for old, new in (("\N{NO-BREAK SPACE}", " "), ("$", ""), ("\n", " ")):
+        text = text.replace(old, new)
+    assert text.endswith(end)
+    assert ("A = " in text) == bool(end)
+
+
 def test_a_picture_without_legend_and_foreign_axes_without_title(coarse: xr.Dataset) -> None:
     axes = Figure((4.0, 4.0)).subplots(1, 2)
     impact.plot(coarse, kind="restitution", ax=axes[0], legend="none")
@@ -668,7 +714,8 @@ def test_a_notebook_shows_the_picture(coarse: xr.Dataset) -> None:
     png, metadata = figure._repr_png_()  # type: ignore[attr-defined]
     assert png.startswith(b"\x89PNG")
     # what a screen reader reads
-    assert "Coefficient of restitution" in metadata["alt"]
+    assert metadata["alt"].endswith("Velocity after the impact v_i^+ (m/s) over Coefficient of restitution e")
+    assert not re.search(r"[$\\{}]", metadata["alt"])
 
 
 # measured points
@@ -801,6 +848,18 @@ def test_kinds_that_do_not_apply_are_reported_and_others_drawn(
     none = cli("plot", coarse_file, "-k", "map", "-k", "validity", "-o", "c.svg", cwd=tmp_path)
     assert (none.returncode, len(none.stderr.splitlines())) == (2, 2)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a-restitution.svg"]
+
+
+def test_a_picture_without_a_second_axis_names_the_first_beside_one_at_a_value(
+    coarse_file: Path, tmp_path: Path
+) -> None:
+    kinds = ("loop", "validity")
+    files = impact.plot_to_files(coarse_file, tmp_path / "a.svg", kinds=kinds, sel={"e": 0.5})
+    assert files.left_out["validity"].startswith(
+        "validity needs two axes; this result has e alone; sweep a second"
+    )
+    with pytest.raises(UsageError, match="has none left beside the selected values"):
+        get_plot_data(impact.load(coarse_file), "validity", Choice(sel={"e": 0.5}))
 
 
 @pytest.mark.slow

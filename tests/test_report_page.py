@@ -219,7 +219,7 @@ def test_all_models_and_axes_are_named(pages: dict[str, str], wide: xr.Dataset, 
         "e": ["coefficient of restitution", "", "0.2", "1", "3", "even, by 0.4"],
         "v1": ["velocity of ball 1 before the impact", "m/s", "1", "2", "2", "1, 2"],
         "m1": ["mass of ball 1", "kg", "1", "3", "2", "1, 3"],
-        "m2": ["mass of ball 2", "kg", "1", "inf", "2", "varies with m1: 1, inf"],
+        "m2": ["mass of ball 2", "kg", "1", "∞", "2", "varies with m1: 1, ∞"],
         "material2": ["material of ball 2", "", "", "", "2", "soft, hard"],
         "ismail-stronge-2008.gamma": ["plastic loss factor γ", "", "1.5", "4", "2", "1.5, 4"],
     }
@@ -290,21 +290,43 @@ def captions_of(text: str) -> list[str]:
 
 def test_a_figure_says_which_other_axes_matter_and_shows_their_values() -> None:
     # the error of these laws depends on e alone, but for that of Kuwabara and Kono also on the speed
-    inputs = {"e": [0.2, 0.5, 0.9], "v1": [0.1, 1.0], "m1": [1.0, 2.0], "m2": 1.0, "K": 6e9}
+    inputs = {"e": [0.2, 0.5, 0.9], "v1": [0.1, 1.0], "m1": [1.0, 2.0, 3.0, 4.0, 5.0], "m2": 1.0, "K": 6e9}
     free = captions_of(build(impact.sweep({"models": FAIR, "sweep": inputs})))
     of_kind = {caption.partition(". ")[2].partition(" At")[0]: caption for caption in free}
     assert "v1 and m1 do not matter (differences below 0.1%)." in of_kind[CAPTIONS["restitution"]]
     assert "Not drawn: combinations of v1 and m1." in of_kind[CAPTIONS["final-velocities"]]
     others = [caption.partition(". ")[2] for caption in free if "As Figure" in caption]
-    assert others == ["As Figure 1, at v1 = 1 m/s.", "As Figure 1, at m1 = 2 kg."]
+    assert others == [
+        f"As Figure 1, at {value}." for value in ("v1 = 1 m/s", *(f"m1 = {m} kg" for m in range(2, 6)))
+    ]
     assert [caption.partition(".")[0] for caption in free] == [f"Figure {n + 1}" for n in range(len(free))]
     law = {"models": ["kuwabara-kono-1987"], "model": {"kuwabara-kono-1987": {"A": "1 ms"}}}
     fast = captions_of(build(impact.sweep({**law, "sweep": inputs | {"v1": {"geomspace": [0.1, 10.0, 40]}}})))
-    # the last and two between it and the first of forty, which Figure 2 has
+    # the last and four between it and the first of forty, which Figure 2 has
     at = [caption.partition(". ")[2] for caption in fast if "As Figure 2, at v1" in caption]
-    assert at == [f"As Figure 2, at v1 = {speed} m/s." for speed in ("0.464159", "2.15443", "10")]
+    assert at == [
+        f"As Figure 2, at v1 = {speed} m/s." for speed in ("0.257191", "0.661474", "1.51178", "3.88816", "10")
+    ]
     (restitution,) = [caption for caption in fast if CAPTIONS["restitution"] in caption]
-    assert restitution.endswith("Not drawn: 36 values of v1 and combinations of v1 and m1.")
+    assert restitution.endswith("Not drawn: 34 values of v1 and combinations of v1 and m1.")
+
+
+def test_numbers_have_few_digits_and_materials_of_the_library_are_no_change() -> None:
+    inputs = {
+        "e": {"linspace": [0.1, 0.6, 10]},
+        "v1": 1.0,
+        "m1": 1.0,
+        "m2": math.inf,
+        "R1": 0.1,
+        "R2": [0.1, math.inf],
+    }
+    result = impact.sweep({"models": FAIR, "sweep": {**inputs, "material": "steel"}}, overrides=["sweep.v1=2.0"])
+    text = impact.report(result, sections=["inputs", "answer", "config"])
+    assert ["m2", "∞", "mass of ball 2"] in table(text, "Single values")
+    assert [row[4:] for row in table(text, "Swept inputs") if row[0] == "R2"] == [["∞", "2", "0.1, ∞"]]
+    assert not re.search(r"[0-9]\.[0-9]{8}", text.partition('id="config"')[0].partition("<main>")[2])
+    assert "Of the library of materials: steel." in text
+    assert re.findall("--set (.*?)<", text) == ["sweep.v1=2.0"]
 
 
 def drawn_elements(svg: bytes) -> Counter[tuple[str, ...]]:
@@ -374,7 +396,9 @@ def test_failed_points_are_listed() -> None:
     assert f"and {failed - 20} more" in text
     for key, where, why in rows:
         at = dict(part.split("\xa0=\xa0") for part in where.split(", "))
-        point = failures.sel(model=key, **{name: float(value.split("\xa0")[0]) for name, value in at.items()})
+        point = failures.sel(
+            model=key, **{name: float(value.split("\xa0")[0].replace("∞", "inf")) for name, value in at.items()}
+        )
         assert at.keys() == {"e", "v1", "m1", "m2"}
         assert why == impact.contact.status.Status(int(point["status"])).meaning
     few = table(build(failures.isel(model=[1], v1=[1], e=[1])), "Failed points")

@@ -152,7 +152,8 @@ def plot(
 ) -> None:
     """Plot a stored result: by default the final-velocity comparison, Figure 6 of the paper.
 
-    loop, history, impulse and animation integrate one point of the result again; --sel selects it.
+    loop, history, impulse and animation integrate one point of the result again; --sel selects it. By default e
+    has the middle of its axis, and other axes have their first value.
     Of several kinds, those that --sel leaves no axis are drawn over the whole axis, and those that do not apply
     are reported with the reason.
     """

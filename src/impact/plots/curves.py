@@ -87,6 +87,7 @@ class Panel:
     y_unit: str = "1"
     x_log: bool = False
     y_log: bool = False
+    y_floor: float | None = None  # smaller values are drawn at it
     bands: tuple[float, ...] = ()  # distances from zero that are shaded, the widest first
     marks: tuple[Mark, ...] = ()
     x_name: str = ""  # in a result or a time history
@@ -124,9 +125,9 @@ class CurveData:
         }
 
     @property
-    def laws(self) -> set[str]:
-        """The models and pairs that have a curve."""
-        return {curve.law for panel in self.panels for curve in panel.curves if curve.law}
+    def laws(self) -> dict[str, str]:
+        """The models and pairs that have a curve: their labels by key."""
+        return {curve.law: curve.label for panel in self.panels for curve in panel.curves if curve.law}
 
     def long_table(self) -> pd.DataFrame:
         """Make a row for each point of a curve, and for each measured point."""
@@ -195,7 +196,8 @@ class CurveData:
             for curve in panel.curves:
                 chosen_name = labels.get(curve.law or "reference")
                 name = chosen_name or pretty_conditions(curve.label)
-                (line,) = axes.plot(curve.x, curve.y, label=f"_{name}", **_line_style(curve, panel, styles))
+                y = curve.y if panel.y_floor is None else np.maximum(curve.y, panel.y_floor)
+                (line,) = axes.plot(curve.x, y, label=f"_{name}", **_line_style(curve, panel, styles))
                 if name:
                     entries.setdefault(name, line)
                 if curve.least:

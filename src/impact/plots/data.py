@@ -55,8 +55,8 @@ class PlotData(Protocol):
         """The names whose text a user can replace: axes, variables and models."""
 
     @property
-    def laws(self) -> set[str]:
-        """The keys of the models and pairs among the names."""
+    def laws(self) -> dict[str, str]:
+        """The names of the models and pairs with their parameters, by key."""
 
     def long_table(self) -> pd.DataFrame:
         """Make a tidy table: a row for each point."""

@@ -21,7 +21,15 @@ from ..results.single_impact import Impact, histories
 from ..results.xarray_backend import result_of
 from .data import PlotData, Points, read_points
 from .kinds import DEFAULT_LEGENDS, STUDIES, Choice, Look, default_kind, find_kind
-from .labels import check_labels, escape_mathtext, legend_labels, pretty_conditions, tick_with_comma, with_comma
+from .labels import (
+    check_labels,
+    escape_mathtext,
+    legend_labels,
+    parameters_of_laws,
+    pretty_conditions,
+    tick_with_comma,
+    with_comma,
+)
 from .layout import LEGEND_PART, Picture
 from .style import default_size, styled
 
@@ -66,7 +74,7 @@ def plot(
     y : second axis of a map, or of the kind validity; by default the next one
     variable : name of the variable that a map or a band shows; by default e_error for a map, e_out for a band
     sel : values of the other axes, such as `{"m2": 1.0}`; the default is the first value. A loop, a history
-        or an impulse may be at a point that is not on the grid
+        or an impulse may be at a point that is not on the grid, and is at the middle of an axis of e by default
     models : keys of the models to show; by default all
     log : which axes are logarithmic, such as "x" or "xy"; axes with logarithmic spacing are in any case
     points : measured points over the curves: a CSV file, or a table of pandas or xarray, whose columns have names
@@ -122,7 +130,9 @@ def get_plot_data(
         frictions = choice.frictions
         if found.of_friction and "friction" in dataset.dims:
             frictions = frictions or dataset["friction"].values.tolist()
-        return found.data(histories(dataset, choice.models, choice.sel or {}, plugin_set, frictions), choice)
+        motions, left_out = histories(dataset, choice.models, choice.sel or {}, plugin_set, frictions)
+        plot_data = found.data(motions, choice)
+        return replace(plot_data, not_drawn=(*left_out, *plot_data.not_drawn))
     return found.data(dataset, choice)
 
 
@@ -154,6 +164,14 @@ def draw(
         figure = all_axes[0].get_figure(root=True)
         assert figure is not None
         return figure
+    picture = _picture_with_room(plot_data, look, measured, heading)
+    with styled(look.style):
+        picture.check_panels()
+    return picture
+
+
+def _picture_with_room(plot_data: PlotData, look: Look, measured: Points | None, heading: str) -> Picture:
+    """Draw a picture in a new figure, with the longest names with which the legend has room if none are chosen."""
     if look.legend is not None or not plot_data.laws:
         return _new_picture(plot_data, look, measured, heading)
     shares = {}
@@ -178,14 +196,19 @@ def _new_picture(
     with styled(look.style):
         (width, height), (default_width, default_height) = look.size, default_size()
         width, height = width or default_width, height or default_height
-        texts = (heading, pretty_conditions(plot_data.conditions)) if look.title else ()
+        names = _labels(plot_data, look)
+        # names with parameters are those of the legend alone
+        parameters = parameters_of_laws(plot_data.laws, names) if look.legend not in (None, "full") else ""
+        conditions = ", ".join(filter(None, (pretty_conditions(plot_data.conditions), parameters)))
+        texts = (heading, conditions) if look.title else ()
         picture = Picture(width, *texts)
         picture.has_legend_rows = legend_rows
         all_axes, panels_height = plot_data.place_panels(picture, width)
-        entries = _draw_panels(plot_data, all_axes, _labels(plot_data, look), measured, look)
+        entries = _draw_panels(plot_data, all_axes, names, measured, look)
         if look.decimal == "comma":
             for text in picture.header:
                 text.set_text(with_comma(text.get_text()))
+        picture.panels = all_axes
         picture.add_legend(panels_height, height, [] if look.legend == "none" else entries)
     return picture
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -169,8 +168,11 @@ def _read_kinds(
             # a motion is at the selected point
             if find_kind(kind).source == "history":
                 continue
-            with suppress(UsageError):
+            try:
                 plot_data[kind] = _over_selected_axes(kind, dataset, choice, plugins)
+            except UsageError as error:
+                # what is missing on all axes, not beside the selected values
+                reasons[kind] = str(error)
     return (
         {kind: plot_data[kind] for kind in kinds if kind in plot_data},
         {kind: reason for kind, reason in reasons.items() if kind not in plot_data},

@@ -166,6 +166,27 @@ def legend_labels(laws: Collection[str], legend: str) -> dict[str, str]:
     return {law: escape_mathtext(WITH.join(map(short, parts))) for law, parts in keys.items()}
 
 
+def parameters_of_laws(laws: Mapping[str, str], names: Mapping[str, str]) -> str:
+    """Write the parameters in the labels of laws, for a picture with other names that lack them.
+
+    >>> labels = {"kuwabara-kono-1987": f"Kuwabara and Kono (1987), A{NO_BREAK}={NO_BREAK}10 µs", "hertz": "Hertz"}
+    >>> parameters_of_laws(labels, {}).replace(NO_BREAK, " ")
+    '$A$ = 10 µs of kuwabara-kono-1987'
+    """
+    owners: dict[str, dict[str, None]] = {}
+    for pair, label in laws.items():
+        keys = pair.split(WITH)
+        parts = label.rsplit(WITH, len(keys) - 1)
+        # the label of a pair may lack its model, which then is in the conditions
+        for law, part in zip(keys[-len(parts) :], parts, strict=True):
+            parameters = " and ".join(word for word in part.split(", ") if f"{NO_BREAK}={NO_BREAK}" in word)
+            name = names.get(law, escape_mathtext(law))
+            owners.setdefault(pretty_conditions(parameters), {})[name] = None
+    return ", ".join(
+        text if len(owners) == 1 else f"{text} of {' and '.join(of)}" for text, of in owners.items() if text
+    )
+
+
 class LawPart(NamedTuple):
     """What a result has for one model, or for one pair: its label, the keys of both laws, and the data."""
 

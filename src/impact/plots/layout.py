@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import warnings
 from collections.abc import Callable, Sequence
@@ -10,6 +11,7 @@ from typing import Any
 import matplotlib
 import numpy as np
 from matplotlib.artist import Artist
+from matplotlib.axes import Axes
 from matplotlib.backend_bases import RendererBase
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -18,6 +20,8 @@ from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
 
+from ..errors import UsageError
+from ..formatting import argument
 from .style import SOFT, encoded, tint
 
 # space between the parts of a picture, and at its edges
@@ -37,8 +41,10 @@ LEGEND_SHARE = 0.5
 MANY_ENTRIES, LEGEND_PART = 16, 0.2
 # space between columns, in letters
 COLUMN_SPACING = 1.2
-# conditions of more lines have smaller letters, and the last are left out
-MAX_CONDITION_LINES = 3
+# conditions and names of panels of more lines have smaller letters, and the last conditions are left out
+MAX_LINES = 3
+# least height of a panel in a picture whose height the user chose
+MIN_PANEL_MM = 12.0
 
 
 class Picture(Figure):
@@ -61,6 +67,14 @@ class Picture(Figure):
         # part of the height; each entry that is left out counts as another height
         self.legend_share = 0.0
         self.shared: tuple[Text, ...] = ()
+        # of panels whose names have more than MAX_LINES lines
+        self.short_names: dict[Text, str] = {}
+        # the axes without colour bars, and the height [in] that suits them
+        self.panels: list[Axes] = []
+        self.body = 0.0
+        self.has_chosen_height = False
+        # whether the layout found room for the axes
+        self.is_laid_out = True
         # of an animation, which can show each frame
         self.show_frame: Callable[[int], None] | None = None
         self.frame_count = 0
@@ -77,7 +91,9 @@ class Picture(Figure):
         # a notebook shows it even if no backend of matplotlib is selected; `alt` is the text for screen readers
         panels = [f"{axes.get_ylabel()} over {axes.get_xlabel()}" for axes in self.axes if axes.get_ylabel()]
         words = [*(text.get_text() for text in self.header), *panels]
-        return encoded(self, "png"), {"alt": " ".join("; ".join(words).split())}
+        # a screen reader would read the signs of mathtext
+        plain = re.sub(r"\\(?:mathrm|dot)\b|[$\\{}]", "", "; ".join(words))
+        return encoded(self, "png"), {"alt": " ".join(plain.split())}
 
     def set_size_inches(self, w: Any, h: Any = None, forward: bool = True) -> None:
         before = self.get_figwidth()
@@ -88,6 +104,7 @@ class Picture(Figure):
 
     def add_legend(self, body: float, height: float | None, entries: Sequence[tuple[Artist, str]]) -> None:
         """Add the legend, and choose the height [in] for panels of the height `body` if the user chose none."""
+        self.body, self.has_chosen_height = body, height is not None
         width, shown = self.get_figwidth(), list(entries)
         legend = self.place_legend(shown)
         if legend > LEGEND_PART * (height or GAP_INCHES + self.place_header() + body + legend):
@@ -106,6 +123,31 @@ class Picture(Figure):
             legend = self.place_legend([*shown, more])
         self.set_size_inches(width, height)
         self.legend_share = self.legend_height() / self.get_figheight() + len(entries) - len(shown)
+
+    def check_panels(self) -> None:
+        """Raise a UsageError where the height that the user chose leaves no room for the panels."""
+        if not self.has_chosen_height:
+            return
+        chosen, rows = self.get_figheight(), self._row_heights()
+        if self.is_laid_out and min(rows) >= MIN_PANEL_MM:
+            return
+        # everything but the panels has the same height in any picture of this width
+        enough = GAP_INCHES + self.place_header() + self.body + self.legend_height()
+        self.set_size_inches(self.get_figwidth(), enough)
+        rows = self._row_heights()
+        # 1 mm for each row, because numbers at the ends of axes need more or less room
+        least = math.ceil(enough * 25.4 + sum(rows) * (MIN_PANEL_MM / min(rows) - 1.0)) + len(rows)
+        raise UsageError(
+            f"{argument('height')}: got {chosen * 25.4:.0f}mm, expected at least {least}mm at this width, so that "
+            f"panels have {MIN_PANEL_MM:.0f} mm"
+        )
+
+    def _row_heights(self) -> list[float]:
+        """Measure the rows of panels [mm], after the layout."""
+        self.draw_without_rendering()
+        boxes = [axes.get_position(original=True) for axes in self.panels]
+        rows = {round(box.y0, 2): box.height for box in boxes}
+        return [height * self.get_figheight() * 25.4 for height in rows.values()]
 
     def place_legend(self, entries: Sequence[tuple[Artist, str]]) -> float:
         """Put the legend at the bottom in as many columns as fit; returns its height [in]."""
@@ -191,7 +233,7 @@ class Picture(Figure):
         down = self.bbox.height - gap
         for text in self.header:
             self.fit(text, self.bbox.width - 2.0 * gap)
-            if text.get_text().count("\n") >= MAX_CONDITION_LINES:
+            if text.get_text().count("\n") >= MAX_LINES:
                 text.set_fontsize("x-small")
                 self.fit(text, self.bbox.width - 2.0 * gap)
                 if text is not self.title:
@@ -201,13 +243,13 @@ class Picture(Figure):
         return float((self.bbox.height - down) / self.dpi)
 
     def _shorten(self, conditions: Text, max_width: float) -> None:
-        """Leave out the conditions beyond MAX_CONDITION_LINES lines, and say how many they are."""
+        """Leave out the conditions beyond MAX_LINES lines, and say how many they are."""
         whole, _ = self.fitted[conditions]
         parts = whole.split(", ")
         # those of the first lines, of which the end may have no room for the number of the others
-        shown = "\n".join(conditions.get_text().split("\n")[:MAX_CONDITION_LINES])
+        shown = "\n".join(conditions.get_text().split("\n")[:MAX_LINES])
         for count in range(min(len(parts) - 1, len(re.findall(r",\s|,$", shown))), 0, -1):
-            if conditions.get_text().count("\n") < MAX_CONDITION_LINES:
+            if conditions.get_text().count("\n") < MAX_LINES:
                 break
             conditions.set_text(f"{', '.join(parts[:count])}, and {len(parts) - count} more")
             self.fit(conditions, max_width)
@@ -228,8 +270,11 @@ class Picture(Figure):
             left = gap + y_label.get_window_extent(self.renderer).width
         return left / width, below / height, above / height
 
-    def fit_labels(self, height: float) -> list[str]:
-        """Break the labels and titles of all axes to the length of their axis; returns their texts."""
+    def fit_labels(self, height: float, *, may_shrink: bool) -> list[str]:
+        """Break the labels and titles of all axes to the length of their axis; returns their texts.
+
+        Before the first layout the lengths are not those of the picture: no title may shrink.
+        """
         labels = []
         # in a single row of panels of a height [px] a vertical label may be longer than its axis
         rows = len({round(axes.get_position().y0, 1) for axes in self.axes})
@@ -238,12 +283,15 @@ class Picture(Figure):
             box = axes.get_window_extent()
             titles = [text for text in axes.get_children() if isinstance(text, Text) and text not in axes.texts]
             for text in (*titles, axes.xaxis.label, axes.yaxis.label):
-                self.fit(
-                    text,
-                    max(LABEL_SHARE_OF_AXIS * box.height, least)
-                    if text is axes.yaxis.label
-                    else LABEL_SHARE_OF_AXIS * box.width,
-                )
+                across = LABEL_SHARE_OF_AXIS * box.width
+                up = max(LABEL_SHARE_OF_AXIS * box.height, least)
+                self.fit(text, up if text is axes.yaxis.label else across)
+                if may_shrink and text in titles and text.get_text().count("\n") >= MAX_LINES:
+                    text.set_fontsize("x-small")
+                    self.fit(text, box.width)
+                    if text.get_text().count("\n") >= MAX_LINES and text in self.short_names:
+                        text.set_text(self.short_names[text])
+                        self.fit(text, box.width)
                 labels.append(text.get_text())
         return labels
 
@@ -289,13 +337,14 @@ class Layout(ConstrainedLayoutEngine):
         # axes become shorter where a label gets another line, which may change the lines again
         before: list[str] = []
         for _ in range(MAX_LAYOUT_PASSES):
-            labels = fig.fit_labels((1.0 - above - below) * fig.bbox.height)
+            labels = fig.fit_labels((1.0 - above - below) * fig.bbox.height, may_shrink=bool(before))
             if labels == before:
                 break
-            with warnings.catch_warnings():
+            with warnings.catch_warnings(record=True) as caught:
                 # it warns where labels leave no space for the axes; the picture is drawn anyway
-                warnings.filterwarnings("ignore", "constrained_layout not applied", UserWarning)
+                warnings.simplefilter("always")
                 super().execute(fig)
+            fig.is_laid_out = not any("constrained_layout not applied" in str(each.message) for each in caught)
             before = labels
         for axes in fig.axes:
             axes.set_position(np.round(axes.get_position(original=True).bounds, 3))

@@ -115,9 +115,9 @@ class MapData:
         return {self.x, self.y, *variable, *(panel.key for panel in self.panels)}
 
     @property
-    def laws(self) -> set[str]:
-        """The models and pairs that have a panel."""
-        return {panel.key for panel in self.panels if panel.model}
+    def laws(self) -> dict[str, str]:
+        """The models and pairs that have a panel: their labels by key."""
+        return {panel.key: panel.label for panel in self.panels if panel.model}
 
     def long_table(self) -> pd.DataFrame:
         """Make a row for each point of each model; x varies more slowly than y."""
@@ -182,8 +182,13 @@ class MapData:
         mesh, entries = draw_panels(self, all_axes, x, y, labels)
         names = [labels.get(panel.key, pretty_conditions(panel.label)) for panel in self.panels]
         titles = ["Closest model", "Its absolute error"] if self.closest else names
+        # the words of a key are fewer than those of a name
+        short = {pretty_conditions(each.label): each.key.replace("-", " ") for each in self.panels}
+        figure = all_axes[0].figure
         for axes, title in zip(all_axes, titles, strict=True):
-            axes.set_title(title)
+            heading_text = axes.set_title(title)
+            if isinstance(figure, Picture) and title in short:
+                figure.short_names[heading_text] = short[title]
             axes.grid(False)
             axes.set(xscale="log" if self.x_log else "linear", yscale="log" if self.y_log else "linear")
             axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
@@ -193,7 +198,7 @@ class MapData:
             ):
                 largest = max(map(abs, values))
                 label_axis(axis, self.labels[index], name, self.units[index], largest, labels, log=log)
-        if len(all_axes) > 1 and isinstance(figure := all_axes[0].figure, Picture):
+        if len(all_axes) > 1 and isinstance(figure, Picture):
             figure.share_labels(all_axes[0].get_xlabel(), all_axes[0].get_ylabel())
             for axes in all_axes:
                 axes.set(xlabel="", ylabel="")

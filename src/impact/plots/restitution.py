@@ -73,13 +73,18 @@ def error_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     ]
     if not _without_empty(signed):
         raise UsageError("this result has no error of the restitution, which needs a requested e; sweep e")
-    absolute = [
-        replace(curve, y=tuple(np.maximum(np.abs(curve.y), MIN_DRAWN_ERROR).tolist()), variable="abs_e_error")
-        for curve in signed
-    ]
+    absolute = [replace(curve, y=tuple(np.abs(curve.y).tolist()), variable="abs_e_error") for curve in signed]
     panels = [
         Panel("", "Error", tuple(signed), bands=BANDS, y_name="e_error"),
-        Panel("", "Absolute error", tuple(absolute), y_log=True, bands=BANDS, y_name="abs_e_error"),
+        Panel(
+            "",
+            "Absolute error",
+            tuple(absolute),
+            y_log=True,
+            y_floor=MIN_DRAWN_ERROR,
+            bands=BANDS,
+            y_name="abs_e_error",
+        ),
     ]
     return complete(dataset, line, "Error of the restitution", panels, choice)
 

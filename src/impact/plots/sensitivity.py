@@ -69,9 +69,9 @@ class BarData:
         return {"index", *self.inputs, *self.laws}
 
     @property
-    def laws(self) -> set[str]:
-        """The models that have a panel."""
-        return {panel.model for panel in self.panels}
+    def laws(self) -> dict[str, str]:
+        """The models that have a panel: their labels by key."""
+        return {panel.model: panel.label for panel in self.panels}
 
     def long_table(self) -> pd.DataFrame:
         """Make a row for each bar."""

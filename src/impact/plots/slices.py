@@ -128,7 +128,9 @@ def take_plane(dataset: xr.Dataset, kind: str, choice: Choice, keep: Sequence[st
             along.append(x_axis(plain.isel(dict.fromkeys(taken, 0)), None))
         except UsageError:
             kind_option = argument("kind", "restitution")
-            has = f"{along[0]} alone; sweep a second" if along else "none; sweep e and another"
+            has = f"{along[0]} alone" if along else "none"
+            has += " left beside the selected values" if choice.sel else ""
+            has += "; sweep a second" if along else "; sweep e and another"
             raise UsageError(f"{kind} needs two axes; this result has {has}, or use {kind_option}") from None
         dims.append(dataset[along[-1]].dims[0])
     if dims[0] == dims[1]:

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 MAX_SEARCHED = 2**18
 # most combinations of values of other axes at which the numbers of a figure are compared, values of an axis that
 # are drawn, and further figures of a kind
-MAX_COMPARED, MAX_VALUES, MAX_MORE = 48, 4, 4
+MAX_COMPARED, MAX_VALUES, MAX_MORE = 48, 6, 12
 # of the largest number: what is hardly visible
 MAX_DIFFERENCE = 1e-3
 
@@ -362,7 +362,7 @@ def _first_answered_of_model(model_data: xr.Dataset, axes: Sequence[Hashable]) -
 def coordinate_text(coordinate: xr.DataArray) -> str:
     """Write the value of a scalar coordinate with its unit."""
     value = InputName.parse(str(coordinate.name)).word(coordinate.values.item())
-    return prefixed(value, numbered_unit(coordinate), 6)
+    return "∞" if value == math.inf else prefixed(value, numbered_unit(coordinate), 6)
 
 
 def numbered_unit(coordinate: xr.DataArray) -> str:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,8 +19,10 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from ..atomic import check_outputs, write_file
+from ..config.draft import Setting
 from ..config.files import to_plain_data
 from ..config.input_names import InputName, is_input
+from ..config.material_library import library
 from ..config.tables import MATERIAL_QUANTITIES
 from ..contact.evidence import Evidence
 from ..contact.frictions import frictions
@@ -149,7 +152,7 @@ def page(
         name = Path(str(dataset.encoding.get("source", ""))).name
         drawn, left_out = figures_of(dataset, keys, plugins, name, model_count)
     descriptions = [_model_section(dataset.isel(model=index)) for index in range(dataset.sizes["model"])]
-    inputs = inputs_of(dataset)
+    inputs, changes = inputs_of(dataset), read_attribute(dataset.attrs, "config_set")
     lines = str(dataset.attrs.get("config", "")).replace("\r\n", "\n").expandtabs(4).split("\n")
     return template("page.html.j2").render(
         title=page_title(dataset),
@@ -180,8 +183,23 @@ def page(
         models=descriptions,
         evidence=[*(row for model in descriptions for row in model["evidence"]), *_friction_evidence(dataset)],
         config=Markup("\n").join(safe_text(line, MAX_LINE_LETTERS) for line in lines),
-        changes=read_attribute(dataset.attrs, "config_set"),
+        changes=[change for change in changes if not _library_material(change)],
+        library_materials=", ".join(filter(None, map(_library_material, changes))),
     )
+
+
+def _library_material(change: str) -> str:
+    """Name the material of the library that a change sets: a result has it, because the library may change.
+
+    >>> [_library_material(change) for change in ("materials.steel={nu = 0.3}", "sweep.v1=2.0")]
+    ['steel', '']
+    """
+    with suppress(ImpactError):
+        setting = Setting.parse(change)
+        name, value = ".".join(map(str, setting.path[1:])), setting.value
+        if setting.path[:1] == ("materials",) and isinstance(value, dict) and name in library():
+            return name if value.items() <= library()[name].items() else ""
+    return ""
 
 
 def _board_page(dataset: xr.Dataset) -> str:
@@ -356,10 +374,10 @@ def _range(coordinate: xr.DataArray) -> tuple[str, str, str, str]:
     ends, large = ("", ""), is_large(coordinate.variable)
     if large:
         extremes = extremes_of(coordinate.to_dataset(name="values"), "values")
-        ends = (number(extremes.smallest), number(extremes.largest)) if extremes else ends
+        ends = (_number(extremes.smallest), _number(extremes.largest)) if extremes else ends
     elif coordinate.dtype.kind == "f":
         smallest, largest = (end.reduce(coordinate.values, axis=None) for end in (np.fmin, np.fmax))
-        ends = number(float(smallest)), number(float(largest))
+        ends = _number(float(smallest)), _number(float(largest))
     spacing = str(coordinate.attrs.get("equation", "")) or ("–" if large else _spacing(coordinate.values.ravel()))
     if coordinate.name not in coordinate.dims:
         spacing = f"varies with {' and '.join(map(str, coordinate.dims))}: {spacing}"
@@ -380,7 +398,11 @@ def _spacing(values: NDArray[Any]) -> str:
             ratio = np.log(values[-1] / values[0]) / (values.size - 1)
             if np.allclose(np.diff(np.log(values)), ratio, rtol=1e-6, atol=0.0):
                 return f"geometric, by {number(float(np.exp(ratio)))}"
-    return ", ".join(map(number, values[:MAX_VALUES].tolist())) + (", …" if values.size > MAX_VALUES else "")
+    return ", ".join(map(_number, values[:MAX_VALUES].tolist())) + (", …" if values.size > MAX_VALUES else "")
+
+
+def _number(value: object) -> str:
+    return "∞" if value == np.inf else number(value)
 
 
 def _rank_models(dataset: xr.Dataset) -> tuple[Ranking | None, str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain
@@ -32,7 +33,19 @@ ARTICLES = (
     re.compile(r"(?P<title>.+?)\. (?P<howpublished>.+)"),
     re.compile(r"(?P<howpublished>.*)"),
 )
-SPECIAL = re.compile(r"[&%$#_{}]")
+# names of letters of Greek that LaTeX has: "GREEK SMALL LETTER CHI"
+GREEK = {
+    letter: unicodedata.name(letter).rpartition(" ")[2].replace("LAMDA", "LAMBDA")
+    for letter in "αβγδεζηθικλμνξπρστυφχψωΓΔΘΛΞΠΣΥΦΨΩ"
+}
+# what LaTeX does not print as it is
+LATEX = {
+    **{letter: rf"\{letter}" for letter in "&%$#_{}"},
+    **{letter: rf"$\{name.title() if letter.isupper() else name.lower()}$" for letter, name in GREEK.items()},
+    **{"µ": r"$\mu$", "√": r"$\surd$", "∞": r"$\infty$", "≤": r"$\le$", "≥": r"$\ge$", "≈": r"$\approx$"},
+    **{"−": "$-$", "<": "$<$", ">": "$>$"},
+    **{"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"},
+}
 
 
 @dataclass(frozen=True)
@@ -98,7 +111,7 @@ def cite(*laws: str | Path | xr.Dataset | ForceModel | FrictionLaw, plugins: Seq
       volume = {92},
       pages = {156},
       doi = {10.1515/crll.1882.92.156},
-      note = {formula seen in Gharib and Hurmuzlu (2012), equation (10); DOI seen in ...},
+      annote = {formula seen in Gharib and Hurmuzlu (2012), equation (10); DOI seen in ...},
     }
     """
     if not laws:
@@ -128,7 +141,8 @@ def bibtex(law: ForceModel | FrictionLaw) -> str:
     for index, reference in enumerate(law.reference.split("; "), 1):
         kind, fields = _parse_reference(reference or law.title)
         if index == 1:
-            fields |= {"doi": law.doi, "note": _escape(f"formula {law.evidence}")}
+            # styles print a note, and no annote
+            fields |= {"doi": law.doi, "annote": _escape(f"formula {law.evidence}")}
         key = law.key if index == 1 else f"{law.key}-{index}"
         lines = (f"  {name} = {{{text}}}," for name, text in fields.items() if text)
         entries.append("\n".join((f"@{kind}{{{key},", *lines, "}")))
@@ -161,4 +175,15 @@ def _authors(text: str) -> str:
 
 
 def _escape(text: str) -> str:
-    return SPECIAL.sub(r"\\\g<0>", text)
+    r"""Write a text for LaTeX, which knows accented letters, but not letters of Greek or small digits.
+
+    >>> print(_escape("χ of e² and v₀, 3 %"))
+    $\chi$ of e$^2$ and v$_0$, 3 \%
+    """
+    return "".join(LATEX.get(letter) or _in_line(letter) for letter in text)
+
+
+def _in_line(letter: str) -> str:
+    """Write a raised or lowered character as mathematics."""
+    sign = {"<sub>": "_", "<super>": "^"}.get(unicodedata.decomposition(letter).partition(" ")[0])
+    return f"${sign}{unicodedata.normalize('NFKC', letter)}$" if sign else letter

@@ -22,7 +22,7 @@ from ..contact.status import FIRST_FAILURE, FrictionStatus, Status
 from ..contact.variables import OUTPUTS
 from ..display import Block, Displayed, Table, html_of
 from ..errors import UsageError, did_you_mean
-from ..formatting import argument, label, number, percentage, safe_text
+from ..formatting import argument, number, percentage, safe_text
 from .kinds import require_sweep
 from .replay_command import describe_point
 from .schema import columns_along, foreign_dims
@@ -144,10 +144,12 @@ class Ranked:
         ('hertz', '10.0%', '0.9', '0.45', '0', 'e=0.1: e_out 1', '1')
         >>> Ranked("exact-hysteresis", {}, 9, 9, 0, 2e-12, 5e-11, {"e": 0.1}, 0.1, ((0.1, 0.9),)).row
         ('exact-hysteresis', '100%', '<1e-9', '<1e-9', '0', '–', '0.1 to 0.9')
+        >>> Ranked("hertz", {}, 10, 1, 0, 0.45, 0.9, {"e": 1 / 9}, 1.0, ((8 / 9, 1.0),)).row[-2:]
+        ('e=0.111111: e_out 1', '0.888889 to 1')
         """
         errors = map(_error_text, (self.max_error, self.mean_error))
         has_worst = self.at and self.max_error > MIN_ERROR_FLOOR
-        worst = f"{describe_point(self.at)}: {self.output} {number(self.e_out, 4)}" if has_worst else "–"
+        worst = f"{describe_point(self.at, 6)}: {self.output} {number(self.e_out, 4)}" if has_worst else "–"
         return (self.name, self.percent, *errors, f"{self.failed:,}", worst, self._served_text)
 
     @property
@@ -155,7 +157,7 @@ class Ranked:
         """The first ranges that it serves."""
         if self.served is None:
             return "–"
-        ranges = [label(least) + (f" to {label(most)}" if most > least else "") for least, most in self.served]
+        ranges = [number(least) + (f" to {number(most)}" if most > least else "") for least, most in self.served]
         more = f" and {len(ranges) - MAX_RANGES:,} more" if len(ranges) > MAX_RANGES else ""
         return ", ".join(ranges[:MAX_RANGES]) + more or "nowhere"
 

@@ -39,13 +39,13 @@ def inputs_of_model(at: Mapping[str, InputValue]) -> dict[str, InputValue]:
     return {name: value for name, value in at.items() if InputName.parse(name).applies_to(*keys)}
 
 
-def describe_point(at: Mapping[str, float | str]) -> str:
-    """List the inputs of a point for a message, rounded to 12 digits.
+def describe_point(at: Mapping[str, float | str], digits: int = 12) -> str:
+    """List the inputs of a point for a message.
 
     >>> describe_point({"model": "hertz", "e": 0.1 + 0.2})
     'model=hertz, e=0.3'
     """
-    return ", ".join(f"{safe_text(name)}={safe_text(number(value, 12), 60)}" for name, value in at.items())
+    return ", ".join(f"{safe_text(name)}={safe_text(number(value, digits), 60)}" for name, value in at.items())
 
 
 def replay_command(start: Sequence[str], at: Mapping[str, object]) -> str:

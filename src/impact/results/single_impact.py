@@ -473,21 +473,27 @@ def histories(
     at: Mapping[str, object],
     plugins: Plugins,
     frictions: Sequence[str] | None = None,
-) -> list[xr.Dataset]:
+) -> tuple[list[xr.Dataset], list[str]]:
     """Integrate the histories of one point by several models; a dataset that is a time history is returned.
 
-    Values of `at` need not be on the grid, and other axes take their first value. A parameter of one model is
+    Also returns the models without a history there, each with the reason. Values of `at` need not be on the grid;
+    an axis of e takes its middle value, because many laws have no motion at e = 0, and other axes take their first
+    value. A parameter of one model is
     ignored by the others. An unknown model or input, and a point without a history, are UsageErrors. A result with
     friction laws has the history of each model with the first friction law that it can be combined with, or those
     of all pairs with `frictions`.
     """
     if "t" in dataset.dims:
-        return [dataset]
+        return [dataset], []
     keys = _chosen_keys(dataset, "model", models)
     friction_keys = _chosen_keys(dataset, "friction", frictions) if "friction" in dataset.coords else []
     integrator = str(dataset.attrs.get("integrator", EXACT))
     if integrator != EXACT:
         raise UsageError(f"no motion to draw in this result: {no_motion(integrator)}")
+    along_e = [name for name, coordinate in dataset.coords.items() if coordinate.dims == ("e",)]
+    if along_e == ["e"] and "e" not in at:
+        values = np.sort(dataset["e"].values)
+        at = {"e": float(values[values.size // 2]), **at}
     source = replace(open_source(dataset, (), plugins), at_name="sel")
     for changed in changed_plugins(dataset.attrs, plugins, "the result"):
         # a changed law has another motion than the result
@@ -523,7 +529,7 @@ def histories(
         raise UsageError(
             f"no motion to draw at {point}: {reason}; choose a point, such as {argument('sel', {'e': 0.5})}"
         )
-    return datasets
+    return datasets, [f"{key} ({reason})" for key, reason in ends.items() if key not in drawn]
 
 
 def _chosen_keys(dataset: xr.Dataset, dim: str, chosen: str | Sequence[str] | None) -> list[str]:
