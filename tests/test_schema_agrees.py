@@ -216,6 +216,7 @@ BEYOND_DATA += (
     "number from -0.5 to 1.5",
     "expected a fraction",
     "missing, expected",
+    "expected v1 > v2",
 )
 
 
