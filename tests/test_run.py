@@ -368,5 +368,11 @@ def test_an_e_of_the_user_that_a_law_ignores_is_a_note(
 
 
 def test_an_e_that_is_set_without_a_config_is_the_choice_of_the_user() -> None:
-    with pytest.warns(impact.ImpactWarning, match="e = 0.4 is not an input of hertz, which delivers 1$"):
-        impact.run(model="hertz", overrides=["sweep.e=0.4"])
+    with pytest.warns(impact.ImpactWarning, match="e = 0.4 is not an input of mujoco-solref"):
+        impact.run(model="mujoco-solref", overrides=["sweep.e=0.4"])
+
+
+def test_an_elastic_law_is_compared_at_an_e_without_a_note() -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert impact.run(model="hertz", at={"e": 0.4}).values["e_out"] == pytest.approx(1.0)

@@ -337,14 +337,16 @@ def run(
 
 
 def warn_of_ignored_e(config: Config, e_out: float) -> None:
-    """Warn if the law of a config without axes ignores its e, and delivers another restitution."""
+    """Warn if the law of a config without axes has another damping than e, and delivers another restitution."""
     law, e = config.models[0], config.scalars.get("e", math.nan)
     is_used = "e" in with_base_quantities(law.quantities) or any(law.may_use_e for law in config.frictions)
-    if is_used or not isinstance(e, float) or e != e or e_out != e_out or number(e_out) == number(e):
+    # an elastic law has no damping to find
+    if is_used or not law.damping or not isinstance(e, float):
+        return
+    if e != e or e_out != e_out or number(e_out) == number(e):
         return
     way = f"impact solve --model {law.key} --for {law.damping} --target e_out={number(e)} finds the parameter"
-    delivered = f"e = {number(e)} is not an input of {law.key}, which delivers {number(e_out)}"
-    warn(f"{delivered}; {way}" if law.damping else delivered)
+    warn(f"e = {number(e)} is not an input of {law.key}, which delivers {number(e_out)}; {way}")
 
 
 def no_motion(integrator: str) -> str:
