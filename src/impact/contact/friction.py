@@ -60,7 +60,10 @@ class FrictionLaw:
     Parameters
     ----------
     key : kebab-case name, unique in the catalogue
-    title, year, reference, doi : name, year and sources of the law, separated by semicolons; the DOI of the first
+    title : the authors, or the name of the law in its code
+    year : with which the law is named
+    reference : sources of the law, separated by semicolons
+    doi : of the first source
     equation : the law in one line of Unicode
     kind : "coulomb", f = mu N; "spring", a spring and a dashpot limited by mu N; "dashpot", limited by mu N;
         "regularized", f = mu(g) N; or "cone", a dashpot limited by mu N, where N grows with what exceeds the limit

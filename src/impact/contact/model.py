@@ -142,7 +142,10 @@ class ForceModel:
     Parameters
     ----------
     key : kebab-case name, unique in the catalogue
-    title, year, reference, doi : name, year and sources of the law, separated by semicolons; the DOI of the first
+    title : the authors, or the name of the law in its code
+    year : with which the law is named
+    reference : sources of the law, separated by semicolons
+    doi : of the first source
     equation : the law in one line of Unicode
     evidence : where the formula and the DOI were read or derived, or that they were not verified
     domain : closed intervals in which the law is reported to hold, by the name of an input or derived quantity
