@@ -213,7 +213,7 @@ WARM_UP_MODULES = (
     "impact.inverse.solve",
     "impact.uncertainty.sensitivity",
     "impact.exporters.export",
-    "impact.reporting.page",
+    "impact.reporting.report",
     "impact.results.extend",
     "impact.results.shards",
 )

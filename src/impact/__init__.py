@@ -90,8 +90,8 @@ if TYPE_CHECKING:
     from .plots.explore import explore as explore
     from .plots.files import plot_to_files as plot_to_files
     from .progress_display import progress_bar as progress_bar
-    from .reporting.explorer import page as page
-    from .reporting.page import report as report
+    from .reporting.page import page as page
+    from .reporting.report import report as report
     from .results.board import Board as Board
     from .results.citations import Citations as Citations, cite as cite
     from .results.describe import describe as describe
@@ -156,14 +156,14 @@ _MODULES = {
     "materials": "config.material_library",
     "merge": "results.shards",
     "models": "engine.model_catalogue",
-    "page": "reporting.explorer",
+    "page": "reporting.page",
     "plot": "plots.draw",
     "plot_to_files": "plots.files",
     "power": "contact.powers",
     "prepare": "inverse.prepared",
     "progress_bar": "progress_display",
     "recommend": "results.ranking",
-    "report": "reporting.page",
+    "report": "reporting.report",
     "rerun": "comparison.rerun",
     "run": "results.single_impact",
     "save": "results.xarray_backend",

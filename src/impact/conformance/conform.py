@@ -12,7 +12,7 @@ from tempfile import TemporaryDirectory
 from ..atomic import check_outputs
 from ..errors import UsageError, did_you_mean
 from ..formatting import argument, number
-from ..reporting.page import report
+from ..reporting.report import report
 from ..results.board import CHECKS, Board, EngineChecks, board_dataset
 from ..results.schema import CHECK_STATUSES
 from ..results.xarray_backend import save

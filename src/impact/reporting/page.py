@@ -1,479 +1,261 @@
-"""The report: a result as one page of HTML, without network access or scripts; texts of a file are escaped.
+"""A result to look at in a browser: one file of HTML, with what was integrated and no law and no integrator.
 
-`page.html.j2` is the template, `board.html.j2` that of a board; this module gives them plain values.
+The outputs follow from it by a few formulas, in `page.js`; `page.html.j2` is the template.
 """
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterator, Sequence
-from contextlib import suppress
-from importlib.resources import files
+import base64
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-from urllib.parse import quote
 
 import numpy as np
-from jinja2 import Environment, FunctionLoader, StrictUndefined, Template
 from markupsafe import Markup
 from numpy.typing import NDArray
 
+from .._version import __version__
+from ..array_types import Array
 from ..atomic import check_outputs, write_file
-from ..config.draft import Setting
-from ..config.files import to_plain_data
-from ..config.input_names import InputName, is_input
-from ..config.material_library import library
-from ..config.tables import MATERIAL_QUANTITIES
-from ..contact.evidence import Evidence
-from ..contact.frictions import frictions
-from ..contact.model import ForceModel
-from ..contact.models import catalogue
-from ..engine.plan import Plan
-from ..engine.plugins import read_plugins
-from ..errors import ImpactError, UsageError, did_you_mean
-from ..formatting import argument, number, prefixed, safe_text, scaled_unit, with_year
-from ..plots.slices import varying_inputs
-from ..results.attributes import read_attribute
-from ..results.board import BOARD_HEADINGS, Board, board_rows, check_rows, engine_headline, failure_lines
-from ..results.calibration import (
-    FIT_HEADINGS,
-    calibration_title,
-    describe_data,
-    fit_notes,
-    fit_rows,
-)
-from ..results.kinds import is_board, is_calibration, is_sensitivity
-from ..results.plausibility import input_notes, inputs_of, result_notes, with_depths
-from ..results.provenance import stored_config
-from ..results.ranking import DEFAULT_TOL, Ranking, rank_models, rankable_parts
-from ..results.replay_command import describe_point
-from ..results.schema import FIT_STATUSES, count_points, exponents_of
+from ..config.grid import SAMPLE, Axis
+from ..config.input_names import InputName
+from ..contact.status import FIRST_FAILURE
+from ..contact.variables import OUTPUTS
+from ..engine.build_impacts import build_impacts, mass_at, restitution_at, velocity_at
+from ..engine.inputs import Inputs
+from ..errors import UsageError
+from ..formatting import argument, with_year
+from ..plots.explore import axes_of, axis_label, shown_values
+from ..plots.slices import conditions_of, unit_of
+from ..plots.style import is_geometric, model_styles
+from ..results.factored import read_inputs
 from ..results.selection import law_positions
-from ..results.sensitivity import INDEX_HEADINGS, describe_design, describe_study, index_rows, iterate_studies
-from ..results.slabs import MAX_SUMMARY_POINTS, is_large
-from ..results.summary import Summary, extremes_of, summarize
-from ..results.xarray_backend import result_of
-from .figures import Figure, at_text, coordinate_text, figures_of, numbered_unit
+from ..results.trajectory_table import TrajectoryTable, table_of_result
+from ..results.xarray_backend import open_result, result_of
+from .report import page_title, template
 
 if TYPE_CHECKING:
     import xarray as xr
 
-# the most that is shown: letters of a text and of a line of the config, values of an axis, failed points
-MAX_TEXT_LETTERS, MAX_LINE_LETTERS, MAX_VALUES, MAX_FAILED = 2000, 100_000, 8, 20
-# of the page of a result, in their order
-SECTIONS = ("inputs", "answer", "figures", "friction", "failures", "computed", "models", "config", "commands")
-# letters of the title at the top of a printed page
-MAX_RUNNING_LETTERS = 80
-# with more than MAX_FIGURE_MODELS models the figures show the BEST_MODELS best
-MAX_FIGURE_MODELS, BEST_MODELS = 12, 8
+SHOWN = ("e_out", "e_error", "v1_post", "v2_post", "v1_error", "v2_error", "peak_force", "contact_time")
+# columns of a trajectory, in the contact's own units, by the names of the outputs that follow from them
+TRAJECTORY = {"e_out": "e_out", "peak_force": "force", "contact_time": "contact_time", "status": "status"}
+# inputs of each ball
+OF_BALLS = {"v": velocity_at, "m": mass_at}
+MAX_BYTES = 10_000_000
+VALUE_BYTES = 8
+# pixels of a line of one point of the plots
+DASH_PIXELS = 1.6
 
 
-def report(
+def page(
     dataset: xr.Dataset | str | Path,
     *,
     output: str | Path | None = None,
     overwrite: bool = False,
-    plugins: Sequence[ForceModel | str | Path] = (),
     models: Sequence[str] | None = None,
-    sections: Sequence[str] | None = None,
 ) -> str:
-    """Write a result as one page of HTML, which needs no network and runs no scripts.
+    """Write a result as one page of HTML with controls, which needs neither Python nor a network.
+
+    It draws the restitution, velocities after the impact, their errors, the peak force and the contact time over
+    any axis, with a slider for each other one. Values at points of the grid are those of the result.
 
     Parameters
     ----------
     dataset : a result, or the file of one
     output : file to write the page to as well, whose name ends in .html
     overwrite : replace the output if it exists
-    plugins : plug-in models that the result was computed with; without them the figures of a motion are left out
     models : keys of the models to show; by default all
-    sections : names of SECTIONS, of which those are written that the result has; by default all. Figures of
-        friction are in the section friction
 
     Returns
     -------
-    str : the page, as HTML
+    str : the page
 
     Raises
     ------
-    UsageError, ResultError : it is a time history, or its attributes are not those of a result; there is no such
-        model or section; the output exists, or has another ending
+    UsageError, ResultError : it is not the result of a sweep with an axis, it takes more than 10 MB, there is no
+        such model; the output exists, or has another ending
 
     >>> import impact
     >>> result = impact.sweep("configs/figure6.toml", overrides=["models=hertz", "sweep.e=[0.5, 1.0]"])
-    >>> "<h1>Final velocities comparison</h1>" in impact.report(result)
+    >>> "<h1>Final velocities comparison</h1>" in impact.page(result)
     True
     """
     if output is not None:
         output = Path(output)
         if output.suffix.lower() not in (".html", ".htm"):
             raise UsageError(f"{output}: expected a name that ends in .html")
-        check_outputs([output], [dataset, *plugins], overwrite=overwrite)
-    text = page(result_of(dataset), plugins, models, sections)
+        check_outputs([output], [dataset], overwrite=overwrite)
+    # a file of a trajectory table is not expanded
+    opened = open_result(dataset) if isinstance(dataset, str | Path) else result_of(dataset)
+    with opened:
+        text = _page_of(opened, models)
     if output is not None:
         write_file(output, text.encode(), overwrite=overwrite)
     return text
 
 
-def page(
-    dataset: xr.Dataset,
-    plugins: Sequence[ForceModel | str | Path] = (),
-    models: Sequence[str] | None = None,
-    sections: Sequence[str] | None = None,
-) -> str:
-    """Write a result as one page of HTML; for errors see `report`."""
-    for name in sections or ():
-        if name not in SECTIONS:
-            raise UsageError(f'{argument("sections")}: no section "{name}"; {did_you_mean(name, SECTIONS)}')
-    if is_board(dataset):
-        for name, value in (("models", models), ("sections", sections)):
-            if value:
-                raise UsageError(f"{argument(name)}: does not apply to the page of a board")
-        return _board_page(dataset)
-    if "model" not in dataset.dims:
-        raise UsageError("got a time history, expected the result of a sweep")
-    model_count, part_notes = dataset.sizes["model"], []
-    models, _ = to_plain_data(models)
-    if models:
-        dataset = dataset.isel(model=law_positions(models, dataset))
-        part_notes = [f"this page shows {dataset.sizes['model']} of the {model_count} models of the result"]
-    sections = sections or SECTIONS
-    summary = with_depths(summarize(dataset, MAX_FAILED), dataset)
-    fits = _fits_section(dataset) if is_calibration(dataset) else None
-    studies = list(_studies(dataset)) if is_sensitivity(dataset) else []
-    ranked, headline = (None, "") if fits or studies else _rank_models(dataset)
-    keys = [str(key) for key in dataset["model"].values]
-    selection = ""
-    if len(keys) > MAX_FIGURE_MODELS:
-        best = [row.model for row in ranked.models] if ranked else keys
-        selection = f"The figures show {BEST_MODELS} of the {len(keys)} models: {', '.join(best[:BEST_MODELS])}."
-        keys = best[:BEST_MODELS]
-    drawn, left_out = list[Figure](), list[str]()
-    if {"figures", "friction", "commands"} & {*sections}:
-        name = Path(str(dataset.encoding.get("source", ""))).name
-        drawn, left_out = figures_of(dataset, keys, plugins, name, model_count)
-    descriptions = [_model_section(dataset.isel(model=index)) for index in range(dataset.sizes["model"])]
-    inputs, changes = inputs_of(dataset), read_attribute(dataset.attrs, "config_set")
-    lines = str(dataset.attrs.get("config", "")).replace("\r\n", "\n").expandtabs(4).split("\n")
-    return template("page.html.j2").render(
-        title=page_title(dataset),
-        summary=f"{describe_data(dataset)}." if fits else "" if studies else _summary_sentence(dataset),
-        fits=fits,
-        studies=studies,
-        index_headings=INDEX_HEADINGS,
-        design=describe_design(dataset),
-        sections=list(sections),
-        notes=[
-            *part_notes,
-            *(input_notes(inputs) if inputs else ()),
-            *_pair_notes(dataset, plugins),
-            *result_notes(summary),
-        ],
-        outcomes=list(_outcomes(summary)),
-        axes=[_axis_row(dataset[name]) for name in varying_inputs(dataset)],
-        single_values=list(_single_values(dataset)),
-        ranking=ranked,
-        headline=headline,
-        selection=selection,
-        figures=drawn,
-        left_out=left_out,
-        running_title=_css_text(page_title(dataset)),
-        failures=_failures_section(dataset, summary),
-        friction=_friction_section(dataset, summary) if "friction" in dataset.dims else None,
-        facts=_facts(dataset),
-        models=descriptions,
-        evidence=[*(row for model in descriptions for row in model["evidence"]), *_friction_evidence(dataset)],
-        config=Markup("\n").join(safe_text(line, MAX_LINE_LETTERS) for line in lines),
-        changes=[change for change in changes if not _library_material(change)],
-        library_materials=", ".join(filter(None, map(_library_material, changes))),
-    )
-
-
-def _library_material(change: str) -> str:
-    """Name the material of the library that a change sets: a result has it, because the library may change.
-
-    >>> [_library_material(change) for change in ("materials.steel={nu = 0.3}", "sweep.v1=2.0")]
-    ['steel', '']
-    """
-    with suppress(ImpactError):
-        setting = Setting.parse(change)
-        name, value = ".".join(map(str, setting.path[1:])), setting.value
-        if setting.path[:1] == ("materials",) and isinstance(value, dict) and name in library():
-            return name if value.items() <= library()[name].items() else ""
-    return ""
-
-
-def _board_page(dataset: xr.Dataset) -> str:
-    """Write a board as one page of HTML."""
-    board = Board(dataset)
-    engines = board.engines
-    return template("board.html.j2").render(
-        title=page_title(dataset),
-        names=[engine["engine"] for engine in engines],
-        rows=board_rows(engines),
-        headings=list(BOARD_HEADINGS),
-        engines=[
-            {
-                "name": f"{engine['engine']} {engine['version']}",
-                "headline": f"{engine_headline(engine)}.",
-                "rows": check_rows(engine),
-                "lines": failure_lines(engine),
-            }
-            for engine in engines
-        ],
-        facts=_facts(dataset),
-        running_title=_css_text(page_title(dataset)),
-    )
-
-
-def _css_text(text: str) -> Markup:
-    """Write a text as a string of a style sheet: all but letters and digits of ASCII are escaped.
-
-    >>> str(_css_text('a "</style>'))
-    '"a\\\\000020\\\\000022\\\\00003c\\\\00002fstyle\\\\00003e"'
-    """
-    shown = safe_text(text, MAX_RUNNING_LETTERS)
-    return Markup('"{}"').format(
-        Markup("").join(c if c.isascii() and c.isalnum() else f"\\{ord(c):06x}" for c in shown)
-    )
-
-
-def page_title(dataset: xr.Dataset) -> str:
-    if is_calibration(dataset):
-        return calibration_title(dataset) or "Calibration"
-    if is_sensitivity(dataset):
-        return f"Which uncertain input matters for {dataset.attrs['of']}"
-    return str(dataset.attrs.get("title", "")) or "Impact of two balls"
-
-
-def _fits_section(dataset: xr.Dataset) -> dict[str, Any]:
-    """Rank the laws of a calibration; explain what the data do not determine, and the columns."""
-    return {
-        "headings": list(FIT_HEADINGS),
-        "rows": [[row[0] or "″", *row[1:]] for row in fit_rows(dataset)],
-        "notes": fit_notes(dataset),
-        "statuses": [f"{name}: {meaning}" for name, meaning in FIT_STATUSES.items() if name != "ok"],
+def _page_of(dataset: xr.Dataset, models: Sequence[str] | None) -> str:
+    if "model" not in dataset.dims or SAMPLE in dataset.dims or not axes_of(dataset):
+        raise UsageError("expected the result of a sweep over an axis; impact report writes a page of any result")
+    positions = law_positions(models, dataset) if models else [*range(dataset.sizes["model"])]
+    table = table_of_result(dataset)
+    if table is None:
+        dataset, positions = dataset.isel(model=positions), [*range(len(positions))]
+        inputs = read_inputs(dataset, axes_of(dataset))
+        arrays = _stored_values(dataset, inputs)
+    else:
+        inputs = table.inputs
+        arrays = _trajectories(table, positions)
+    of_dataset = dataset.isel(model=positions)
+    laws = [{**law, **columns} for law, columns in zip(_laws(of_dataset), arrays, strict=True)]
+    axes = [_axis(dataset, axis) for axis in inputs.axes]
+    content = {
+        "title": page_title(dataset),
+        "reference": "Impulse-momentum",
+        "first_failure": FIRST_FAILURE,
+        "first_axis": _first_axis(axes),
+        "axes": axes,
+        "inputs": {name: _array(values) for name, values in _inputs(inputs).items()},
+        "outputs": [_output(name) for name in SHOWN if name in dataset],
+        "laws": laws,
     }
+    # no text of a result ends the script
+    data = json.dumps(content, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
+    _check_size(len(data))
+    return template("page.html.j2").render(
+        title=content["title"],
+        running_title='""',
+        summary=conditions_of(dataset, *(name for axis in inputs.axes for name in axis.columns)),
+        data=Markup(data),
+        version=__version__,
+    )
 
 
-def _pair_notes(dataset: xr.Dataset, plugins: Sequence[ForceModel | str | Path]) -> list[str]:
-    """Note the pairs of a model and a friction law that have no meaning at some points, as the sweep did."""
-    if "friction" not in dataset.dims:
-        return []
-    try:
-        plugin_set = read_plugins(plugins)
-        config = stored_config(dataset.attrs, (), plugin_set, "the result")
-        return Plan(config, plugin_set.of(config.models)).pair_notes("frictions")
-    except ImpactError:
-        # without its plug-ins, or its config, a result has no law to ask
-        return []
-
-
-def _studies(dataset: xr.Dataset) -> Iterator[dict[str, Any]]:
-    """Describe the output of each model at each point, and the indices of the uncertain inputs."""
-    for point, study in iterate_studies(dataset):
+def _laws(dataset: xr.Dataset) -> Iterator[dict[str, Any]]:
+    """Name the laws, with their style in pictures."""
+    keys = [str(key) for key in dataset["model"].values]
+    styles = model_styles(keys)
+    for key, title, year in zip(keys, dataset["title"].values, dataset["year"].values, strict=True):
+        style = styles[key]
+        dashes = [DASH_PIXELS * length for length in style["linestyle"][1]] if style["linestyle"] != "-" else []
         yield {
-            "point": describe_point(point),
-            "sentence": f"{describe_study(study)}.",
-            "rows": index_rows(study) if study["total"].notnull().any() else [],
+            "key": key,
+            "label": with_year(str(title), int(year)),
+            "color": style["color"],
+            "marker": style["marker"],
+            "dashes": " ".join(map("{:g}".format, dashes)) or "none",
         }
 
 
-def template(name: str) -> Template:
-    """Load a template, which escapes all values."""
-
-    def text(value: object) -> str:
-        return value if isinstance(value, Markup) else safe_text(str(value), MAX_TEXT_LETTERS)
-
-    environment = Environment(
-        loader=FunctionLoader(lambda name: files(__package__).joinpath(name).read_text(encoding="utf-8")),
-        autoescape=True,
-        finalize=text,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
-    return environment.get_template(name)
-
-
-def _summary_sentence(dataset: xr.Dataset) -> str:
-    models, axes = dataset.sizes["model"], [str(dim) for dim in dataset.sizes if dim not in ("model", "friction")]
-    points, over = count_points(dataset), f" over {', '.join(axes)}" if axes else ""
-    return (
-        f"{models:,} model{_plural_s(models)} of the impact of two balls{over}, compared with the "
-        f"impulse-momentum solution: {points:,} point{_plural_s(points)}."
-    )
-
-
-def _friction_section(dataset: xr.Dataset, summary: Summary) -> dict[str, Any]:
-    """Describe the friction laws, and the number of points of pairs by friction status."""
-    laws = [(key, frictions().get(key)) for key in dataset["friction"].values.tolist()]
-    return {
-        "laws": [
-            (key, with_year(law.title, law.year), law.equation, law.reference) if law else (key, "–", "–", "–")
-            for key, law in laws
-        ],
-        "statuses": [
-            (status.name.lower(), f"{count:,}", status.meaning)
-            for status, count in sorted(summary.friction_counts.items())
-        ],
-    }
-
-
-def _friction_evidence(dataset: xr.Dataset) -> Iterator[tuple[str, str, str]]:
-    """List where the formulas of friction laws were read."""
-    for key in dataset["friction"].values.tolist() if "friction" in dataset.dims else ():
-        if key in frictions():
-            yield _evidence_row(key, frictions()[key].evidence)
-
-
-def _evidence_row(key: str, seen: Evidence) -> tuple[str, str, str]:
-    """Describe where the formulas of a law were read."""
-    source = [seen.source, f"DOI seen in {seen.doi}" if seen.doi else "", seen.note]
-    return key, seen.state, "; ".join(filter(None, source)) or "–"
-
-
-def _outcomes(summary: Summary) -> Iterator[str]:
-    """Write the number of points by status."""
-    for status in sorted(summary.counts):
-        yield f"{summary.counts[status]:,} {status.name.lower()}: {status.meaning}"
-    if summary.not_counted:
-        yield f"{summary.not_counted:,} not evaluated: too many different points to count them for a report"
-
-
-def _single_values(dataset: xr.Dataset) -> Iterator[tuple[str, str, str]]:
-    """List name, value and meaning of the inputs and materials that have a single value."""
-    for name, coordinate in dataset.coords.items():
-        if coordinate.ndim == 0 and is_input(name):
-            value = (exponents_of(dataset) if name == "n" else None) or coordinate_text(coordinate)
-            yield str(name), value, str(coordinate.attrs.get("long_name", ""))
-    units = {key: rule.unit for key, rule in MATERIAL_QUANTITIES.items()}
-    for name, material in read_attribute(dataset.attrs, "materials").items():
-        values = (
-            f"{key} = {prefixed(value, units.get(key, '1'))}"
-            for key, value in material.items()
-            if value is not None
+def _check_size(size: int) -> None:
+    """Refuse more bytes than a page has."""
+    if size > MAX_BYTES:
+        raise UsageError(
+            f"its values take more than {MAX_BYTES / 1e6:g} MB; take a part first, by {argument('models')} or "
+            "impact expand RESULT --sel AXIS=VALUE"
         )
-        yield name, ", ".join(values), "material"
 
 
-def _axis_row(coordinate: xr.DataArray) -> tuple[str, ...]:
-    """Describe a coordinate: name, meaning, unit, ends, number of values, and how they are spaced."""
-    meaning = str(coordinate.attrs.get("long_name", ""))
-    unit = numbered_unit(coordinate)
-    if coordinate.dtype.kind == "f" and not is_large(coordinate.variable):
-        values = coordinate.values
-        largest = np.max(np.abs(values), initial=0.0, where=np.isfinite(values))
-        size, unit = scaled_unit(unit, float(largest))
-        coordinate = coordinate.copy(data=values / size)
-    return str(coordinate.name), meaning, unit if unit not in ("", "1") else "", *_range(coordinate)
+def _trajectories(table: TrajectoryTable, positions: Sequence[int]) -> Iterator[dict[str, Any]]:
+    """Collect the trajectories of laws, and what converts them to SI."""
+    index = table.inputs.index()
+    for position in positions:
+        law, trajectory_map = table.laws[position], table.maps[position]
+        # before they are read
+        _check_size(trajectory_map.count * len(TRAJECTORY) * VALUE_BYTES)
+        rows = table.rows.take(position, np.arange(trajectory_map.count))
+        impacts = build_impacts(table.inputs, law, index, table.stiffness[position])
+        _check_size(impacts.K.size * VALUE_BYTES)
+        columns = {
+            name: {**_encoded(getattr(rows, column)), "axes": list(trajectory_map.axes), "is_shared": True}
+            for name, column in TRAJECTORY.items()
+        }
+        cells = trajectory_map.of_cell
+        yield {
+            "is_table": True,
+            "asks_for_e": "e" in law.quantities,
+            "cells": None if cells is None else _encoded(cells.astype(np.int32)),
+            "columns": {**columns, "K": _array(impacts.K), "n": _array(impacts.n)},
+        }
 
 
-def _range(coordinate: xr.DataArray) -> tuple[str, str, str, str]:
-    """Find the ends of a coordinate, the number of values, and how they are spaced."""
-    ends, large = ("", ""), is_large(coordinate.variable)
-    if large:
-        extremes = extremes_of(coordinate.to_dataset(name="values"), "values")
-        ends = (_number(extremes.smallest), _number(extremes.largest)) if extremes else ends
-    elif coordinate.dtype.kind == "f":
-        smallest, largest = (end.reduce(coordinate.values, axis=None) for end in (np.fmin, np.fmax))
-        ends = _number(float(smallest)), _number(float(largest))
-    spacing = str(coordinate.attrs.get("equation", "")) or ("–" if large else _spacing(coordinate.values.ravel()))
-    if coordinate.name not in coordinate.dims:
-        spacing = f"varies with {' and '.join(map(str, coordinate.dims))}: {spacing}"
-    return *ends, f"{coordinate.size:,}", spacing
+def _stored_values(dataset: xr.Dataset, inputs: Inputs) -> Iterator[dict[str, Any]]:
+    """Collect the values of laws that a result stores; outputs that it lacks are left out."""
+    if "e_out" not in dataset:
+        raise UsageError("e_out is not in this result; sweep with it in output.variables")
+    names = [name for name in TRAJECTORY if name in dataset and name != "status"]
+    dims = [axis.name for axis in inputs.axes]
+    others = {*dataset["e_out"].dims} - {"model", *dims}
+    if others:
+        raise UsageError(f"e_out depends on {', '.join(map(str, others))} in this result; select one value of it")
+    _check_size(dataset["e_out"].size * len(names) * VALUE_BYTES)
+    for position in range(dataset.sizes["model"]):
+        values = {
+            name: dataset[name].isel(model=position).transpose(*dims, missing_dims="ignore") for name in names
+        }
+        yield {
+            "is_table": False,
+            "cells": None,
+            "columns": {
+                name: {
+                    **_encoded(np.asarray(array.values, float)),
+                    "axes": [dims.index(str(dim)) for dim in array.dims],
+                }
+                for name, array in values.items()
+            },
+        }
 
 
-def _spacing(values: NDArray[Any]) -> str:
-    """Write the spacing of values, or the values.
-
-    >>> _spacing(np.array([0.0, 0.5, 1.0])), _spacing(np.array([1.0, 10.0, 100.0])), _spacing(np.array([2.0, 1.0]))
-    ('even, by 0.5', 'geometric, by 10', '2, 1')
-    """
-    if values.dtype.kind == "f" and values.size > 2 and np.isfinite(values).all():
-        step = (values[-1] - values[0]) / (values.size - 1)
-        if np.allclose(np.diff(values), step, rtol=1e-6, atol=0.0):
-            return f"even, by {number(step)}"
-        if (values > 0.0).all():
-            ratio = np.log(values[-1] / values[0]) / (values.size - 1)
-            if np.allclose(np.diff(np.log(values)), ratio, rtol=1e-6, atol=0.0):
-                return f"geometric, by {number(float(np.exp(ratio)))}"
-    return ", ".join(map(_number, values[:MAX_VALUES].tolist())) + (", …" if values.size > MAX_VALUES else "")
+def _inputs(inputs: Inputs) -> dict[str, Array]:
+    """What the outputs depend on besides the trajectory, of length 1 along axes on which it does not depend."""
+    index = inputs.index()
+    of_balls = {f"{name}{ball}": at(inputs, ball, index) for name, at in OF_BALLS.items() for ball in "12"}
+    return {**of_balls, "e": restitution_at(inputs, index)}
 
 
-def _number(value: object) -> str:
-    return "∞" if value == np.inf else number(value)
+def _array(values: Array) -> dict[str, Any]:
+    """Encode values over the grid, without the axes along which they do not vary."""
+    axes = [axis for axis, size in enumerate(values.shape) if size > 1]
+    return {**_encoded(np.asarray(values, float)), "axes": axes}
 
 
-def _rank_models(dataset: xr.Dataset) -> tuple[Ranking | None, str]:
-    """Rank the models, if possible, and write the answer in a sentence."""
-    try:
-        ranked = rank_models(rankable_parts(dataset, {}, None, max_points=MAX_SUMMARY_POINTS), DEFAULT_TOL)
-    except UsageError as error:
-        return None, f"The models are not ranked: {error}."
-    return ranked, re.sub("^no ", "No ", f"{ranked.headline}.")
+def _encoded(values: NDArray[Any]) -> dict[str, Any]:
+    """Encode an array in C order, little-endian."""
+    little = np.ascontiguousarray(values, values.dtype.newbyteorder("<"))
+    return {"type": little.dtype.str[1:], "base64": base64.b64encode(little.tobytes()).decode()}
 
 
-def _failures_section(dataset: xr.Dataset, summary: Summary) -> dict[str, Any]:
-    """Describe failed points: sentences, the first points, and the number of the others."""
-    if "status" not in dataset:
-        return {"sentences": ["The result does not contain the status of the points."], "points": [], "more": ""}
-    sentences = [f"The status of {summary.not_counted:,} points was not evaluated."] if summary.not_counted else []
-    if not summary.failed:
-        sentences.append("No other point failed." if summary.not_counted else "No point failed.")
-    axes = [dim for dim in dataset["status"].dims if dim != "model"]
-    points = []
-    for status, model, index in summary.failed_at:
-        point = dataset.isel({"model": model, **dict(zip(axes, index, strict=True))})
-        key = str(point["model"].item())
-        inputs = [name for name in varying_inputs(dataset) if InputName.parse(name).applies_to(key)]
-        points.append((key, at_text(point, inputs) or "–", status.meaning))
-    more = summary.failed - len(points)
-    return {"sentences": sentences, "points": points, "more": f"{more:,}" if more > 0 else ""}
+def _output(name: str) -> dict[str, str]:
+    meaning = OUTPUTS[name].meaning
+    return {"name": name, "label": meaning[:1].upper() + meaning[1:], "unit": OUTPUTS[name].unit}
 
 
-def _facts(dataset: xr.Dataset) -> list[tuple[str, str]]:
-    """List what a result was computed with, its fingerprint and its seal."""
-    attributes, settings = dataset.attrs, ("rtol", "max_steps")
-    packages = read_attribute(attributes, "packages")
-    facts = {
-        "program": f"impact {attributes.get('impact_version', '')}",
-        "packages": ", ".join(f"{name} {version}" for name, version in packages.items()),
-        "solver": ", ".join(f"{name} {number(attributes[name])}" for name in settings if name in attributes),
-        "integrator": attributes.get("integrator", ""),
-        "core": attributes.get("core", ""),
-        "fingerprint": attributes.get("fingerprint", ""),
-        "seal": dataset.encoding.get("seal") or "",
-        "reason": attributes.get("reason", ""),
-        **{
-            f"plug-in {key}": ", ".join(f"{name} {text}" for name, text in plugin if text is not None)
-            for key, plugin in read_attribute(dataset.attrs, "plugins").items()
-        },
-    }
-    return [(name, str(fact)) for name, fact in facts.items() if fact]
-
-
-def _model_section(model_data: xr.Dataset) -> dict[str, Any]:
-    """Describe a model: its reference, and its domain and evidence from the catalogue."""
-    key, title, year, equation, reference, doi = (
-        str(model_data[name].item()) for name in ("model", "title", "year", "equation", "reference", "doi")
-    )
-    declaration = catalogue().get(key)
-    # a plug-in, or another version of the program, may use this key for another law
-    declaration = declaration if declaration is not None and declaration.equation == equation else None
-    evidence = [_evidence_row(key, declaration.evidence)] if declaration else []
-    is_doi = re.fullmatch(r"10\.[0-9]{4,}/\S+", doi)
+def _axis(dataset: xr.Dataset, axis: Axis) -> dict[str, Any]:
+    """Describe an axis of the grid: its values, null where infinite, and their texts with the other columns."""
+    coordinate, word = dataset[axis.name], InputName.parse(axis.name).word
+    has_words = any(isinstance(word(value), str) for value in coordinate.values.tolist())
+    numbers = np.arange(coordinate.size, dtype=float) if has_words else np.asarray(coordinate.values, float)
+    texts = [text for text, _ in shown_values(coordinate)]
+    for name in axis.columns:
+        if name != axis.name:
+            along = [f"{axis_label(name)} = {text}" for text, _ in shown_values(dataset[name])]
+            texts = [f"{text}, {other}" for text, other in zip(texts, along, strict=True)]
     return {
-        "key": key,
-        "title": with_year(title, year),
-        "equation": equation,
-        "reference": reference,
-        "doi": doi,
-        "link": f"https://doi.org/{quote(doi, safe='/', errors='replace')}" if is_doi else "",
-        "domain": declaration.domain_text if declaration else "",
-        "evidence": evidence,
+        "name": axis.name,
+        "label": axis_label(axis.name),
+        "unit": unit_of(coordinate),
+        "values": [value if math.isfinite(value) else None for value in numbers.tolist()],
+        "texts": texts,
+        "has_words": has_words,
+        "is_log": not has_words and is_geometric(np.sort(numbers)),
     }
 
 
-def _plural_s(number: int) -> str:
-    return "" if number == 1 else "s"
+def _first_axis(axes: Sequence[Mapping[str, Any]]) -> int:
+    """Choose e to draw over, else the first axis with several numbers."""
+    several = [number for number, axis in enumerate(axes) if len(axis["values"]) > 1 and not axis["has_words"]]
+    of_e = [number for number in several if axes[number]["name"] == "e"]
+    return (of_e or several or [0])[0]

@@ -86,8 +86,7 @@ def test_a_page_has_no_law_no_network_and_texts_that_do_not_end_its_script(
 
 def test_the_script_and_the_template_are_short() -> None:
     lines = [
-        len((REPORTING / name).read_text(encoding="utf-8").splitlines())
-        for name in ("explorer.js", "explorer.html.j2")
+        len((REPORTING / name).read_text(encoding="utf-8").splitlines()) for name in ("page.js", "page.html.j2")
     ]
     assert sum(lines) < 400
 
