@@ -62,7 +62,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
         pytest.skip(f"no {builder}: `make site` makes it; how the catalogue acts in a browser is not tested")
     folder = tmp_path_factory.mktemp("site")
     # the build writes its generated pages beside its sources
-    for name in ("docs", "scripts", "src", "CHANGELOG.md", "SECURITY.md"):
+    for name in ("docs", "scripts", "src", "configs", "CHANGELOG.md", "SECURITY.md"):
         if (ROOT / name).is_dir():
             shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("reference", "notebooks"))
         else:

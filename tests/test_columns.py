@@ -164,7 +164,7 @@ def test_a_calibration_prints_what_is_left_out_as_notes(folder: Path, cli: Run) 
     notes = ["note: a.csv: 1 of 4 rows has no e_out: left out", "note: a.csv: columns without use: Probe, Datum"]
     assert (done.returncode, done.stderr.splitlines()) == (0, notes)
     (folder / "fit.toml").write_text(text.replace("[data]", '[data]\nmissing = "error"'), encoding="utf-8")
-    assert_refused(cli("calibrate", "fit.toml", cwd=folder), "a.csv:4: e_out: expected a value")
+    assert_refused(cli("calibrate", "fit.toml", cwd=folder), "a.csv:4: Restitution (gemessen): expected a value")
 
 
 V = "v1 [m/s],e_out\n"

@@ -33,7 +33,7 @@ def test_the_toml_and_the_commands_of_daily_use(cli: Run, tmp_path: Path) -> Non
     (toml,) = blocks("toml")
     (tmp_path / "config.toml").write_text(toml, encoding="utf-8")
     commands = [line for block in blocks("sh")[2:] for line in block.splitlines() if line]
-    assert len(commands) == 21
+    assert len(commands) == 22
     for folder in ("configs", "docs"):
         (tmp_path / folder).symlink_to(ROOT / folder)
     (tmp_path / "measured.csv").write_text("e, e_out, sigma\n0.5, 0.45, 0.02\n", encoding="utf-8")
