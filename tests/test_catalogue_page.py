@@ -8,7 +8,6 @@ import shutil
 import subprocess
 import tomllib
 from collections.abc import Iterator
-from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -19,7 +18,7 @@ from impact.contact.models import catalogue
 from impact.exporters.registry import CODES
 
 from .conftest import ROOT
-from .test_explore_in_jupyterlab import Page, answer_of, free_port
+from .test_explore_in_jupyterlab import Page, open_browser
 
 # builds pages of the site: `make test-faults` runs it
 pytestmark = pytest.mark.slow
@@ -93,20 +92,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def page(chromium: str, site: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
     """A page of a browser."""
-    port = free_port()
-    browser = [
-        *(chromium, "--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"),
-        *(f"--remote-debugging-port={port}", f"--user-data-dir={tmp_path_factory.mktemp('profile')}"),
-        "about:blank",
-    ]
-    with ExitStack() as stack:
-        process = stack.enter_context(
-            subprocess.Popen(browser, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        )
-        stack.callback(process.terminate)
-        targets = json.loads(answer_of(f"http://127.0.0.1:{port}/json"))
-        page = Page(next(one["webSocketDebuggerUrl"] for one in targets if one["type"] == "page"))
-        stack.callback(page.socket.close)
+    with open_browser(chromium, tmp_path_factory.mktemp("profile")) as page:
         # a page without the focus has no clipboard
         page.call("Emulation.setFocusEmulationEnabled", enabled=True)
         page.call("Browser.grantPermissions", permissions=["clipboardReadWrite"])

@@ -10,7 +10,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 from urllib.request import urlopen
@@ -169,6 +169,24 @@ def answer_of(address: str, limit_s: float = START_S) -> bytes:
             time.sleep(0.1)
 
 
+@contextmanager
+def open_browser(chromium: str, folder: Path) -> Iterator[Page]:
+    """A page of a browser of its own, whose profile and log are in a folder."""
+    port = free_port()
+    words = [
+        *(chromium, "--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"),
+        *(f"--remote-debugging-port={port}", f"--user-data-dir={folder}/profile", "about:blank"),
+    ]
+    with ExitStack() as stack:
+        log = stack.enter_context((folder / "browser.txt").open("w"))
+        process = stack.enter_context(subprocess.Popen(words, stdout=log, stderr=log, cwd=folder))
+        stack.callback(process.terminate)
+        targets = json.loads(answer_of(f"http://127.0.0.1:{port}/json"))
+        page = Page(next(one["webSocketDebuggerUrl"] for one in targets if one["type"] == "page"))
+        stack.callback(page.socket.close)
+        yield page
+
+
 @pytest.fixture(scope="module")
 def page(chromium: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
     """JupyterLab with a notebook whose cells have run, in a browser."""
@@ -188,9 +206,9 @@ def page(chromium: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Pa
     settings = folder / "settings" / "@jupyterlab" / "apputils-extension" / "notification.jupyterlab-settings"
     settings.parent.mkdir(parents=True)
     settings.write_text('{"fetchNews": "false"}', encoding="utf-8")
-    ports = free_port(), free_port()
+    port = free_port()
     lab = [
-        *(sys.executable, "-m", "jupyterlab", "--no-browser", "--allow-root", f"--port={ports[0]}"),
+        *(sys.executable, "-m", "jupyterlab", "--no-browser", "--allow-root", f"--port={port}"),
         *(
             "--IdentityProvider.token=",
             "--LabApp.expose_app_in_browser=True",
@@ -198,21 +216,14 @@ def page(chromium: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Pa
         ),
         *(f"--LabApp.user_settings_dir={folder}/settings", f"--LabApp.workspaces_dir={folder}/workspaces"),
     ]
-    browser = [
-        *(chromium, "--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"),
-        *(f"--remote-debugging-port={ports[1]}", f"--user-data-dir={folder}/profile", "about:blank"),
-    ]
     with ExitStack() as stack:
         log = stack.enter_context((folder / "log.txt").open("w"))
-        for command in (lab, browser):
-            process = stack.enter_context(subprocess.Popen(command, stdout=log, stderr=log, cwd=folder))
-            stack.callback(process.terminate)
-        answer_of(f"http://127.0.0.1:{ports[0]}/api")
-        targets = json.loads(answer_of(f"http://127.0.0.1:{ports[1]}/json"))
-        page = Page(next(one["webSocketDebuggerUrl"] for one in targets if one["type"] == "page"))
-        stack.callback(page.socket.close)
+        process = stack.enter_context(subprocess.Popen(lab, stdout=log, stderr=log, cwd=folder))
+        stack.callback(process.terminate)
+        answer_of(f"http://127.0.0.1:{port}/api")
+        page = stack.enter_context(open_browser(chromium, folder))
         page.resize(1280, 900)
-        page.call("Page.navigate", url=f"http://127.0.0.1:{ports[0]}/lab/tree/explore.ipynb")
+        page.call("Page.navigate", url=f"http://127.0.0.1:{port}/lab/tree/explore.ipynb")
         page.wait_for(READY, START_S)
         page.wait_for(RUN, START_S, every_s=3.0)
         page.wait_for(f"!!{PICTURE}?.naturalWidth", START_S)

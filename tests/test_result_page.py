@@ -5,9 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
-import subprocess
 from collections.abc import Iterator
-from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -17,9 +15,10 @@ import xarray as xr
 
 import impact
 from impact.errors import UsageError
+from impact.results.xarray_backend import open_result
 
 from .conftest import ROOT, Run
-from .test_explore_in_jupyterlab import Page, answer_of, free_port
+from .test_explore_in_jupyterlab import Page, open_browser
 
 REPORTING = ROOT / "src" / "impact" / "reporting"
 STEEL = {"E": 210e9, "nu": 0.3, "rho": 7850}
@@ -91,6 +90,14 @@ def test_the_script_and_the_template_are_short() -> None:
     assert sum(lines) < 400
 
 
+def test_a_dataset_of_the_user_stays_open(results: dict[str, xr.Dataset], tmp_path: Path) -> None:
+    impact.save(results["part"], tmp_path / "part.h5")
+    # what `impact.load` returns of a large file
+    with open_result(tmp_path / "part.h5") as dataset:
+        impact.page(dataset)
+        assert dataset["energy_loss"].equals(results["part"]["energy_loss"])
+
+
 def test_inputs_that_vary_together_are_named_beside_their_slider() -> None:
     sweep = {"e": [0.5, 0.6], "m1": [1.0, 2.0], "m2": [1.0, math.inf], "zip": [["m1", "m2"]], "K": 1e9, "v1": 1.0}
     _, axis = content_of(impact.page(impact.sweep({"models": "hertz", "sweep": sweep})))["axes"]
@@ -133,20 +140,7 @@ def test_what_a_page_cannot_show_is_refused_in_one_line(results: dict[str, xr.Da
 @pytest.fixture(scope="module")
 def browser(chromium: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
     """A page of a browser."""
-    port = free_port()
-    words = [
-        *(chromium, "--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"),
-        *(f"--remote-debugging-port={port}", f"--user-data-dir={tmp_path_factory.mktemp('profile')}"),
-        "about:blank",
-    ]
-    with ExitStack() as stack:
-        process = stack.enter_context(
-            subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        )
-        stack.callback(process.terminate)
-        targets = json.loads(answer_of(f"http://127.0.0.1:{port}/json"))
-        page = Page(next(one["webSocketDebuggerUrl"] for one in targets if one["type"] == "page"))
-        stack.callback(page.socket.close)
+    with open_browser(chromium, tmp_path_factory.mktemp("profile")) as page:
         page.call("Page.enable")
         yield page
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from .._version import __version__
 from ..array_types import Array
-from ..atomic import check_outputs, write_file
+from ..atomic import write_file
 from ..config.grid import SAMPLE, Axis
 from ..config.input_names import InputName
 from ..contact.status import FIRST_FAILURE
@@ -34,7 +34,7 @@ from ..results.factored import read_inputs
 from ..results.selection import law_positions
 from ..results.trajectory_table import TrajectoryTable, table_of_result
 from ..results.xarray_backend import open_result, result_of
-from .report import page_title, template
+from .report import check_page_path, page_title, template
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -83,17 +83,15 @@ def page(
     >>> "<h1>Final velocities comparison</h1>" in impact.page(result)
     True
     """
+    check_page_path(output, [dataset], overwrite=overwrite)
+    if isinstance(dataset, str | Path):
+        # values of a trajectory table are not computed
+        with open_result(dataset) as opened:
+            text = _page_of(opened, models)
+    else:
+        text = _page_of(result_of(dataset), models)
     if output is not None:
-        output = Path(output)
-        if output.suffix.lower() not in (".html", ".htm"):
-            raise UsageError(f"{output}: expected a name that ends in .html")
-        check_outputs([output], [dataset], overwrite=overwrite)
-    # a file of a trajectory table is not expanded
-    opened = open_result(dataset) if isinstance(dataset, str | Path) else result_of(dataset)
-    with opened:
-        text = _page_of(opened, models)
-    if output is not None:
-        write_file(output, text.encode(), overwrite=overwrite)
+        write_file(Path(output), text.encode(), overwrite=overwrite)
     return text
 
 

@@ -103,15 +103,20 @@ def report(
     >>> "<h1>Final velocities comparison</h1>" in impact.report(result)
     True
     """
-    if output is not None:
-        output = Path(output)
-        if output.suffix.lower() not in (".html", ".htm"):
-            raise UsageError(f"{output}: expected a name that ends in .html")
-        check_outputs([output], [dataset, *plugins], overwrite=overwrite)
+    check_page_path(output, [dataset, *plugins], overwrite=overwrite)
     text = _report_of(result_of(dataset), plugins, models, sections)
     if output is not None:
-        write_file(output, text.encode(), overwrite=overwrite)
+        write_file(Path(output), text.encode(), overwrite=overwrite)
     return text
+
+
+def check_page_path(output: str | Path | None, inputs: Sequence[object], *, overwrite: bool) -> None:
+    """Refuse a page that would replace a file, or whose name is not that of a page."""
+    if output is None:
+        return
+    if Path(output).suffix.lower() not in (".html", ".htm"):
+        raise UsageError(f"{output}: expected a name that ends in .html")
+    check_outputs([Path(output)], inputs, overwrite=overwrite)
 
 
 def _report_of(
