@@ -7,6 +7,7 @@ import math
 import re
 import shlex
 import subprocess
+import time
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -711,7 +712,18 @@ def test_a_script_that_does_not_end_is_stopped(tmp_path: Path) -> None:
         run_program(command, str(tmp_path), 0.5)
     pid = (tmp_path / "pid").read_text(encoding="utf-8").strip()
     status = Path("/proc", pid, "stat")
-    assert not status.exists() or status.read_text(encoding="utf-8").split()[2] == "Z"
+
+    def runs() -> bool:
+        try:
+            return status.read_text(encoding="utf-8").split()[2] != "Z"
+        except (FileNotFoundError, ProcessLookupError):
+            return False
+
+    # a killed process ends a moment later; it would sleep for a minute
+    end = time.monotonic() + 10.0
+    while runs() and time.monotonic() < end:
+        time.sleep(0.01)
+    assert not runs()
 
 
 @pytest.mark.parametrize("reported", ["31 Feb 2025", "99 Foo 2025"])
