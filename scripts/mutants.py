@@ -3,10 +3,10 @@
 A random sample of mutants is drawn: a comparison, an operator or a condition is inverted, a number is changed,
 two arguments are exchanged, a statement is removed. Modules for numba, annotations, decorators and texts stay as
 they are. A package with four times as many places has twice as many mutants. The tests of a mutant are those
-that execute its lines (or anything in functions of its module, if it is executed at import), with the doctests
-of the module: first those within the process, the quickest first, until one fails or the time limit is over.
-Which tests execute which lines is recorded once for each file of tests and state of the code, with coverage.py
-(`pip install coverage`), also in forked commands.
+that execute its lines, with the doctests of the module (if it is executed at import, those that execute anything
+in functions of its module, or else of its package): first those within the process, the quickest first, until
+one fails or the time limit is over. Which tests execute which lines is recorded once for each file of tests and
+state of the code, with coverage.py (`pip install coverage`), also in forked commands.
 
     python scripts/mutants.py [--count 200] [--seed 0] [--packages inverse cli] [--tests tests/test_solve.py ...]
                               [--limit 60] [--only INDEX ...] [--folder build/mutants]
@@ -26,6 +26,7 @@ import functools
 import gc
 import hashlib
 import importlib
+import itertools
 import json
 import os
 import pkgutil
@@ -38,7 +39,7 @@ import sys
 import time
 import traceback
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -53,8 +54,8 @@ LIBRARIES = (
     "scipy.stats scipy.optimize xarray pandas h5netcdf matplotlib.pyplot typer rich jinja2 pydantic pint dask"
 )
 RECORD_S = 120.0  # for a file of tests; the later tests of a slow file are not used
+START_S = 0.05  # of a test in addition to its recorded cost
 GRACE_S = 60.0  # beyond the limit, for the last test that began within it
-MAX_ANEW = 10  # tests of a mutant that is executed at import, each in a new interpreter
 SERVERS = {"forked", "cli", "sweeps"}  # fixtures that start another interpreter
 OUTCOMES = ("killed", "stopped", "survived", "not covered")
 
@@ -367,12 +368,28 @@ class Judge:
 
     def covering_tests(self, mutant: Mutant) -> list[str]:
         """The tests that execute a mutant, the doctests of its module first, the tests of commands last."""
-        costs = {test: [False, 0.0] for test in self.items if test.startswith(f"{mutant.path}::")}
+        costs = {test: (False, 0.0) for test in self.items if test.startswith(f"{mutant.path}::")}
+        costs |= self.costs_of_tests(mutant.path, mutant.lines)
+        if not (costs or mutant.lines):  # a module of data
+            folder = f"{mutant.path.rpartition('/')[0]}/"
+            neighbours = {path for record in self.records for path in record["lines"] if path.startswith(folder)}
+            for path in neighbours:
+                costs |= self.costs_of_tests(path, ())
+        tests = sorted(costs.keys() & self.items.keys(), key=lambda test: (costs[test], test))
+        if mutant.lines:
+            return tests
+        # these run in a new interpreter, which cannot be told to begin no test after the limit
+        ends = itertools.accumulate(costs[test][1] + START_S for test in tests)
+        return [test for test, end in zip(tests, ends, strict=True) if end < self.limit]
+
+    def costs_of_tests(self, path: str, lines: Collection[int]) -> dict[str, tuple[bool, float]]:
+        """The costs of the tests that execute lines, or any line, of functions of a module."""
+        costs: dict[str, tuple[bool, float]] = {}
         for record in self.records:
-            rows = record["lines"].get(mutant.path, {})
-            for line in map(str, mutant.lines) if mutant.lines else rows:
-                costs |= {record["tests"][index]: record["costs"][index] for index in rows.get(line, ())}
-        return sorted(costs.keys() & self.items.keys(), key=lambda test: (costs[test], test))
+            rows = record["lines"].get(path, {})
+            for line in map(str, lines) if lines else rows:
+                costs |= {record["tests"][index]: tuple(record["costs"][index]) for index in rows.get(line, ())}
+        return costs
 
     def run(self, mutant: Mutant | None, tests: list[str]) -> tuple[str, str, int]:
         """Run tests in a child until one fails; return the outcome, the test that noticed, and how many passed."""
@@ -410,7 +427,7 @@ class Judge:
             "no:cacheprovider",
             "--tb=no",
             "-rf",
-            *tests[:MAX_ANEW],
+            *tests,
         ]
         try:
             done = subprocess.run(
@@ -420,9 +437,7 @@ class Judge:
             return "stopped", "", 0
         failed = re.search(r"^FAILED (.*?)( - .*)?$", done.stdout, re.MULTILINE)
         return (
-            ("killed", failed[1] if failed else "import", 0)
-            if done.returncode
-            else ("survived", "", len(tests[:MAX_ANEW]))
+            ("killed", failed[1] if failed else "import", 0) if done.returncode else ("survived", "", len(tests))
         )
 
 
