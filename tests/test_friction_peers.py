@@ -232,8 +232,6 @@ PAIRINGS = (
             values,
             liggghts(model, tangential, " ".join(f"{name} {word}" for name, word in values.items())),
             shortens_arms=True,
-            # each run is a process
-            steps=(12, 31),
             alternates=values == {"tangential_damping": "on"},
         )
         for model in ("hooke", "hertz")

@@ -1,17 +1,11 @@
-"""Two spheres in LIGGGHTS, pair style gran; each collision is a process."""
+"""Two spheres in LIGGGHTS, pair style gran."""
 
 from __future__ import annotations
 
-import os
-import re
-import subprocess
 from collections.abc import Sequence
-from pathlib import Path
 
-from runner import serve
+from liggghts import serve_scripts
 
-# one process needs no network, for which MPI would look each time
-ENVIRONMENT = os.environ | {"OMPI_MCA_pml": "ob1", "OMPI_MCA_btl": "self"}
 SCRIPT = """
 atom_style granular
 atom_modify map array
@@ -43,24 +37,16 @@ run {count}
 """
 
 
-def collide(
+def script(
     model: str, options: str, E: float, nu: float, e: float, vc: float,
     m1: float, m2: float, R1: float, R2: float, v1: float, v2: float, gap: float, step: float, count: int,
     properties: Sequence[str] = (),
-) -> tuple[float, float]:  # fmt: skip
+) -> str:  # fmt: skip
     more = "\n".join(f"fix p{i} all property/global {words}" for i, words in enumerate(properties))
-    script = SCRIPT.format(
+    return SCRIPT.format(
         model=model, options=options, E=E, nu=nu, e=e, vc=vc, x1=-R1 - gap, x2=R2, d1=2 * R1, d2=2 * R2,
         m1=m1, m2=m2, v1=v1, v2=v2, step=step, count=count, properties=more,
     )  # fmt: skip
-    process = subprocess.run(
-        ["liggghts", "-log", "none"], input=script, capture_output=True, text=True, check=False, env=ENVIRONMENT
-    )
-    if process.returncode or "ERROR" in process.stdout:
-        raise RuntimeError(process.stdout + process.stderr)
-    last = dict(line.split() for line in Path("velocities").read_text(encoding="utf-8").splitlines()[-2:])
-    return float(last["1"]), float(last["2"])
 
 
-words = subprocess.run(["liggghts", "-help"], capture_output=True, text=True, check=False).stdout
-serve(re.search(r"LIGGGHTS-PUBLIC ([\d.]+)", words)[1], collide)  # type: ignore[index]
+serve_scripts(script, lambda velocities: (*velocities["1"], *velocities["2"]))

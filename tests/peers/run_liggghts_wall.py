@@ -1,4 +1,4 @@
-"""A sphere and a plane in LIGGGHTS, fix wall/gran; each collision is a process. The plane is z = 0.
+"""A sphere and a plane in LIGGGHTS, fix wall/gran; the plane is z = 0.
 
 A finite R2 replaces the plane by a second sphere at rest, below z = 0.
 """
@@ -6,15 +6,9 @@ A finite R2 replaces the plane by a second sphere at rest, below z = 0.
 from __future__ import annotations
 
 import math
-import os
-import re
-import subprocess
-from pathlib import Path
 
-from runner import serve
+from liggghts import serve_scripts
 
-# one process needs no network, for which MPI would look each time
-ENVIRONMENT = os.environ | {"OMPI_MCA_pml": "ob1", "OMPI_MCA_btl": "self"}
 SCRIPT = """
 atom_style granular
 atom_modify map array
@@ -50,28 +44,24 @@ SPHERE = """create_atoms 1 single 0 0 {z}
 set atom 2 diameter {d} mass {m} vx 0 vy 0 vz 0"""
 
 
-def collide(
+def script(
     model: str, tangential: str, options: str, E: float, nu: float, e: float, vc: float, mu: float,
     m1: float, R1: float, v1: float, u1: float, omega1: float, gap: float, step: float, count: int,
     m2: float = math.inf, R2: float = math.inf,
-) -> tuple[float, float, float]:  # fmt: skip
+) -> str:  # fmt: skip
     second = f"fix 7 all wall/gran model {model} tangential {tangential} primitive type 2 zplane 0.0 {options}"
     if math.isfinite(R2):
         second = SPHERE.format(z=-R2, d=2 * R2, m=m2)
     # the normal points down to the plane, the tangent along x, so that spins are about -y
-    script = SCRIPT.format(
+    return SCRIPT.format(
         model=model, tangential=tangential, options=options, E=E, nu=nu, e=e, vc=vc, mu=mu, x=-u1 * gap / v1,
         z=R1 + gap, d=2 * R1, m=m1, u=u1, vz=-v1, spin=-omega1, step=step, count=count, second=second,
     )  # fmt: skip
-    process = subprocess.run(
-        ["liggghts", "-log", "none"], input=script, capture_output=True, text=True, check=False, env=ENVIRONMENT
-    )
-    if process.returncode or "ERROR" in process.stdout:
-        raise RuntimeError(process.stdout + process.stderr)
-    rows = Path("velocities").read_text(encoding="utf-8").splitlines()[-2 if math.isfinite(R2) else -1 :]
-    u, vz, spin = next(map(float, words[1:]) for words in map(str.split, rows) if words[0] == "1")
+
+
+def rebound(velocities: dict[str, list[float]]) -> tuple[float, float, float]:
+    u, vz, spin = velocities["1"]
     return -vz, u, -spin
 
 
-words = subprocess.run(["liggghts", "-help"], capture_output=True, text=True, check=False).stdout
-serve(re.search(r"LIGGGHTS-PUBLIC ([\d.]+)", words)[1], collide)  # type: ignore[index]
+serve_scripts(script, rebound)

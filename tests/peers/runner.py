@@ -29,8 +29,12 @@ def serve(version: str, collide: Callable[..., tuple[float, ...]]) -> None:
         line, ball 1 on the left, and `gap` apart at the start. At an oblique impact it also gets u1 [m/s] and
         omega1 [rad/s], and returns v1, u1 and omega1 after the contact with a plane.
     """
+    serve_all(version, lambda collisions: [collide(**collision) for collision in collisions])
+
+
+def serve_all(version: str, collide_all: Callable[[list[dict[str, Any]]], list[tuple[float, ...]]]) -> None:
+    """Do the same with a function of all collisions."""
     with open(sys.argv[-2], encoding="utf-8") as stream:
-        collisions: list[dict[str, Any]] = json.load(stream)
-    answers = [collide(**collision) for collision in collisions]
+        answers = collide_all(json.load(stream))
     with open(sys.argv[-1], "w", encoding="utf-8") as stream:
         json.dump({"version": version, "answers": answers}, stream)
