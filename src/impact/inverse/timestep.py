@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, SupportsFloat
 
@@ -74,6 +74,8 @@ NEARBY, MIN_SLOPE = 1.1, 1e-2
 SECANT_TOLERANCE, MAX_SECANTS = 1e-6, 20
 # a contact of more steps than this is none that a parameter is looked for
 MAX_SECANT_STEPS = 4096
+# relative to the tolerance: an error of zero, for its logarithm
+EXACT_ERROR = 1e-300
 # e is kept within this distance
 HELD_E = 1e-8
 # largest logarithm of the factor by which a parameter changes
@@ -523,9 +525,12 @@ def compensated_e(law: FixedStepLaw, dt: Array) -> Array:
 
 
 def needed_steps(
-    law: FixedStepLaw, tol: float, e_continuous: float, most: int = MAX_STEPS_PER_CONTACT
+    law: FixedStepLaw, tol: float, e_continuous: float, most: int = MAX_STEPS_PER_CONTACT, start: int = 2
 ) -> NeededSteps | None:
-    """Bisect for the smallest number of steps per contact with which every phase is within a tolerance."""
+    """Search for the smallest number of steps per contact with which every phase is within a tolerance.
+
+    The search begins at `start`: a number that is enough for a similar law mostly is the answer.
+    """
     target = law.e if law.has_e else e_continuous
     if not target > 0.0:
         raise UsageError(f"{argument('tol')} is relative to e, expected e > 0")
@@ -533,18 +538,27 @@ def needed_steps(
         # no step does what the continuous law does not
         return None
 
-    def is_within(steps: int) -> bool:
+    @cache
+    def log_error(steps: int) -> float:
+        """The logarithm of the largest error over the tolerance; inf where a phase has no rebound."""
         e = law.restitution(np.array([law.contact_time / steps]))
-        return bool((np.abs(e - target) <= tol * target).all())
+        error = float(np.abs(e - target).max()) / (tol * target)
+        return math.log(error or EXACT_ERROR) if math.isfinite(error) else math.inf
 
-    lower, upper = 1, 2
-    while not is_within(upper):
+    lower, upper, turn = start - 1, start, 0
+    if lower > 1 and log_error(lower) <= 0.0:
+        lower, upper = 1, lower
+    while log_error(upper) > 0.0:
         lower, upper = upper, 2 * upper
         if upper > most:
             return None
     while upper - lower > 1:
-        middle = (lower + upper) // 2
-        lower, upper = (lower, middle) if is_within(middle) else (middle, upper)
+        # the error falls roughly as a power of the number of steps; every third time the middle is taken
+        turn += 1
+        is_known = lower > 1 and math.isfinite(log_error(lower)) and turn % 3
+        share = 1.0 / (1.0 - log_error(upper) / log_error(lower)) if is_known else 0.5
+        middle = min(max(round(lower * (upper / lower) ** share), lower + 1), upper - 1)
+        lower, upper = (lower, middle) if log_error(middle) <= 0.0 else (middle, upper)
     return NeededSteps(tol, upper, law.contact_time / upper)
 
 
@@ -596,11 +610,12 @@ def needed_parameter(
         slope = math.log(nearby.contact_time / law.contact_time) / math.log(NEARBY)
     if abs(slope) < MIN_SLOPE:
         raise UsageError(f"{argument('parameter')}: {name} does not set the contact time of {model.key}")
-    changed = config
+    changed, start = config, 2
     for _ in range(MAX_SECANTS):
-        needed = needed_steps(law, tol, collision["e_out"], MAX_SECANT_STEPS)
+        needed = needed_steps(law, tol, collision["e_out"], MAX_SECANT_STEPS, start)
         if needed is None:
             return None
+        start = needed.steps_per_contact
         distance = math.log(law.contact_time / (needed.steps_per_contact * dt))
         if abs(distance) < SECANT_TOLERANCE:
             return NeededParameter(
