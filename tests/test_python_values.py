@@ -311,6 +311,11 @@ def test_errors_are_those_of_python() -> None:
     with pytest.raises(FileNotFoundError, match=r"^no\.py: cannot be read") as missing:
         impact.run(plugins=["no.py"])
     assert isinstance(missing.value, impact.UsageError)
+    drops = {"models": "hertz", "sweep": {"cases": "no.csv"}}
+    fit = {"models": "hertz", "sweep": {"K": {"fit": [1e6, 1e9]}}, "data": {"file": "no.csv"}}
+    for call, config in ((impact.sweep, drops), (impact.run, drops), (impact.calibrate, fit)):
+        with pytest.raises(FileNotFoundError, match=r"(?m)^no\.csv: cannot be read: No such file or directory$"):
+            call(config)
     error = pickle.loads(pickle.dumps(impact.ConfigError("a", "b\n")))
     assert (type(error), error.problems) == (impact.ConfigError, ("a", "b\\x0a"))
 
