@@ -11,6 +11,7 @@ import re
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import suppress
+from dataclasses import is_dataclass
 from pathlib import Path
 from typing import Any
 
@@ -165,8 +166,9 @@ def test_help_names_each_public_name_once_by_its_purpose() -> None:
 
 
 def test_no_signature_shows_an_object_by_its_address() -> None:
-    functions = filter(inspect.isfunction, (getattr(impact, name) for name in impact.__all__))
-    signatures = {function.__name__: str(inspect.signature(function)) for function in functions}
+    members = [getattr(impact, name) for name in impact.__all__]
+    shown_members = [member for member in members if inspect.isfunction(member) or is_dataclass(member)]
+    signatures = {member.__name__: str(inspect.signature(member)) for member in shown_members}
     shown = ("<", " at 0x", "Plan", "Output(")
     assert [name for name, signature in signatures.items() if any(text in signature for text in shown)] == []
 

@@ -1,4 +1,4 @@
-"""Wrong types of arguments: what fails in a public function because of one is a UsageError that names it."""
+"""What users see of public names: errors that name an argument of a wrong type, and signatures."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ import inspect
 import numbers
 import warnings
 from collections.abc import Callable
+from dataclasses import MISSING, fields, is_dataclass
 from functools import wraps
-from types import UnionType
+from types import FunctionType, UnionType
 from typing import Any, ParamSpec, TypeVar, get_origin
 
 from .errors import ImpactError, UsageError
@@ -55,6 +56,27 @@ def name_wrong_types(function: Callable[P, T]) -> Callable[P, T]:
 
     call.__module__ = __package__
     return call
+
+
+def prepare_for_users(member: Any) -> Any:
+    """Make a public name of what a module defines: a function names arguments of wrong types."""
+    if is_dataclass(member) and isinstance(member, type):
+        _show_defaults(member)
+    # formulas of laws call `power`, also with symbols
+    if not isinstance(member, FunctionType) or member.__name__ == "power":
+        return member
+    return name_wrong_types(member)
+
+
+def _show_defaults(kind: type[Any]) -> None:
+    """Let `help` show the defaults of a dataclass, such as {}, in place of `<factory>`."""
+    made = {field.name: field.default_factory for field in fields(kind) if field.default_factory is not MISSING}
+    signature = inspect.signature(vars(kind)["__init__"])
+    parameters = [
+        parameter.replace(default=made[name]()) if name in made else parameter
+        for name, parameter in signature.parameters.items()
+    ]
+    vars(kind)["__init__"].__signature__ = signature.replace(parameters=parameters)
 
 
 def require_counts(**counts: int) -> None:

@@ -103,7 +103,7 @@ class PreparedProblem:
     """
 
     config: Config
-    law: PlanLaw
+    law: ForceModel | Pair
     outputs: tuple[str, ...]
 
     def __repr__(self) -> str:
