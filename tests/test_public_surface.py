@@ -21,6 +21,7 @@ import xarray as xr
 import impact
 from impact.cli import main as program
 from impact.config.tables import Output
+from impact.display import Displayed
 
 from .conftest import ROOT, Run
 from .fork_server import start_fork_server
@@ -87,7 +88,9 @@ def functions() -> Iterator[str]:
         member = getattr(impact, name)
         if inspect.isclass(member):
             fields = getattr(member, "__dataclass_fields__", {})
-            public = {*fields, *vars(member)} - {key for key in vars(member) if key.startswith("_")}
+            # what all results have is not repeated
+            bases = [base for base in member.__mro__ if base.__module__.startswith("impact") and base != Displayed]
+            public = {*fields, *(key for base in bases for key in vars(base) if not key.startswith("_"))}
             yield f"class {name}: {' '.join(sorted(public))}"
         else:
             parameters = inspect.signature(member).parameters.values()
