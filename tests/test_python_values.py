@@ -366,6 +366,8 @@ def test_models_may_be_an_array_of_keys(collect: Callable[[list[str]], Any], res
     assert impact.sweep(models=keys)["model"].values.tolist() == ["tsuji-1992", "hertz"]
     assert len(impact.recommend(result, models=keys)) == 2
     assert impact.plot(result, models=keys).axes
+    assert impact.explore(result, models=keys).children
+    assert "tsuji-1992" in impact.page(result, models=keys)
     assert "tsuji-1992" in impact.report(result.isel(e=[0]), models=keys, sections=["models"])
 
 

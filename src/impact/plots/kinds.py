@@ -72,10 +72,11 @@ class Choice:
 
     def __post_init__(self) -> None:
         # imported here: every command reads the kinds
-        from ..config.files import to_plain_data
+        from ..results.selection import as_keys
 
         for name in ("models", "frictions"):
-            object.__setattr__(self, name, to_plain_data(getattr(self, name))[0])
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, as_keys(getattr(self, name)))
         if self.log not in ("", *LOG_AXES):
             raise UsageError(f"{argument('log')}: got {self.log}, expected {', '.join(LOG_AXES)}")
 

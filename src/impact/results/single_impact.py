@@ -59,6 +59,7 @@ from .plausibility import input_notes
 from .provenance import changed_plugins, stored_config, stored_draft, unknown_plugins
 from .schema import DEFAULT_RTOL_FACTOR, SCHEMA_VERSION, attributes_of, is_case, plain_unit, scale_of
 from .seal import is_result
+from .selection import chosen_laws
 from .xarray_backend import open_result
 
 STARTER_E = "sweep.e=0.5"
@@ -487,8 +488,8 @@ def histories(
     """
     if "t" in dataset.dims:
         return [dataset], []
-    keys = _chosen_keys(dataset, "model", models)
-    friction_keys = _chosen_keys(dataset, "friction", frictions) if "friction" in dataset.coords else []
+    keys = chosen_laws(models, dataset)
+    friction_keys = chosen_laws(frictions, dataset, "friction") if "friction" in dataset.coords else []
     integrator = str(dataset.attrs.get("integrator", EXACT))
     if integrator != EXACT:
         raise UsageError(f"no motion to draw in this result: {no_motion(integrator)}")
@@ -532,16 +533,6 @@ def histories(
             f"no motion to draw at {point}: {reason}; choose a point, such as {argument('sel', {'e': 0.5})}"
         )
     return datasets, [f"{key} ({reason})" for key, reason in ends.items() if key not in drawn]
-
-
-def _chosen_keys(dataset: xr.Dataset, dim: str, chosen: str | Sequence[str] | None) -> list[str]:
-    """List the chosen keys of models or friction laws of a result, each once; by default all."""
-    keys = [str(key) for key in dataset[dim].values.ravel()]
-    chosen = [chosen] if isinstance(chosen, str) else chosen
-    for key in chosen or ():
-        if key not in keys:
-            raise UsageError(f'no {dim} "{key}" in this result; {did_you_mean(key, keys)}')
-    return list(dict.fromkeys(chosen or keys))
 
 
 @dataclass(frozen=True)
