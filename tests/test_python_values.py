@@ -123,6 +123,13 @@ def test_another_type_is_named(source: object) -> None:
         (lambda: impact.info(5), "result: got an int, expected xr.Dataset | str | Path"),
         (lambda: impact.load(5), "path: got an int, expected str | Path"),
         (lambda: impact.estimate(BASE, jobs=0), "jobs: got 0, expected a whole number >= 1"),
+        (lambda: impact.estimate(BASE, jobs=1.5), "jobs: got a float, expected int"),  # type: ignore[arg-type]
+        (lambda: impact.run(times=np.array(1)), "times: got 1, expected a whole number >= 2"),  # type: ignore[arg-type]
+        (lambda: impact.sweep(impact.sweep(BASE)), "source: got a Dataset, expected a mapping"),
+        (
+            lambda: impact.plot(impact.sweep(BASE), width=xr.DataArray(0.5)),  # type: ignore[arg-type]
+            "width: got 0.5, expected a length from 26mm",
+        ),
         (lambda: impact.merge([], "r.h5"), "folders: got none, expected the work folders of all shards"),
         (lambda: impact.run("hertz"), 'No such file or directory; did you mean model="hertz"?'),
         (lambda: impact.sweep("hertz"), 'No such file or directory; did you mean models="hertz"?'),

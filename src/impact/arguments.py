@@ -6,6 +6,7 @@ import ast
 import builtins
 import inspect
 import numbers
+import operator
 import warnings
 from collections.abc import Callable
 from dataclasses import MISSING, fields, is_dataclass
@@ -79,11 +80,11 @@ def _show_defaults(kind: type[Any]) -> None:
     vars(kind)["__init__"].__signature__ = signature.replace(parameters=parameters)
 
 
-def require_counts(**counts: int) -> None:
-    """Refuse numbers of processes, threads or others that are not at least 1."""
+def require_counts(least: int = 1, /, **counts: int | None) -> None:
+    """Refuse numbers of processes, threads or others that are too small; one that is not whole is a TypeError."""
     for name, count in counts.items():
-        if count < 1:
-            raise UsageError(f"{argument(name)}: got {count}, expected a whole number >= 1")
+        if count is not None and operator.index(count) < least:
+            raise UsageError(f"{argument(name)}: got {operator.index(count)}, expected a whole number >= {least}")
 
 
 def type_problem(function: Callable[..., object], args: Any, kwargs: Any) -> str:

@@ -149,7 +149,7 @@ def length(size: str | float | None, origin: str) -> float | None:
     if not isinstance(inches, float | int) or not MIN_SIZE_INCHES <= inches <= MAX_SIZE_INCHES:
         expected = f"a length from 26mm to {MAX_SIZE_INCHES:g}in, such as 84mm, 8.4cm or 3.3in"
         names = f", or {' or '.join(WIDTHS)}" if origin.endswith("width") else ""
-        raise UsageError(f"{origin}: got {size}, expected {expected}{names}")
+        raise UsageError(f"{origin}: got {plain}, expected {expected}{names}")
     return float(inches)
 
 

@@ -15,6 +15,7 @@ import numpy as np
 import xarray as xr
 
 from .._version import __version__
+from ..arguments import require_counts
 from ..config.columns import without_replaced_inputs
 from ..config.design import distribution_paths
 from ..config.draft import (
@@ -326,8 +327,7 @@ def run(
     >>> round(shot.values["e_out"], 6), round(shot.e_energetic, 6)
     (0.41072, 0.41072)
     """
-    if times is not None and times < 2:
-        raise UsageError(f"times: got {times}, expected a whole number >= 2")
+    require_counts(2, times=times)
     plugin_set = read_plugins(plugins)
     opened = open_source(source, overrides, plugin_set)
     config, first = single_point(opened, model, at, friction=friction)
