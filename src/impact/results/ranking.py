@@ -127,16 +127,6 @@ class Ranked:
         return 0 < self.points == self.within
 
     @property
-    def percent(self) -> str:
-        """The share as text: 0% and 100% mean exactly none and all.
-
-        >>> nan = math.nan
-        >>> [Ranked("hertz", {}, 3000, n, 0, nan, nan, {}, nan, None).percent for n in (0, 1, 2000, 2999, 3000)]
-        ['0%', '<0.1%', '66.7%', '>99.9%', '100%']
-        """
-        return percentage(self.share)
-
-    @property
     def row(self) -> tuple[str, ...]:
         """The model in a table under `Ranking.headings`.
 
@@ -150,7 +140,7 @@ class Ranked:
         errors = map(_error_text, (self.max_error, self.mean_error))
         has_worst = self.at and self.max_error > MIN_ERROR_FLOOR
         worst = f"{describe_point(self.at, 6)}: {self.output} {number(self.e_out, 4)}" if has_worst else "–"
-        return (self.name, self.percent, *errors, f"{self.failed:,}", worst, self._served_text)
+        return (self.name, percentage(self.share), *errors, f"{self.failed:,}", worst, self._served_text)
 
     @property
     def _served_text(self) -> str:
@@ -218,8 +208,8 @@ class Ranking(Displayed, Sequence[Ranked]):
             nearest = [
                 ranked for ranked in self.models if _rank_key(ranked, self.floor) == _rank_key(first, self.floor)
             ]
-            verb = "are" if len(nearest) > 1 else "is"
-            return f"{nothing} everywhere; {_listed(nearest)} {verb} nearest: {first.percent} of {points}"
+            verb, share = "are" if len(nearest) > 1 else "is", percentage(first.share)
+            return f"{nothing} everywhere; {_listed(nearest)} {verb} nearest: {share} of {points}"
         return f"{nothing} at {alone or f'any of {points}'}"
 
     def as_dict(self) -> dict[str, Any]:

@@ -241,16 +241,11 @@ class Impact(Displayed):
             **({"friction": self.friction.key} if self.friction else {}),
             "inputs": dict(self.point),
             "first_value_of": list(self.first),
-            "integrator": self.integrator,
-            "exponent": self.exponent,
-            "closing_speed": self.closing_speed,
+            **{name: getattr(self, name) for name in ("integrator", "exponent", "closing_speed")},
             "outputs": {**self.values, **words},
             "materials": {name: asdict(material) for name, material in self.materials.items()},
             "derived": dict(self.derived),
-            "damping": self.damping,
-            "e_kinematic": self.e_kinematic,
-            "e_kinetic": self.e_kinetic,
-            "e_energetic": self.e_energetic,
+            **{name: getattr(self, name) for name in ("damping", "e_kinematic", "e_kinetic", "e_energetic")},
         }
 
     def records(self) -> Sequence[Mapping[str, Any]]:
