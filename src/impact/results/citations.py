@@ -6,7 +6,6 @@ import re
 import unicodedata
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +18,7 @@ from ..contact.model import ForceModel
 from ..display import LATEX_CHARACTERS, Block, Displayed
 from ..engine.model_catalogue import models
 from ..errors import UsageError
+from .selection import chosen_laws
 from .xarray_backend import load
 
 # "Tsuji Y, Tanaka T (1992) Title. Journal 71, 239"; the title may be missing, and something may follow
@@ -115,15 +115,13 @@ def cite(*laws: str | Path | xr.Dataset | ForceModel | FrictionLaw, plugins: Seq
         if isinstance(item, ForceModel | FrictionLaw):
             chosen[item.key] = item
             continue
-        if not isinstance(item, xr.Dataset) and (isinstance(item, Path) or Path(item).suffix):
-            item = load(item)
-        if isinstance(item, xr.Dataset):
-            coordinates = (item.coords[name] for name in ("model", "friction") if name in item.coords)
-            # the laws of a calibration with friction are pairs
-            laws_of = (str(key).split(" with ") for coordinate in coordinates for key in coordinate.values.flat)
-            keys = list(chain.from_iterable(laws_of))
-        else:
+        if isinstance(item, str) and not Path(item).suffix:
             keys = [item]
+        else:
+            result = item if isinstance(item, xr.Dataset) else load(item)
+            names = [*chosen_laws(None, result), *chosen_laws(None, result, "friction")]
+            # the laws of a calibration with friction are pairs
+            keys = [key for name in names for key in name.split(" with ")]
         chosen |= {key: look_up(known, key, "law") for key in keys}
     return Citations(Citation(key, bibtex(law), dict(vars(law.evidence))) for key, law in chosen.items())
 
