@@ -306,6 +306,12 @@ def test_the_text_of_a_result_has_100_columns() -> None:
         assert 90 < max(map(cell_len, text.splitlines())) <= 100
 
 
+def test_a_result_at_a_prompt_is_its_text(result: xr.Dataset) -> None:
+    for value in (impact.run(model="hertz"), impact.recommend(result), impact.compare(result, result)):
+        assert repr(value) == str(value)
+    assert repr(impact.models()["hertz"]) == "<ForceModel hertz: F = K δⁿ  (10)>"
+
+
 def test_errors_are_those_of_python() -> None:
     with pytest.raises(ValueError, match=r"got 1\.4"):
         impact.run(at={"e": 1.4})

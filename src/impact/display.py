@@ -284,6 +284,11 @@ Block: TypeAlias = str | Table
 class Displayed:
     """A result that a command prints: its plain data, its text, and what a notebook shows."""
 
+    def __init_subclass__(cls) -> None:
+        # at a prompt a dataclass would show its fields in place of its tables
+        if cls.__repr__ is object.__repr__:
+            cls.__repr__ = cls.__str__  # type: ignore[assignment, method-assign]
+
     @abstractmethod
     def as_dict(self) -> dict[str, Any]:
         """The JSON object of the command."""
