@@ -172,8 +172,6 @@ class PreparedProblem:
         if known is None:
             raise UsageError(f'no input "{name}" of this law; {did_you_mean(name, list(self._quantities))}')
         full_name, quantity = known
-        if isinstance(value, float) and quantity.allows(value):
-            return full_name, np.array(value)
         plain, _ = to_plain_data(value)
         try:
             array = np.asarray(plain)
