@@ -307,7 +307,8 @@ def test_the_text_of_a_result_has_100_columns() -> None:
 
 
 def test_a_result_at_a_prompt_is_its_text(result: xr.Dataset) -> None:
-    for value in (impact.run(model="hertz"), impact.recommend(result), impact.compare(result, result)):
+    results = impact.run(model="hertz"), impact.recommend(result), impact.compare(result, result)
+    for value in (*results, impact.cite("hertz"), impact.info(result)):
         assert repr(value) == str(value)
     assert repr(impact.models()["hertz"]) == "<ForceModel hertz: F = K δⁿ  (10)>"
 
