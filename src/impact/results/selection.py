@@ -34,9 +34,9 @@ IndexArray = NDArray[np.intp]
 LawDim = Literal["model", "friction"]
 
 
-def as_keys(laws: object) -> list[str]:
-    """List one key or several, in a sequence of any library; none for None."""
-    plain, _ = to_plain_data(laws)
+def as_keys(names: object) -> list[str]:
+    """List one key or name or several, in a sequence of any library; none for None."""
+    plain, _ = to_plain_data(names)
     return [plain] if isinstance(plain, str) else list(plain or ())
 
 
