@@ -123,6 +123,13 @@ def test_another_type_is_named(source: object) -> None:
         (lambda: impact.info(5), "result: got an int, expected xr.Dataset | str | Path"),
         (lambda: impact.load(5), "path: got an int, expected str | Path"),
         (lambda: impact.estimate(BASE, jobs=0), "jobs: got 0, expected a whole number >= 1"),
+        (lambda: impact.estimate(BASE, jobs=1.5), "jobs: got a float, expected int"),  # type: ignore[arg-type]
+        (lambda: impact.run(times=np.array(1)), "times: got 1, expected a whole number >= 2"),  # type: ignore[arg-type]
+        (lambda: impact.sweep(impact.sweep(BASE)), "source: got a Dataset, expected a mapping"),
+        (
+            lambda: impact.plot(impact.sweep(BASE), width=xr.DataArray(0.5)),  # type: ignore[arg-type]
+            "width: got 0.5, expected a length from 26mm",
+        ),
         (lambda: impact.merge([], "r.h5"), "folders: got none, expected the work folders of all shards"),
         (lambda: impact.run("hertz"), 'No such file or directory; did you mean model="hertz"?'),
         (lambda: impact.sweep("hertz"), 'No such file or directory; did you mean models="hertz"?'),
@@ -299,6 +306,13 @@ def test_the_text_of_a_result_has_100_columns() -> None:
         assert 90 < max(map(cell_len, text.splitlines())) <= 100
 
 
+def test_a_result_at_a_prompt_is_its_text(result: xr.Dataset) -> None:
+    results = impact.run(model="hertz"), impact.recommend(result), impact.compare(result, result)
+    for value in (*results, impact.cite("hertz"), impact.info(result)):
+        assert repr(value) == str(value)
+    assert repr(impact.models()["hertz"]) == "<ForceModel hertz: F = K δⁿ  (10)>"
+
+
 def test_errors_are_those_of_python() -> None:
     with pytest.raises(ValueError, match=r"got 1\.4"):
         impact.run(at={"e": 1.4})
@@ -311,6 +325,11 @@ def test_errors_are_those_of_python() -> None:
     with pytest.raises(FileNotFoundError, match=r"^no\.py: cannot be read") as missing:
         impact.run(plugins=["no.py"])
     assert isinstance(missing.value, impact.UsageError)
+    drops = {"models": "hertz", "sweep": {"cases": "no.csv"}}
+    fit = {"models": "hertz", "sweep": {"K": {"fit": [1e6, 1e9]}}, "data": {"file": "no.csv"}}
+    for call, config in ((impact.sweep, drops), (impact.run, drops), (impact.calibrate, fit)):
+        with pytest.raises(FileNotFoundError, match=r"(?m)^no\.csv: cannot be read: No such file or directory$"):
+            call(config)
     error = pickle.loads(pickle.dumps(impact.ConfigError("a", "b\n")))
     assert (type(error), error.problems) == (impact.ConfigError, ("a", "b\\x0a"))
 
@@ -361,6 +380,8 @@ def test_models_may_be_an_array_of_keys(collect: Callable[[list[str]], Any], res
     assert impact.sweep(models=keys)["model"].values.tolist() == ["tsuji-1992", "hertz"]
     assert len(impact.recommend(result, models=keys)) == 2
     assert impact.plot(result, models=keys).axes
+    assert impact.explore(result, models=keys).children
+    assert "tsuji-1992" in impact.page(result, models=keys)
     assert "tsuji-1992" in impact.report(result.isel(e=[0]), models=keys, sections=["models"])
 
 

@@ -279,7 +279,7 @@ def test_the_headline_names_the_best_models_or_the_nearest(cli: Run, fair_and_ex
 
 def test_a_share_near_0_or_1_is_not_rounded_to_it() -> None:
     def percent(within: int) -> str:
-        return Ranked("hertz", {}, 100_000, within, 0, 0.0, 0.0, {}, 0.0, None).percent
+        return Ranked("hertz", {}, 100_000, within, 0, 0.0, 0.0, {}, 0.0, None).row[1]
 
     assert [percent(n) for n in (0, 1, 50_000, 99_999, 100_000)] == ["0%", "<0.1%", "50.0%", ">99.9%", "100%"]
 

@@ -26,6 +26,7 @@ import xarray as xr
 import impact
 from impact.contact.models import catalogue
 from impact.errors import UsageError
+from impact.formatting import percentage
 from impact.plots.kinds import KINDS, find_kind
 from impact.results.ranking import recommend
 from impact.results.replay_command import describe_point
@@ -235,7 +236,7 @@ def test_the_table_of_models_is_the_ranking(pages: dict[str, str], wide: xr.Data
         rows = table(pages[name], "Models, the best first")
         assert [row[0] for row in rows] == [model.name for model in ranked.models]
         for (_, share, most, mean, failed, worst, serves), model in zip(rows, ranked.models, strict=True):
-            assert (share, failed) == (model.percent, f"{model.failed:,}")
+            assert (share, failed) == (percentage(model.share), f"{model.failed:,}")
             for shown, error in ((mean, model.mean_error), (most, model.max_error)):
                 is_rounding = shown == "<1e-9"
                 assert is_rounding == (0.0 < error < 1e-9)

@@ -48,7 +48,6 @@ from __future__ import annotations
 
 from functools import cache
 from importlib import import_module
-from types import FunctionType
 from typing import TYPE_CHECKING, Any
 
 from ._version import __version__ as __version__
@@ -105,78 +104,53 @@ if TYPE_CHECKING:
     from .results.xarray_backend import expand as expand, load as load, save as save
     from .uncertainty.sensitivity import sensitivities as sensitivities, sensitivity as sensitivity
 
-# the module of each public name, which is imported on first use: `import impact` and `impact --help` need no numpy
-_MODULES = {
-    "Board": "results.board",
-    "Citations": "results.citations",
-    "ConfigError": "errors",
-    "Engines": "conformance.registry",
-    "Environment": "exporters.environment",
-    "Estimate": "results.estimate",
-    "Evidence": "contact.evidence",
-    "Export": "exporters.export",
-    "ForceModel": "contact.model",
-    "FrictionLaw": "contact.friction",
-    "Frictions": "engine.friction_catalogue",
-    "Impact": "results.single_impact",
-    "ImpactError": "errors",
-    "ImpactWarning": "errors",
-    "ModelError": "errors",
-    "Models": "engine.model_catalogue",
-    "Parameter": "contact.model",
-    "PreparedProblem": "inverse.prepared",
-    "Ranking": "results.ranking",
-    "ResultError": "errors",
-    "SolveResult": "inverse.solve",
-    "StoreError": "errors",
-    "TimestepResult": "inverse.timestep",
-    "UsageError": "errors",
-    "Verdict": "comparison.verdict",
-    "bless": "comparison.bless",
-    "calibrate": "inverse.calibrate",
-    "check_model": "contact.checks",
-    "cite": "results.citations",
-    "compare": "comparison.compare",
-    "conform": "conformance.conform",
-    "conform_engines": "conformance.registry",
-    "describe": "results.describe",
-    "doctor": "exporters.environment",
-    "estimate": "results.estimate",
-    "expand": "results.xarray_backend",
-    "explore": "plots.explore",
-    "export": "exporters.export",
-    "export_codes": "exporters.export",
-    "extend": "results.extend",
-    "extend_to_file": "results.extend",
-    "frictions": "engine.friction_catalogue",
-    "hysteresis": "contact.models.hysteresis",
-    "info": "results.info",
-    "init": "config.starter",
-    "load": "results.xarray_backend",
-    "materials": "config.material_library",
-    "merge": "results.shards",
-    "models": "engine.model_catalogue",
-    "page": "reporting.page",
-    "plot": "plots.draw",
-    "plot_to_files": "plots.files",
-    "power": "contact.powers",
-    "prepare": "inverse.prepared",
-    "progress_bar": "progress_display",
-    "recommend": "results.ranking",
-    "report": "reporting.report",
-    "rerun": "comparison.rerun",
-    "run": "results.single_impact",
-    "save": "results.xarray_backend",
-    "schema": "config.tables",
-    "sensitivities": "uncertainty.sensitivity",
-    "sensitivity": "uncertainty.sensitivity",
-    "solve": "inverse.solve",
-    "sweep": "results.sweep",
-    "sweep_shard": "results.shards",
-    "sweep_to_file": "results.sweep",
-    "timestep": "inverse.timestep",
+# the public names of each module, which is imported on first use, so that `impact --help` needs no numpy
+_NAMES = {
+    "comparison.bless": "bless",
+    "comparison.compare": "compare",
+    "comparison.rerun": "rerun",
+    "comparison.verdict": "Verdict",
+    "config.material_library": "materials",
+    "config.starter": "init",
+    "config.tables": "schema",
+    "conformance.conform": "conform",
+    "conformance.registry": "Engines conform_engines",
+    "contact.checks": "check_model",
+    "contact.evidence": "Evidence",
+    "contact.friction": "FrictionLaw",
+    "contact.model": "ForceModel Parameter",
+    "contact.models.hysteresis": "hysteresis",
+    "contact.powers": "power",
+    "engine.friction_catalogue": "Frictions frictions",
+    "engine.model_catalogue": "Models models",
+    "errors": "ConfigError ImpactError ImpactWarning ModelError ResultError StoreError UsageError",
+    "exporters.environment": "Environment doctor",
+    "exporters.export": "Export export export_codes",
+    "inverse.calibrate": "calibrate",
+    "inverse.prepared": "PreparedProblem prepare",
+    "inverse.solve": "SolveResult solve",
+    "inverse.timestep": "TimestepResult timestep",
+    "plots.draw": "plot",
+    "plots.explore": "explore",
+    "plots.files": "plot_to_files",
+    "progress_display": "progress_bar",
+    "reporting.page": "page",
+    "reporting.report": "report",
+    "results.board": "Board",
+    "results.citations": "Citations cite",
+    "results.describe": "describe",
+    "results.estimate": "Estimate estimate",
+    "results.extend": "extend extend_to_file",
+    "results.info": "info",
+    "results.ranking": "Ranking recommend",
+    "results.shards": "merge sweep_shard",
+    "results.single_impact": "Impact run",
+    "results.sweep": "sweep sweep_to_file",
+    "results.xarray_backend": "expand load save",
+    "uncertainty.sensitivity": "sensitivities sensitivity",
 }
-__all__ = list(_MODULES)
+_MODULES = {name: module for module, names in _NAMES.items() for name in names.split()}
+__all__ = sorted(_MODULES)
 
 if not TYPE_CHECKING:
     # the same function each time, which can be pickled
@@ -185,10 +159,7 @@ if not TYPE_CHECKING:
         if name not in _MODULES:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
         member = getattr(import_module(f".{_MODULES[name]}", __name__), name)
-        # formulas of laws call `power`, also with symbols
-        if isinstance(member, FunctionType) and name != "power":
-            return import_module(".arguments", __name__).name_wrong_types(member)
-        return member
+        return import_module(".arguments", __name__).prepare_for_users(member)
 
 
 def __dir__() -> list[str]:

@@ -1,4 +1,4 @@
-"""Wrong types of arguments: what fails in a public function because of one is a UsageError that names it."""
+"""What users see of public names: errors that name an argument of a wrong type, and signatures."""
 
 from __future__ import annotations
 
@@ -6,10 +6,12 @@ import ast
 import builtins
 import inspect
 import numbers
+import operator
 import warnings
 from collections.abc import Callable
+from dataclasses import MISSING, fields, is_dataclass
 from functools import wraps
-from types import UnionType
+from types import FunctionType, UnionType
 from typing import Any, ParamSpec, TypeVar, get_origin
 
 from .errors import ImpactError, UsageError
@@ -57,11 +59,32 @@ def name_wrong_types(function: Callable[P, T]) -> Callable[P, T]:
     return call
 
 
-def require_counts(**counts: int) -> None:
-    """Refuse numbers of processes, threads or others that are not at least 1."""
+def prepare_for_users(member: Any) -> Any:
+    """Make a public name of what a module defines: a function names arguments of wrong types."""
+    if is_dataclass(member) and isinstance(member, type):
+        _show_defaults(member)
+    # formulas of laws call `power`, also with symbols
+    if not isinstance(member, FunctionType) or member.__name__ == "power":
+        return member
+    return name_wrong_types(member)
+
+
+def _show_defaults(kind: type[Any]) -> None:
+    """Let `help` show the defaults of a dataclass, such as {}, in place of `<factory>`."""
+    made = {field.name: field.default_factory for field in fields(kind) if field.default_factory is not MISSING}
+    signature = inspect.signature(vars(kind)["__init__"])
+    parameters = [
+        parameter.replace(default=made[name]()) if name in made else parameter
+        for name, parameter in signature.parameters.items()
+    ]
+    vars(kind)["__init__"].__signature__ = signature.replace(parameters=parameters)
+
+
+def require_counts(least: int = 1, /, **counts: int | None) -> None:
+    """Refuse numbers of processes, threads or others that are too small; one that is not whole is a TypeError."""
     for name, count in counts.items():
-        if count < 1:
-            raise UsageError(f"{argument(name)}: got {count}, expected a whole number >= 1")
+        if count is not None and operator.index(count) < least:
+            raise UsageError(f"{argument(name)}: got {operator.index(count)}, expected a whole number >= {least}")
 
 
 def type_problem(function: Callable[..., object], args: Any, kwargs: Any) -> str:

@@ -17,6 +17,7 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TextIO, TypeAlias
 
+from .arguments import require_counts
 from .atomic import check_output, write_file
 from .errors import UsageError
 from .formatting import argument, number, safe_text
@@ -125,9 +126,8 @@ class TableForm:
     decimal: str = "point"
 
     def __post_init__(self) -> None:
-        for name, value, least in (("rows", self.rows, 2), ("digits", self.digits, 1)):
-            if value is not None and value < least:
-                raise UsageError(f"{argument(name)}: got {value}, expected a whole number >= {least}")
+        require_counts(2, rows=self.rows)
+        require_counts(digits=self.digits)
         object.__setattr__(self, "decimal", resolve_decimal(self.decimal))
 
     def check_used(self, path: Path | None, name: str) -> None:
@@ -283,6 +283,11 @@ Block: TypeAlias = str | Table
 
 class Displayed:
     """A result that a command prints: its plain data, its text, and what a notebook shows."""
+
+    def __init_subclass__(cls) -> None:
+        # at a prompt a dataclass, a dict or a tuple would show its fields in place of its tables
+        if cls.__repr__ in (object.__repr__, dict.__repr__, tuple.__repr__):
+            cls.__repr__ = cls.__str__  # type: ignore[assignment, method-assign]
 
     @abstractmethod
     def as_dict(self) -> dict[str, Any]:

@@ -6,6 +6,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from datetime import timedelta
+from functools import partial
 from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
@@ -85,11 +86,6 @@ def new_bar(get_time: Callable[[], float] | None = None) -> Bar:
     )
 
 
-def write_to_stderr(line: str) -> None:
-    """Print a line on stderr."""
-    print(line, file=sys.stderr, flush=True)
-
-
 @contextmanager
 def progress_bar(
     write: Callable[[str], None] | None = None, *, quiet: bool = False
@@ -115,6 +111,7 @@ def progress_bar(
     bar = new_bar()
     begun = bar.get_time()
     last = begun + FIRST_S - INTERVAL_S
+    show = write or partial(print, file=sys.stderr, flush=True)
 
     def report(at: Progress) -> None:
         nonlocal last
@@ -125,7 +122,7 @@ def progress_bar(
                 bar.start()
         elif now - last >= INTERVAL_S and not task.finished:
             last = now
-            (write or write_to_stderr)(line(task, at.of_points))
+            show(line(task, at.of_points))
 
     try:
         yield report

@@ -478,11 +478,11 @@ def csv_form(table: Mapping[Any, Any]) -> CsvForm:
     return CsvForm(separator if separator in SEPARATORS else "", decimal if decimal in DECIMALS else "")
 
 
-def read_files(draft: Draft) -> tuple[dict[KeyPath, object], list[str], list[str]]:
-    """Read the CSV files of cases and of single columns: the values that replace their names, problems, notes."""
+def read_files(draft: Draft) -> tuple[dict[KeyPath, object], list[ConfigError], list[str]]:
+    """Read the CSV files of cases and of single columns: the values that replace their names, errors, notes."""
     open_csv = cache(partial(read_csv_of, draft))
     values: dict[KeyPath, object] = {}
-    problems: list[str] = []
+    errors: list[ConfigError] = []
     notes: tuple[str, ...] = ()
     cases, form = draft.table("sweep").get("cases"), CsvForm()
     table = as_table(cases)
@@ -492,7 +492,7 @@ def read_files(draft: Draft) -> tuple[dict[KeyPath, object], list[str], list[str
         try:
             values["sweep", "cases"], notes = _read_cases(open_csv(cases, form), draft)
         except ConfigError as error:
-            problems += error.problems
+            errors.append(error)
     for name, file, column, form in _file_columns(draft.data):
         try:
             columns = open_csv(file, form, () if column is None else (column,))
@@ -500,10 +500,10 @@ def read_files(draft: Draft) -> tuple[dict[KeyPath, object], list[str], list[str
             list_of_values = columns.values(found, name.quantity(draft.known_models), draft.exponent, unit)
             values[name.path] = list_of_values if column is not None else {"empirical": list_of_values}
         except ConfigError as error:
-            problems += error.problems
+            errors.append(error)
         except KeyError:
             continue  # an unknown key is reported with the others
-    return values, list(dict.fromkeys(problems)), list(notes)
+    return values, errors, list(notes)
 
 
 def _find_column(columns: Columns, name: str, *, is_only: bool) -> tuple[str, str]:

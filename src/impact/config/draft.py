@@ -129,6 +129,7 @@ class Draft:
     problems: tuple[ConfigProblem, ...] = ()
     lines: tuple[str, ...] = ()  # complete messages about settings and files
     notes: tuple[str, ...] = ()  # on what is left out
+    misses_file: bool = False  # a CSV file that it names does not exist
     has_own_scheme: bool = False  # the command chooses the scheme of friction, not the config
 
     def table(self, name: str) -> dict[str, Any]:
@@ -220,7 +221,8 @@ class Draft:
         lines = [line for _, line in sorted(ranked, key=lambda ranked_line: ranked_line[0])]
         if len(lines) > MAX_PROBLEM_LINES:
             lines[MAX_PROBLEM_LINES:] = [f"and {len(lines) - MAX_PROBLEM_LINES} more"]
-        return ConfigError(*lines, *self.lines)
+        kind_of_error = MissingFileError if self.misses_file else ConfigError
+        return kind_of_error(*lines, *self.lines)
 
     def _written_path(self, path: KeyPath) -> KeyPath:
         """Find the path in the source of a path that may be a column of cases or of measurements."""

@@ -17,6 +17,7 @@ from ..contact.materials import Material
 from ..contact.model import ForceModel
 from ..contact.numba.dispatch import is_installed
 from ..contact.variables import OUTPUTS, default_variables
+from ..errors import MissingFileError
 from . import measurements, quantities, tables
 from .columns import expand_cases, named_files, read_files, without_replaced_inputs
 from .design import design_problems, distribution_paths, draw_columns, unit_samples
@@ -190,8 +191,11 @@ def inline_files(draft: Draft) -> Draft:
         return draft
     draft = replace(draft, files=tuple((draft.folder or Path()) / file for file in named_files(draft.data)))
     for read in (read_files, measurements.read_data_file):
-        values, lines, notes = read(draft)
-        draft = replace(draft, lines=(*draft.lines, *lines), notes=(*draft.notes, *notes))
+        values, errors, notes = read(draft)
+        # several columns may be of one file that cannot be read
+        lines = dict.fromkeys(problem for error in errors for problem in error.problems)
+        misses_file = draft.misses_file or any(isinstance(error, MissingFileError) for error in errors)
+        draft = replace(draft, lines=(*draft.lines, *lines), notes=(*draft.notes, *notes), misses_file=misses_file)
         for path, value in values.items():
             setting = Setting(path, value, "", override_text(path, value))
             data, _ = set_value(draft.data, path, value)

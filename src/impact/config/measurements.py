@@ -384,7 +384,7 @@ def _deviation(output: str) -> Quantity:
     return Quantity(OUTPUTS[output].unit, "standard deviation", least=MIN_SIGMA, most=MAX_MEASURED)
 
 
-def read_data_file(draft: Draft) -> tuple[dict[KeyPath, object], list[str], list[str]]:
+def read_data_file(draft: Draft) -> tuple[dict[KeyPath, object], list[ConfigError], list[str]]:
     """Read the file of [data], as `columns.read_files` reads others."""
     table = draft.table("data")
     if not isinstance(table.get("file"), str) or not _are_headers(table.get("columns", {})):
@@ -394,7 +394,7 @@ def read_data_file(draft: Draft) -> tuple[dict[KeyPath, object], list[str], list
         columns = read_csv_of(draft, table["file"], csv_form(table), tuple(headers.values()) if headers else None)
         columns = _mapped(columns, headers)
     except ConfigError as error:
-        return {}, [*error.problems], []
+        return {}, [error], []
     points, problems = _read_columns(columns, draft)
     if problems and not columns.is_known:
         # it may be any file, of which messages contain nothing
@@ -402,7 +402,8 @@ def read_data_file(draft: Draft) -> tuple[dict[KeyPath, object], list[str], list
     if problems:
         # a row is under the header of the file, which may have another name in [data]
         named = [(name if row is None else headers.get(name, name), row, text) for name, row, text in problems]
-        return {}, [columns.problem(text, header, row) for header, row, text in named[:MAX_PROBLEMS]], []
+        lines = (columns.problem(text, header, row) for header, row, text in named[:MAX_PROBLEMS])
+        return {}, [ConfigError(*lines)], []
     values = {column.header: list(column.values) for column in points.columns}
     return {("data", "columns"): values, ("data", "lines"): list(points.lines)}, [], list(points.notes)
 

@@ -101,7 +101,7 @@ class FrictionLaw:
             raise ModelError(f'friction key "{self.key}": expected kebab-case, such as "coulomb-1785"')
 
     def __repr__(self) -> str:
-        return f"<FrictionLaw {self.key}>"
+        return f"<FrictionLaw {self.key}: {self.equation}>"
 
     @property
     def may_use_e(self) -> bool:

@@ -299,7 +299,7 @@ class ForceModel:
                 raise ModelError(f"model {self.key}: domain of {name}: got {ends!r}, expected (least, most)")
 
     def __repr__(self) -> str:
-        return f"<ForceModel {self.key}>"
+        return f"<ForceModel {self.key}: {self.equation}>"
 
     def _check_arguments(self, role: str, formula: Formula | None, names: set[str]) -> None:
         for name in argument_names(formula):

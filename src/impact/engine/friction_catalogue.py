@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from ..contact.catalogue import look_up
-from ..contact.evidence import count_states
 from ..contact.friction import FrictionLaw
 from ..contact.frictions import frictions as catalogue
 from ..display import Block, Displayed, Table, Wrapped
 from ..formatting import with_year
-from .model_catalogue import MAX_TEXT, matching_laws, parameter_record, parameter_rows
+from .model_catalogue import MAX_TEXT, Laws, matching_laws, parameter_record, parameter_rows
 
 STIFFNESS = {
     "constant": "k_t or kt_over_kn",
@@ -70,28 +68,10 @@ class FrictionDescription(Displayed):
         yield Table([row for row in rows.items() if row[1]], max_cell=MAX_TEXT)
 
 
-class Frictions(dict[str, FrictionLaw], Displayed):
+class Frictions(Laws[FrictionLaw]):
     """Friction laws by key, which a notebook shows as a table."""
 
-    def __repr__(self) -> str:
-        return f"{len(self)} friction laws: {', '.join(self)}"
-
-    def find(self, key: str) -> FrictionLaw:
-        """Look up a friction law.
-
-        Raises
-        ------
-        ModelError : no friction law has this key; the message names the nearest one
-        """
-        return look_up(self, key, "friction law")
-
-    def as_dict(self) -> dict[str, Any]:
-        """The declarations by key."""
-        return {key: FrictionDescription(law).as_dict() for key, law in self.items()}
-
-    def records(self) -> Sequence[Mapping[str, Any]]:
-        """The declarations."""
-        return list(self.as_dict().values())
+    _noun, _describe = "friction law", FrictionDescription
 
     def sections(self, width: int) -> Iterator[Block]:
         """One row for each friction law, and how to read the table."""
@@ -105,9 +85,7 @@ class Frictions(dict[str, FrictionLaw], Displayed):
             "f is the friction, F the contact force, g the slip speed. A friction law is combined with any "
             "contact force; `impact models KEY --frictions` describes one in full."
         )
-        counts = count_states(law.evidence for law in self.values())
-        entries = "this entry" if len(self) == 1 else f"these {len(self)} entries"
-        yield Wrapped(f"Evidence for the formulas of {entries}: {counts}.")
+        yield self._evidence_line
 
 
 def frictions(*, pattern: str = "*", search: str | None = None) -> Frictions:

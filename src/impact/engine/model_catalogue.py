@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from itertools import groupby
@@ -32,7 +32,7 @@ COMPILED_AT = (1.0, 1.5, 2.0, 2.5, 3.0)
 # characters of a text about one model, which may be a plug-in
 MAX_TEXT = 2000
 
-Described = TypeVar("Described", ForceModel, FrictionLaw)
+Described = TypeVar("Described", bound=ForceModel | FrictionLaw)
 
 
 @dataclass(frozen=True)
@@ -122,28 +122,44 @@ def _describe_parameter(parameter: Parameter) -> str:
     return f"{parameter.name}{unit}: {parameter.meaning}; {limits}, {status}"
 
 
-class Models(dict[str, ForceModel], Displayed):
-    """Models by key, which a notebook shows as a table."""
+class Laws(dict[str, Described], Displayed):
+    """Laws by key, which a notebook shows as a table."""
+
+    _noun: str
+    _describe: Callable[[Described], Displayed]
 
     def __repr__(self) -> str:
-        return f"{len(self)} models: {', '.join(self)}"
+        return f"{len(self)} {self._noun}s: {', '.join(self)}"
 
-    def find(self, key: str) -> ForceModel:
-        """Look up a model.
+    def find(self, key: str) -> Described:
+        """Look up a law.
 
         Raises
         ------
-        ModelError : no model has this key; the message names the nearest one
+        ModelError : none has this key; the message names the nearest one
         """
-        return look_up(self, key, "model")
+        return look_up(self, key, self._noun)
 
     def as_dict(self) -> dict[str, Any]:
         """The declarations by key."""
-        return {key: ModelDescription(model).as_dict() for key, model in self.items()}
+        return {key: self._describe(law).as_dict() for key, law in self.items()}
 
     def records(self) -> Sequence[Mapping[str, Any]]:
         """The declarations."""
         return list(self.as_dict().values())
+
+    @property
+    def _evidence_line(self) -> Wrapped:
+        """How many formulas are verified, and how."""
+        entries = "this entry" if len(self) == 1 else f"these {len(self)} entries"
+        counts = count_states(law.evidence for law in self.values())
+        return Wrapped(f"Evidence for the formulas of {entries}: {counts}.")
+
+
+class Models(Laws[ForceModel]):
+    """Models by key, which a notebook shows as a table."""
+
+    _noun, _describe = "model", ModelDescription
 
     def sections(self, width: int) -> Iterator[Block]:
         """One row for each model, by family, with the columns that fit the terminal, and what they mean."""
@@ -173,9 +189,7 @@ class Models(dict[str, ForceModel], Displayed):
         yield Wrapped(
             "A model with [parameters] depends on them; `impact models KEY` describes one model in full."
         )
-        counts = count_states(model.evidence for model in self.values())
-        entries = "this entry" if len(self) == 1 else f"these {len(self)} entries"
-        yield Wrapped(f"Evidence for the formulas of {entries}: {counts}.")
+        yield self._evidence_line
 
     def _repr_html_(self) -> str:
         rows = [

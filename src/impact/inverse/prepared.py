@@ -31,6 +31,7 @@ from ..engine.plan import Plan
 from ..engine.plugins import read_plugins
 from ..engine.trajectories import PlanLaw, model_of
 from ..errors import UsageError, did_you_mean
+from ..results.selection import as_keys
 from ..results.single_impact import open_source, single_point
 
 if TYPE_CHECKING:
@@ -103,7 +104,7 @@ class PreparedProblem:
     """
 
     config: Config
-    law: PlanLaw
+    law: ForceModel | Pair
     outputs: tuple[str, ...]
 
     def __repr__(self) -> str:
@@ -172,8 +173,6 @@ class PreparedProblem:
         if known is None:
             raise UsageError(f'no input "{name}" of this law; {did_you_mean(name, list(self._quantities))}')
         full_name, quantity = known
-        if isinstance(value, float) and quantity.allows(value):
-            return full_name, np.array(value)
         plain, _ = to_plain_data(value)
         try:
             array = np.asarray(plain)
@@ -228,8 +227,8 @@ def prepare(
         raise UsageError(f'prepare: got the integrator "{config.solver.integrator}", expected "{EXACT}"')
     law = Plan(config, plugin_set.of(config.models)).laws[-1]
     known = [*CENTRAL_OUTPUTS] if isinstance(law, ForceModel) else [*OUTPUTS]
-    known = [name for name in known if OUTPUTS[name].dtype == "f8" and "model" in OUTPUTS[name].dims]
-    names = [outputs] if isinstance(outputs, str) else known if outputs is None else list(outputs)
+    known = [name for name in known if OUTPUTS[name].dtype == "f8" and OUTPUTS[name].per_model]
+    names = known if outputs is None else as_keys(outputs)
     for name in names:
         if name not in known:
             raise UsageError(f'outputs: no output "{name}" of this law; {did_you_mean(name, known)}')

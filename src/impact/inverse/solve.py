@@ -307,7 +307,7 @@ def solve_damping(config: Config, plugins: Plugins, e: float) -> Config:
 
 def solve_input(config: Config, plugins: Plugins, unknown: Parameter, target: Mapping[str, object]) -> SolveResult:
     """Find all values of an input that give a target; with an axis, the value nearest to it everywhere."""
-    names = [name for name, variable in OUTPUTS.items() if variable.dtype == "f8" and "model" in variable.dims]
+    names = [name for name, variable in OUTPUTS.items() if variable.dtype == "f8" and variable.per_model]
     if len(target) != 1:
         example = argument("target", {"e_out": 0.6})
         raise UsageError(f"{argument('target')}: got {len(target)} targets, expected one, such as {example}")

@@ -9,10 +9,11 @@ import numpy as np
 from ..array_types import Array
 from ..config.measurements import SIGMA
 from ..contact.variables import OUTPUTS
-from ..errors import UsageError, did_you_mean
+from ..errors import UsageError
 from ..formatting import argument, decimals, safe_text
 from ..results.calibration import calibration_title, fit_status
 from ..results.kinds import is_calibration
+from ..results.selection import chosen_laws
 from .curves import CurveData, Panel, curve_of, x_axis_fields
 from .data import Points
 from .kinds import Choice, Kind
@@ -39,11 +40,9 @@ def calibration_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     for name, value in (("sel", choice.sel), ("x", choice.x), ("y", choice.y)):
         if value:
             raise UsageError(f"{argument(name)}: does not apply to the picture of a calibration")
-    keys = [str(key) for key in dataset["model"].values]
-    for key in choice.models or ():
-        if key not in keys:
-            raise UsageError(f'no model "{key}" in this calibration; {did_you_mean(key, keys)}')
-    shown = [key for key in keys if key in choice.models] if choice.models else keys[:MAX_LAWS]
+    keys = chosen_laws(None, dataset)
+    wanted = chosen_laws(choice.models, dataset) if choice.models else keys[:MAX_LAWS]
+    shown = [key for key in keys if key in wanted]
     not_drawn = tuple(f"{key}, rank {keys.index(key) + 1}" for key in keys if key not in shown)
     # a difference between the best law and others; a law alone has none
     data = dataset.load().assign(difference=dataset["aicc"] - float(dataset["aicc"][0])).sel(model=shown)

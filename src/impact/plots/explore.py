@@ -22,7 +22,7 @@ from ..engine.plugins import Plugins, read_plugins
 from ..errors import ImpactError, UsageError, did_you_mean
 from ..formatting import quantity, safe_text
 from ..results.provenance import changed_plugins, config_of_part, stored_config
-from ..results.selection import in_si, law_positions, select
+from ..results.selection import chosen_laws, in_si, select
 from ..results.sweep import sweep_in_memory
 from ..results.xarray_backend import result_of
 from .draw import plot
@@ -90,7 +90,7 @@ def explore(
     if kind is not None and kind not in kinds:
         raise UsageError(f'kind: no kind "{kind}" of this result; {did_you_mean(kind, kinds)}')
     keys = [str(key) for key in dataset["model"].values]
-    shown = [keys[position] for position in law_positions(models, dataset)] if models else keys
+    shown = chosen_laws(models, dataset)
     swept = [name for name in axes if dataset.sizes[name] > 1]
     config, reasons = _config_and_reasons(dataset, swept, plugin_set)
 

@@ -72,10 +72,11 @@ class Choice:
 
     def __post_init__(self) -> None:
         # imported here: every command reads the kinds
-        from ..config.files import to_plain_data
+        from ..results.selection import as_keys
 
         for name in ("models", "frictions"):
-            object.__setattr__(self, name, to_plain_data(getattr(self, name))[0])
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, as_keys(getattr(self, name)))
         if self.log not in ("", *LOG_AXES):
             raise UsageError(f"{argument('log')}: got {self.log}, expected {', '.join(LOG_AXES)}")
 
@@ -148,7 +149,7 @@ def length(size: str | float | None, origin: str) -> float | None:
     if not isinstance(inches, float | int) or not MIN_SIZE_INCHES <= inches <= MAX_SIZE_INCHES:
         expected = f"a length from 26mm to {MAX_SIZE_INCHES:g}in, such as 84mm, 8.4cm or 3.3in"
         names = f", or {' or '.join(WIDTHS)}" if origin.endswith("width") else ""
-        raise UsageError(f"{origin}: got {size}, expected {expected}{names}")
+        raise UsageError(f"{origin}: got {plain}, expected {expected}{names}")
     return float(inches)
 
 

@@ -16,7 +16,7 @@ from ..contact.variables import OUTPUTS
 from ..errors import UsageError
 from ..formatting import argument, heading
 from ..results.kinds import is_sensitivity
-from ..results.selection import law_positions, select
+from ..results.selection import select, select_laws
 from ..results.sensitivity import distribution_texts
 from .data import Points
 from .kinds import Choice, Kind
@@ -143,9 +143,7 @@ def sensitivity_bars(dataset: xr.Dataset, choice: Choice) -> BarData:
     for name, value in (("x", choice.x), ("y", choice.y), ("log", choice.log)):
         if value:
             raise UsageError(f"{argument(name)}: does not apply to the picture of a sensitivity study")
-    if choice.models:
-        dataset = dataset.isel(model=law_positions(choice.models, dataset))
-    data = select(dataset, choice.sel or {}).load()
+    data = select(select_laws(dataset, choice.models), choice.sel or {}).load()
     data = data.isel({dim: 0 for dim in data["mean"].dims if dim != "model"})
     panels: list[BarPanel] = []
     not_drawn: list[str] = []

@@ -15,7 +15,7 @@ from ..contact.units import names_in, with_numbers
 from ..errors import UsageError, did_you_mean
 from ..formatting import NO_BREAK, argument, prefixed, safe_text
 from ..results.schema import exponents_of, plain_unit
-from ..results.selection import law_positions, select
+from ..results.selection import select, select_laws
 from .kinds import Choice
 
 if TYPE_CHECKING:
@@ -154,11 +154,7 @@ def _select(dataset: xr.Dataset, choice: Choice) -> xr.Dataset:
     """Select the chosen models, friction laws and values of a result."""
     if "model" not in dataset.dims:
         raise not_a_sweep()
-    if choice.models:
-        dataset = dataset.isel(model=law_positions(choice.models, dataset))
-    if choice.frictions:
-        dataset = dataset.isel(friction=law_positions(choice.frictions, dataset, "friction"))
-    return select(dataset, choice.sel or {})
+    return select(select_laws(dataset, choice.models, choice.frictions), choice.sel or {})
 
 
 def _drop_other_axes(dataset: xr.Dataset, dims: Sequence[object]) -> xr.Dataset:

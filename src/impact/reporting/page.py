@@ -98,7 +98,7 @@ def page(
 def _page_of(dataset: xr.Dataset, models: Sequence[str] | None) -> str:
     if "model" not in dataset.dims or SAMPLE in dataset.dims or not axes_of(dataset):
         raise UsageError("expected the result of a sweep over an axis; impact report writes a page of any result")
-    positions = law_positions(models, dataset) if models else [*range(dataset.sizes["model"])]
+    positions = law_positions(models, dataset)
     table = table_of_result(dataset)
     if table is None:
         dataset, positions = dataset.isel(model=positions), [*range(len(positions))]

@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 
 from ..atomic import check_outputs, write_file
 from ..config.draft import Setting
-from ..config.files import to_plain_data
 from ..config.input_names import InputName, is_input
 from ..config.material_library import library
 from ..config.tables import MATERIAL_QUANTITIES
@@ -48,7 +47,7 @@ from ..results.provenance import stored_config
 from ..results.ranking import DEFAULT_TOL, Ranking, rank_models, rankable_parts
 from ..results.replay_command import describe_point
 from ..results.schema import FIT_STATUSES, count_points, exponents_of
-from ..results.selection import law_positions
+from ..results.selection import select_laws
 from ..results.sensitivity import INDEX_HEADINGS, describe_design, describe_study, index_rows, iterate_studies
 from ..results.slabs import MAX_SUMMARY_POINTS, is_large
 from ..results.summary import Summary, extremes_of, summarize
@@ -137,9 +136,8 @@ def _report_of(
     if "model" not in dataset.dims:
         raise UsageError("got a time history, expected the result of a sweep")
     model_count, part_notes = dataset.sizes["model"], []
-    models, _ = to_plain_data(models)
-    if models:
-        dataset = dataset.isel(model=law_positions(models, dataset))
+    dataset = select_laws(dataset, models)
+    if dataset.sizes["model"] < model_count:
         part_notes = [f"this page shows {dataset.sizes['model']} of the {model_count} models of the result"]
     sections = sections or SECTIONS
     summary = with_depths(summarize(dataset, MAX_FAILED), dataset)

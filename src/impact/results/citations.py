@@ -6,7 +6,6 @@ import re
 import unicodedata
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -16,9 +15,10 @@ from ..contact.catalogue import look_up
 from ..contact.friction import FrictionLaw
 from ..contact.frictions import frictions
 from ..contact.model import ForceModel
-from ..display import Block, Displayed
+from ..display import LATEX_CHARACTERS, Block, Displayed
 from ..engine.model_catalogue import models
 from ..errors import UsageError
+from .selection import chosen_laws
 from .xarray_backend import load
 
 # "Tsuji Y, Tanaka T (1992) Title. Journal 71, 239"; the title may be missing, and something may follow
@@ -33,18 +33,11 @@ ARTICLES = (
     re.compile(r"(?P<title>.+?)\. (?P<howpublished>.+)"),
     re.compile(r"(?P<howpublished>.*)"),
 )
-# names of letters of Greek that LaTeX has: "GREEK SMALL LETTER CHI"
-GREEK = {
-    letter: unicodedata.name(letter).rpartition(" ")[2].replace("LAMDA", "LAMBDA")
-    for letter in "αβγδεζηθικλμνξπρστυφχψωΓΔΘΛΞΠΣΥΦΨΩ"
-}
-# what LaTeX does not print as it is
-LATEX = {
-    **{letter: rf"\{letter}" for letter in "&%$#_{}"},
-    **{letter: rf"$\{name.title() if letter.isupper() else name.lower()}$" for letter, name in GREEK.items()},
+# what LaTeX does not print as it is, besides letters of Greek and raised or lowered characters
+SYMBOLS = {
+    **{chr(code): text for code, text in LATEX_CHARACTERS.items()},
     **{"µ": r"$\mu$", "√": r"$\surd$", "∞": r"$\infty$", "≤": r"$\le$", "≥": r"$\ge$", "≈": r"$\approx$"},
     **{"−": "$-$", "<": "$<$", ">": "$>$"},
-    **{"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"},
 }
 
 
@@ -122,15 +115,13 @@ def cite(*laws: str | Path | xr.Dataset | ForceModel | FrictionLaw, plugins: Seq
         if isinstance(item, ForceModel | FrictionLaw):
             chosen[item.key] = item
             continue
-        if not isinstance(item, xr.Dataset) and (isinstance(item, Path) or Path(item).suffix):
-            item = load(item)
-        if isinstance(item, xr.Dataset):
-            coordinates = (item.coords[name] for name in ("model", "friction") if name in item.coords)
-            # the laws of a calibration with friction are pairs
-            laws_of = (str(key).split(" with ") for coordinate in coordinates for key in coordinate.values.flat)
-            keys = list(chain.from_iterable(laws_of))
-        else:
+        if isinstance(item, str) and not Path(item).suffix:
             keys = [item]
+        else:
+            result = item if isinstance(item, xr.Dataset) else load(item)
+            names = [*chosen_laws(None, result), *chosen_laws(None, result, "friction")]
+            # the laws of a calibration with friction are pairs
+            keys = [key for name in names for key in name.split(" with ")]
         chosen |= {key: look_up(known, key, "law") for key in keys}
     return Citations(Citation(key, bibtex(law), dict(vars(law.evidence))) for key, law in chosen.items())
 
@@ -180,10 +171,14 @@ def _escape(text: str) -> str:
     >>> print(_escape("χ of e² and v₀, 3 %"))
     $\chi$ of e$^2$ and v$_0$, 3 \%
     """
-    return "".join(LATEX.get(letter) or _in_line(letter) for letter in text)
+    return "".join(SYMBOLS.get(letter) or _mathematics(letter) for letter in text)
 
 
-def _in_line(letter: str) -> str:
-    """Write a raised or lowered character as mathematics."""
+def _mathematics(letter: str) -> str:
+    """Write a letter of Greek, or a raised or lowered character, as mathematics; another one is unchanged."""
+    greek = re.fullmatch(r"GREEK (CAPITAL|SMALL) LETTER (\w+)", unicodedata.name(letter, ""))
+    if greek:
+        name = greek[2].replace("LAMDA", "LAMBDA")
+        return rf"$\{name.title() if greek[1] == 'CAPITAL' else name.lower()}$"
     sign = {"<sub>": "_", "<super>": "^"}.get(unicodedata.decomposition(letter).partition(" ")[0])
     return f"${sign}{unicodedata.normalize('NFKC', letter)}$" if sign else letter

@@ -7,14 +7,14 @@ from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, Literal, SupportsFloat, overload
+from typing import Any, SupportsFloat, overload
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
 from ..array_types import Mask
-from ..config.files import read_number, to_plain_data
+from ..config.files import read_number
 from ..config.input_names import InputName
 from ..config.quantities import Quantity
 from ..config.tables import TOLERANCE
@@ -26,7 +26,7 @@ from ..formatting import argument, number, percentage, safe_text
 from .kinds import require_sweep
 from .replay_command import describe_point
 from .schema import columns_along, foreign_dims
-from .selection import law_positions, select
+from .selection import LawDim, as_keys, law_positions, select
 from .slabs import Slab, distinct_points, is_computed, over_varying_dims, slabs, varying_dims
 from .xarray_backend import result_of
 
@@ -127,16 +127,6 @@ class Ranked:
         return 0 < self.points == self.within
 
     @property
-    def percent(self) -> str:
-        """The share as text: 0% and 100% mean exactly none and all.
-
-        >>> nan = math.nan
-        >>> [Ranked("hertz", {}, 3000, n, 0, nan, nan, {}, nan, None).percent for n in (0, 1, 2000, 2999, 3000)]
-        ['0%', '<0.1%', '66.7%', '>99.9%', '100%']
-        """
-        return percentage(self.share)
-
-    @property
     def row(self) -> tuple[str, ...]:
         """The model in a table under `Ranking.headings`.
 
@@ -150,7 +140,7 @@ class Ranked:
         errors = map(_error_text, (self.max_error, self.mean_error))
         has_worst = self.at and self.max_error > MIN_ERROR_FLOOR
         worst = f"{describe_point(self.at, 6)}: {self.output} {number(self.e_out, 4)}" if has_worst else "–"
-        return (self.name, self.percent, *errors, f"{self.failed:,}", worst, self._served_text)
+        return (self.name, percentage(self.share), *errors, f"{self.failed:,}", worst, self._served_text)
 
     @property
     def _served_text(self) -> str:
@@ -218,8 +208,8 @@ class Ranking(Displayed, Sequence[Ranked]):
             nearest = [
                 ranked for ranked in self.models if _rank_key(ranked, self.floor) == _rank_key(first, self.floor)
             ]
-            verb = "are" if len(nearest) > 1 else "is"
-            return f"{nothing} everywhere; {_listed(nearest)} {verb} nearest: {first.percent} of {points}"
+            verb, share = "are" if len(nearest) > 1 else "is", percentage(first.share)
+            return f"{nothing} everywhere; {_listed(nearest)} {verb} nearest: {share} of {points}"
         return f"{nothing} at {alone or f'any of {points}'}"
 
     def as_dict(self) -> dict[str, Any]:
@@ -306,9 +296,8 @@ def recommend(
     dataset = result_of(dataset)
     require_sweep(dataset, "recommend")
     tol = read_number(tol, TOLERANCE, "tol")
-    models, frictions = (to_plain_data(keys)[0] for keys in (models, frictions))
     criterion = BY_ERROR if target is None else _criterion_of(target)
-    if frictions and not OUTPUTS[criterion.names[0]].of_friction:
+    if as_keys(frictions) and not OUTPUTS[criterion.names[0]].of_friction:
         origin, of = argument("frictions"), argument("target")
         raise UsageError(f"{origin}: expected a {of} that depends on friction, such as beta=0.4")
     return rank_models(rankable_parts(dataset, sel or {}, models, criterion, frictions), tol, criterion)
@@ -342,10 +331,10 @@ def rankable_parts(
     """Select the part of each law to rank; refuse a result that lacks a target or has too many points."""
     _check_rankable(dataset, criterion)
     selected, places = select(dataset[list(criterion.names)], sel), [{"model": 0}]
-    wanted: dict[Literal["model", "friction"], Sequence[str] | None] = {"model": models, "friction": frictions}
+    wanted: dict[LawDim, object] = {"model": models, "friction": frictions}
     for dim, keys in wanted.items():
         if dim in selected.dims:
-            chosen = law_positions(keys, dataset, dim) if keys else range(dataset.sizes[dim])
+            chosen = law_positions(keys, dataset, dim)
             places = [place | {dim: position} for place in places for position in chosen]
     parts = [_select_law(selected, place) for place in places]
     evaluated = [

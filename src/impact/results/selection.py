@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..array_types import Mask
-from ..config.files import to_plain_value
+from ..config.files import to_plain_data, to_plain_value
 from ..config.quantities import number_in
 from ..errors import UsageError, did_you_mean
 from ..formatting import argument, label, safe_text
@@ -31,19 +31,43 @@ Labels = NDArray[Any]
 IndexArray = NDArray[np.intp]
 
 
-def law_positions(
-    laws: str | Sequence[str], dataset: xr.Dataset, dim: Literal["model", "friction"] = "model"
-) -> list[int]:
-    """Find the positions of one or more models or friction laws, in the order of the keys; each counts once."""
-    laws = [laws] if isinstance(laws, str) else laws
+LawDim = Literal["model", "friction"]
+
+
+def as_keys(names: object) -> list[str]:
+    """List one key or name or several, in a sequence of any library; none for None."""
+    plain, _ = to_plain_data(names)
+    return [plain] if isinstance(plain, str) else list(plain or ())
+
+
+def chosen_laws(laws: object, dataset: xr.Dataset, dim: LawDim = "model") -> list[str]:
+    """List the models or friction laws of a result that are named, each once; all if none is."""
     noun = "friction law" if dim == "friction" else dim
-    if dim not in dataset.dims:
-        raise UsageError(f'no {noun} "{laws[0]}" in this result, which has none; sweep a config with {dim}s')
-    keys = [str(key) for key in dataset[dim].values]
-    for key in laws:
+    wanted = as_keys(laws)
+    keys = [str(key) for key in dataset[dim].values.ravel()] if dim in dataset.coords else []
+    for key in wanted:
+        if not keys:
+            raise UsageError(f'no {noun} "{key}" in this result, which has none; sweep a config with {dim}s')
         if key not in keys:
             raise UsageError(f'no {noun} "{key}" in this result; {did_you_mean(key, keys)}')
-    return [keys.index(key) for key in dict.fromkeys(laws)]
+    return list(dict.fromkeys(wanted or keys))
+
+
+def law_positions(laws: object, dataset: xr.Dataset, dim: LawDim = "model") -> list[int]:
+    """Find the positions of the `chosen_laws`, in the order in which they are named."""
+    keys = chosen_laws(None, dataset, dim)
+    return [keys.index(key) for key in chosen_laws(laws, dataset, dim)]
+
+
+def select_laws(dataset: xr.Dataset, models: object = None, frictions: object = None) -> xr.Dataset:
+    """Select the models and friction laws that are named; all if none is."""
+    wanted: dict[LawDim, object] = {"model": models, "friction": frictions}
+    for dim, laws in wanted.items():
+        positions = law_positions(laws, dataset, dim) if as_keys(laws) else []
+        # the law of a part of a result may be no dimension
+        if positions and dim in dataset.dims:
+            dataset = dataset.isel({dim: positions})
+    return dataset
 
 
 def select(dataset: xr.Dataset, sel: Mapping[str, object]) -> xr.Dataset:

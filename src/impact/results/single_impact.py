@@ -15,6 +15,7 @@ import numpy as np
 import xarray as xr
 
 from .._version import __version__
+from ..arguments import require_counts
 from ..config.columns import without_replaced_inputs
 from ..config.design import distribution_paths
 from ..config.draft import (
@@ -59,6 +60,7 @@ from .plausibility import input_notes
 from .provenance import changed_plugins, stored_config, stored_draft, unknown_plugins
 from .schema import DEFAULT_RTOL_FACTOR, SCHEMA_VERSION, attributes_of, is_case, plain_unit, scale_of
 from .seal import is_result
+from .selection import chosen_laws
 from .xarray_backend import open_result
 
 STARTER_E = "sweep.e=0.5"
@@ -239,16 +241,11 @@ class Impact(Displayed):
             **({"friction": self.friction.key} if self.friction else {}),
             "inputs": dict(self.point),
             "first_value_of": list(self.first),
-            "integrator": self.integrator,
-            "exponent": self.exponent,
-            "closing_speed": self.closing_speed,
+            **{name: getattr(self, name) for name in ("integrator", "exponent", "closing_speed")},
             "outputs": {**self.values, **words},
             "materials": {name: asdict(material) for name, material in self.materials.items()},
             "derived": dict(self.derived),
-            "damping": self.damping,
-            "e_kinematic": self.e_kinematic,
-            "e_kinetic": self.e_kinetic,
-            "e_energetic": self.e_energetic,
+            **{name: getattr(self, name) for name in ("damping", "e_kinematic", "e_kinetic", "e_energetic")},
         }
 
     def records(self) -> Sequence[Mapping[str, Any]]:
@@ -325,8 +322,7 @@ def run(
     >>> round(shot.values["e_out"], 6), round(shot.e_energetic, 6)
     (0.41072, 0.41072)
     """
-    if times is not None and times < 2:
-        raise UsageError(f"times: got {times}, expected a whole number >= 2")
+    require_counts(2, times=times)
     plugin_set = read_plugins(plugins)
     opened = open_source(source, overrides, plugin_set)
     config, first = single_point(opened, model, at, friction=friction)
@@ -487,8 +483,8 @@ def histories(
     """
     if "t" in dataset.dims:
         return [dataset], []
-    keys = _chosen_keys(dataset, "model", models)
-    friction_keys = _chosen_keys(dataset, "friction", frictions) if "friction" in dataset.coords else []
+    keys = chosen_laws(models, dataset)
+    friction_keys = chosen_laws(frictions, dataset, "friction") if "friction" in dataset.coords else []
     integrator = str(dataset.attrs.get("integrator", EXACT))
     if integrator != EXACT:
         raise UsageError(f"no motion to draw in this result: {no_motion(integrator)}")
@@ -532,16 +528,6 @@ def histories(
             f"no motion to draw at {point}: {reason}; choose a point, such as {argument('sel', {'e': 0.5})}"
         )
     return datasets, [f"{key} ({reason})" for key, reason in ends.items() if key not in drawn]
-
-
-def _chosen_keys(dataset: xr.Dataset, dim: str, chosen: str | Sequence[str] | None) -> list[str]:
-    """List the chosen keys of models or friction laws of a result, each once; by default all."""
-    keys = [str(key) for key in dataset[dim].values.ravel()]
-    chosen = [chosen] if isinstance(chosen, str) else chosen
-    for key in chosen or ():
-        if key not in keys:
-            raise UsageError(f'no {dim} "{key}" in this result; {did_you_mean(key, keys)}')
-    return list(dict.fromkeys(chosen or keys))
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ import xarray as xr
 from xarray.backends import BackendEntrypoint
 
 from ..atomic import Sink, atomic_write, check_output, check_outputs
-from ..config.files import RESULT_MAGIC, to_plain_data
+from ..config.files import RESULT_MAGIC
 from ..config.grid import MAX_POINTS
 from ..config.tables import Output
 from ..contact.variables import OUTPUTS
@@ -26,7 +26,7 @@ from .layouts import LAYOUTS
 from .netcdf import RegionValues, encode_attribute, read_variables, write_dataset
 from .schema import MODEL_METADATA
 from .seal import check_seal, write_seal
-from .selection import law_positions, select
+from .selection import select, select_laws
 from .slabs import slabs
 from .trajectory_table import in_memory, table_of_result
 from .validation import schema_violation
@@ -262,9 +262,7 @@ def expand(
     dataset = select(opened, sel or {})
     if "model" not in dataset.dims:
         raise UsageError(f"{shown}: is a time history, expected a result of a sweep")
-    models, _ = to_plain_data(models)
-    if models:
-        dataset = dataset.isel(model=law_positions(models, dataset))
+    dataset = select_laws(dataset, models)
     points = math.prod(dataset.sizes.values())
     if points > max_points:
         part = f"a part, such as {argument('sel', {'e': 0.5})}"

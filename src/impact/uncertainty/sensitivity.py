@@ -24,6 +24,7 @@ from ..engine.plan import Plan
 from ..engine.run import Run
 from ..errors import ConfigError, UsageError, did_you_mean
 from ..formatting import argument
+from ..results.selection import as_keys
 from ..results.sensitivity import HALF, QUANTILES, sensitivity_template
 from ..results.sweep import read_plan, sweep_in_memory
 from ..results.xarray_backend import save
@@ -130,7 +131,7 @@ def sensitivities(
     [187.75797, 0.00998]
     """
     names = [name for name, variable in OUTPUTS.items() if not variable.flags]
-    of = [of] if isinstance(of, str) else of
+    of = as_keys(of)
     for name in of:
         if name not in names:
             raise UsageError(f'{argument("of")}: no output "{name}"; {did_you_mean(name, names)}')
