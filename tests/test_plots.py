@@ -231,6 +231,12 @@ def test_a_motion_is_that_of_a_single_impact(
             single = single_impacts[curve.model]
             history = single.history
             assert history is not None
+            if panel.y_name == "x":
+                # the displacements of an animation are at its frames, before and after the contact too
+                inside = (np.asarray(curve.x) >= 0.0) & (curve.x <= history["t"].values[-1])
+                expected = np.interp(curve.x, history["t"], history[f"x{curve.case[-1]}"])
+                np.testing.assert_array_equal(np.asarray(curve.y)[inside], expected[inside])
+                continue
             assert len(curve.x) == history.sizes["t"]
             if kind == "loop":
                 np.testing.assert_array_equal(curve.x, history["delta"])
