@@ -84,3 +84,19 @@ def test_the_table_has_the_displacement_of_each_ball(single: impact.Impact) -> N
     assert single.history is not None
     columns = list(animation_data([single.history], Choice()).wide_table())
     assert columns[1:3] == [f"x gharib-hurmuzlu-2012 ball{ball} [m]" for ball in (1, 2)]
+
+
+@pytest.mark.parametrize(("mass", "ratio"), [(0.125, 0.5), (1.0, 1.0), (8.0, 2.0)])
+def test_both_balls_are_within_the_picture_in_every_frame(mass: float, ratio: float) -> None:
+    figure = impact.plot(impact.run(at={"e": 0.5, "m2": mass}), kind="animation")
+    assert isinstance(figure, Picture)
+    assert figure.show_frame is not None
+    scene = figure.axes[0]
+    balls = [patch for patch in scene.patches if isinstance(patch, Circle)]
+    assert balls[1].radius == pytest.approx(ratio * balls[0].radius)
+    for index in range(figure.frame_count):
+        figure.show_frame(index)
+        for ball in balls:
+            (x, _), radius = ball.center, ball.radius
+            assert scene.get_xlim()[0] < x - radius < x + radius < scene.get_xlim()[1]
+            assert scene.get_ylim()[1] > radius

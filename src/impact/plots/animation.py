@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 
 # free flight before and after the contact, over the contact time
 FRAMES, FREE_FLIGHT = 80, 0.3
-# drawn radius of the smaller ball over the largest displacement, and the largest ratio of radii, which looks plane
-RADIUS, PLANE = 0.6, 50.0
+# drawn radius of the smaller ball over the largest displacement; ratios of radii: that looks plane, of the window
+RADIUS, PLANE, WINDOW = 0.6, 50.0, 2.0
 # the curves are beside each other only where each has room for its numbers [in]
 MIN_WIDTH_OF_ROW = 5.0
 COLOURS = ("#0072B2", "#D55E00")
@@ -65,12 +65,11 @@ class AnimationData(CurveData):
             # the only marker is at the end that moves
             line.set(linestyle="-", marker="o", markevery=[-1], markerfacecolor=line.get_color())
             lines.append(line)
-        balls = [Circle((0.0, 0.0), r, fc=(c, 0.5), ec=c) for r, c in zip(self.radii, COLOURS, strict=True)]
-        for ball in balls:
-            scene.add_patch(ball)
-        room = 2.1 * min(self.radii)
-        low, high = min(surfaces.curves[0].y) - room, max(surfaces.curves[1].y) + room
-        scene.set(xlim=(low, high), ylim=(-room / 2.0, room / 2.0), yticks=[], aspect="equal")
+        circles = (Circle((0, 0), r, fc=(c, 0.5), ec=c) for r, c in zip(self.radii, COLOURS, strict=True))
+        balls = [scene.add_patch(circle) for circle in circles]
+        sizes = np.minimum(self.radii, WINDOW * min(self.radii))
+        low, high = min(surfaces.curves[0].y) - 2.1 * sizes[0], max(surfaces.curves[1].y) + 2.1 * sizes[1]
+        scene.set(xlim=(low, high), ylim=(-1.05 * max(sizes), 1.05 * max(sizes)), yticks=[], aspect="equal")
         scene.spines["left"].set_visible(False)
         label_axis(scene.xaxis, surfaces.y_label, "x", "m", max(-low, high), labels, log=False)
         # a method, so that a figure can be pickled
@@ -95,7 +94,6 @@ def animation_data(histories: Sequence[xr.Dataset], choice: Choice) -> Animation
     """Follow one impact in uniform frames, from before the contact until after it; other laws are left out."""
     curves = curves_over("Impact", histories[:1], [("t", "F", ""), ("delta", "F", "")], choice)
     force, history = curves.panels[0], histories[0]
-    (curve,) = force.curves
     t = history["t"].values
     frames = np.linspace(-FREE_FLIGHT, 1.0 + FREE_FLIGHT, FRAMES) * t[-1]
     # velocities are constant outside the contact
@@ -104,8 +102,10 @@ def animation_data(histories: Sequence[xr.Dataset], choice: Choice) -> Animation
     for ball in ("1", "2"):
         x, v = history[f"x{ball}"].values, history[f"v{ball}"].values
         path = np.interp(frames, t, x) + before * v[0] + after * v[-1]
-        surfaces.append(replace(curve, variable="x", case=f"ball {ball}", x=tuple(frames), y=tuple(path)))
-    scene = replace(force, y_label="displacement of the surfaces", y_name="x", y_unit="m", curves=tuple(surfaces))
+        surfaces.append(
+            replace(force.curves[0], variable="x", case=f"ball {ball}", x=tuple(frames), y=tuple(path))
+        )
+    scene = replace(force, y_label="displacement", y_name="x", y_unit="m", curves=tuple(surfaces))
     masses = np.array([impact_inputs(history)["m1"], impact_inputs(history)["m2"]], float)
     radii = np.minimum(np.cbrt(masses / masses.min()), PLANE) * RADIUS * np.abs([c.y for c in surfaces]).max()
     left_out = ("the other laws: an animation shows one impact",) if len(histories) > 1 else ()
@@ -113,5 +113,5 @@ def animation_data(histories: Sequence[xr.Dataset], choice: Choice) -> Animation
 
 
 ANIMATION = motion(
-    "animation", "Both balls of one impact, its force over time, and the loop.", animation_data, in_report=False
+    "animation", "Both balls of an impact, force over time and loop.", animation_data, in_report=False
 )
