@@ -65,8 +65,9 @@ class AnimationData(CurveData):
             # the only marker is at the end that moves
             line.set(linestyle="-", marker="o", markevery=[-1], markerfacecolor=line.get_color())
             lines.append(line)
-        circles = (Circle((0, 0), r, fc=(c, 0.5), ec=c) for r, c in zip(self.radii, COLOURS, strict=True))
-        balls = [scene.add_patch(circle) for circle in circles]
+        balls = [Circle((0.0, 0.0), r, fc=(c, 0.5), ec=c) for r, c in zip(self.radii, COLOURS, strict=True)]
+        for ball in balls:
+            scene.add_patch(ball)
         sizes = np.minimum(self.radii, WINDOW * min(self.radii))
         low, high = min(surfaces.curves[0].y) - 2.1 * sizes[0], max(surfaces.curves[1].y) + 2.1 * sizes[1]
         scene.set(xlim=(low, high), ylim=(-1.05 * max(sizes), 1.05 * max(sizes)), yticks=[], aspect="equal")
@@ -84,7 +85,6 @@ class AnimationData(CurveData):
         surfaces, *curve_panels = self.panels
         for ball, surface, side in zip(balls, surfaces.curves, (-1.0, 1.0), strict=True):
             ball.center = surface.y[index] + side * ball.radius, 0.0
-        # the curves begin at the first contact
         count = max(1, int(np.searchsorted(curve_panels[0].curves[0].x, surfaces.curves[0].x[index], "right")))
         for panel, line in zip(curve_panels, lines, strict=True):
             line.set_data(panel.curves[0].x[:count], panel.curves[0].y[:count])
