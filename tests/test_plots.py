@@ -610,6 +610,17 @@ def test_every_line_and_text_follows_the_colours_of_a_style(coarse: xr.Dataset, 
     assert max(to_rgb(figure.axes[-1].get_xgridlines()[0].get_color())) == pytest.approx(0.1)
 
 
+def test_a_floor_of_errors_is_named_where_smaller_ones_are_drawn_at_it(coarse: xr.Dataset) -> None:
+    def floors(result: xr.Dataset) -> list[str]:
+        return [
+            text.get_text() for text in impact.plot(result, kind="error").axes[1].texts if "≤" in text.get_text()
+        ]
+
+    assert float(np.abs(coarse["e_error"]).min()) < 1e-9
+    assert floors(coarse) == ["≤ $10^{-9}$"]
+    assert floors(coarse.assign(e_error=coarse["e_error"] + 0.01)) == []
+
+
 def test_labels_titles_and_sizes_are_chosen(coarse: xr.Dataset) -> None:
     labels = {"e": "Restitution $e$", "gharib-hurmuzlu-2012": "G & H", "reference": "Exact", "title": "Mine"}
     figure = impact.plot(coarse, labels=labels, width="84mm", height="60mm")
