@@ -25,7 +25,7 @@ def single() -> impact.Impact:
 def test_a_frame_shows_the_surfaces_and_the_force_of_its_time(single: impact.Impact) -> None:
     history = single.history
     assert history is not None
-    data = animation_data([history], Choice())
+    frames = animation_data([history], Choice()).panels[0].curves[0].x
     figure = impact.plot(single, kind="animation")
     assert isinstance(figure, Picture)
     assert figure.show_frame is not None
@@ -36,7 +36,7 @@ def test_a_frame_shows_the_surfaces_and_the_force_of_its_time(single: impact.Imp
     contact_time = float(history["t"][-1])
     for index in (0, FRAMES // 2, FRAMES - 1):
         figure.show_frame(index)
-        time = data.frames[index]
+        time = frames[index]
         surfaces = balls[0].center[0] + balls[0].radius, balls[1].center[0] - balls[1].radius
         if time < 0.0:
             # ball 1 comes with 1 m/s to the place of contact, ball 2 rests
@@ -78,3 +78,25 @@ def test_only_an_animation_is_a_gif(single: impact.Impact, cli: Run, tmp_path: P
     message = "a.gif: a .gif is an animation, expected --kind animation\n"
     assert (done.returncode, done.stderr) == (2, message)
     assert not (tmp_path / "a.gif").exists()
+
+
+def test_the_table_has_the_displacement_of_each_ball(single: impact.Impact) -> None:
+    assert single.history is not None
+    columns = list(animation_data([single.history], Choice()).wide_table())
+    assert columns[1:3] == [f"x gharib-hurmuzlu-2012 ball{ball} [m]" for ball in (1, 2)]
+
+
+@pytest.mark.parametrize(("mass", "ratio"), [(0.125, 0.5), (1.0, 1.0), (8.0, 2.0)])
+def test_both_balls_are_within_the_picture_in_every_frame(mass: float, ratio: float) -> None:
+    figure = impact.plot(impact.run(at={"e": 0.5, "m2": mass}), kind="animation")
+    assert isinstance(figure, Picture)
+    assert figure.show_frame is not None
+    scene = figure.axes[0]
+    balls = [patch for patch in scene.patches if isinstance(patch, Circle)]
+    assert balls[1].radius == pytest.approx(ratio * balls[0].radius)
+    for index in range(figure.frame_count):
+        figure.show_frame(index)
+        for ball in balls:
+            (x, _), radius = ball.center, ball.radius
+            assert scene.get_xlim()[0] < x - radius < x + radius < scene.get_xlim()[1]
+            assert scene.get_ylim()[1] > radius

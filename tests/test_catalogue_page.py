@@ -191,6 +191,18 @@ def test_a_link_shows_the_row_of_a_law_as_a_whole(page: Page, site: Path, width:
     assert page.settled(is_in_upper_half("jkr-1971"))
 
 
+def test_the_columns_of_a_laptop_have_room_for_their_words(table: Page) -> None:
+    cells = "[...document.querySelectorAll('.catalogue td:last-child')]"
+    assert table.settled(f"Math.min(...{cells}.map(cell => cell.clientWidth))") >= 125
+    # the median of the rows is not much higher than the curve of a law and its names
+    rows = "[...document.querySelectorAll('.catalogue tbody tr')].map(row => row.offsetHeight)"
+    heights = sorted(table.evaluate(rows))
+    assert heights[len(heights) // 2] < 225
+    # names are not broken within a word
+    families = "[...document.querySelectorAll('.catalogue td[data-label=\"family\"] a')]"
+    assert table.evaluate(f"Math.max(...{families}.map(link => link.getClientRects().length))") <= 2
+
+
 def test_a_law_opens_and_its_example_is_copied_and_runs(table: Page) -> None:
     # a law with a parameter without a default
     link = "document.getElementById('kuwabara-kono-1987').closest('tr').querySelector('a code').closest('a')"

@@ -231,6 +231,12 @@ def test_a_motion_is_that_of_a_single_impact(
             single = single_impacts[curve.model]
             history = single.history
             assert history is not None
+            if panel.y_name == "x":
+                # the displacements of an animation are at its frames, before and after the contact too
+                inside = (np.asarray(curve.x) >= 0.0) & (curve.x <= history["t"].values[-1])
+                expected = np.interp(curve.x, history["t"], history[f"x{curve.case[-1]}"])
+                np.testing.assert_array_equal(np.asarray(curve.y)[inside], expected[inside])
+                continue
             assert len(curve.x) == history.sizes["t"]
             if kind == "loop":
                 np.testing.assert_array_equal(curve.x, history["delta"])
@@ -602,6 +608,17 @@ def test_every_line_and_text_follows_the_colours_of_a_style(coarse: xr.Dataset, 
     for line in (line for axes in figure.axes for line in axes.lines if line.get_marker() not in ("None", "o")):
         assert to_rgb(line.get_markerfacecolor()) == (0.0, 0.0, 0.0)
     assert max(to_rgb(figure.axes[-1].get_xgridlines()[0].get_color())) == pytest.approx(0.1)
+
+
+def test_a_floor_of_errors_is_named_where_smaller_ones_are_drawn_at_it(coarse: xr.Dataset) -> None:
+    def floors(result: xr.Dataset) -> list[str]:
+        return [
+            text.get_text() for text in impact.plot(result, kind="error").axes[1].texts if "≤" in text.get_text()
+        ]
+
+    assert float(np.abs(coarse["e_error"]).min()) < 1e-9
+    assert floors(coarse) == ["≤ $10^{-9}$"]
+    assert floors(coarse.assign(e_error=coarse["e_error"] + 0.01)) == []
 
 
 def test_labels_titles_and_sizes_are_chosen(coarse: xr.Dataset) -> None:

@@ -256,8 +256,9 @@ def test_results_can_be_pickled(make: Callable[[], object]) -> None:
     assert str(after) == str(before)
 
 
-def test_figures_can_be_pickled(result: xr.Dataset) -> None:
-    figure = impact.plot(result, kind="restitution")
+@pytest.mark.parametrize("kind", ["restitution", "animation"])
+def test_figures_can_be_pickled(result: xr.Dataset, kind: str) -> None:
+    figure = impact.plot(result, kind=kind)
     again = pickle.loads(pickle.dumps(figure))
     again.canvas.draw()
     figure.canvas.draw()

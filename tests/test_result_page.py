@@ -104,6 +104,18 @@ def test_inputs_that_vary_together_are_named_beside_their_slider() -> None:
     assert axis["texts"] == ["1 kg, m2 = 1 kg", "2 kg, m2 = ∞"]
 
 
+@pytest.mark.parametrize(("viscosity", "label"), [("1 us", ", A = 1 µs"), (["1 us", "2 us"], "")])
+def test_laws_are_named_with_their_parameters_of_one_value(viscosity: object, label: str) -> None:
+    config = {
+        "models": ["hertz", "kuwabara-kono-1987"],
+        "model": {"kuwabara-kono-1987": {"A": viscosity}},
+        "sweep": {"e": 0.5, "v1": [1.0, 2.0], "m1": 1.0, "m2": 1.0, "K": 1e9},
+    }
+    laws = content_of(impact.page(impact.sweep(config)))["laws"]
+    labels = [law["label"].replace("\xa0", " ") for law in laws]
+    assert labels == ["Hertz (1882)", f"Kuwabara and Kono (1987){label}"]
+
+
 def test_the_command_writes_a_page(results: dict[str, xr.Dataset], cli: Run, tmp_path: Path) -> None:
     impact.save(results["part"], tmp_path / "part.h5")
     done = cli("page", "part.h5", "--model", "bilinear", cwd=tmp_path)
@@ -231,6 +243,27 @@ def test_sliders_laws_the_cursor_and_the_numbers_follow_the_controls(
     assert "interpolated" not in browser.evaluate("document.getElementById('note').textContent")
 
 
+# of each curve to the paper, by the definition of WCAG
+CONTRASTS = """
+(() => {
+  const context = document.createElement('canvas').getContext('2d', {willReadFrequently: true});
+  const luminance = colour => {
+    context.fillStyle = colour;
+    context.fillRect(0, 0, 1, 1);
+    const [r, g, b] = [...context.getImageData(0, 0, 1, 1).data].map(
+      level => level / 255 <= 0.04045 ? level / 255 / 12.92 : ((level / 255 + 0.055) / 1.055) ** 2.4
+    );
+    return 0.2126 * r + 0.7152 * g + 0.0722 * b;
+  };
+  const paper = luminance(getComputedStyle(document.body).backgroundColor);
+  return [...document.querySelectorAll('svg .curve')].map(curve => {
+    const [low, high] = [luminance(getComputedStyle(curve).stroke), paper].sort((a, b) => a - b);
+    return (high + 0.05) / (low + 0.05);
+  });
+})()
+"""
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("width", [400, 1280, 1600])
 @pytest.mark.parametrize("scheme", ["light", "dark"])
@@ -253,5 +286,8 @@ def test_a_page_fits_its_window(
     colours = "(style => [style.color, style.backgroundColor])(getComputedStyle(document.body))"
     ink, paper = (sum(map(int, re.findall(r"\d+", colour))) for colour in browser.evaluate(colours))
     assert (ink < paper) == (scheme == "light")
+    # curves are legible on either paper, as parts of pictures have to be
+    contrasts = browser.evaluate(CONTRASTS)
+    assert min(contrasts) >= (3.0 if scheme == "dark" else 2.0)
     browser.screenshot(tmp_path / "page.png")
     assert (tmp_path / "page.png").stat().st_size > 10_000

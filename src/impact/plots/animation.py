@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, ClassVar
 
@@ -14,47 +14,36 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 
-from ..array_types import Array
 from .curves import CurveData
 from .data import Points
-from .kinds import Choice, Kind
+from .kinds import Choice
 from .labels import label_axis
 from .layout import Picture
-from .motions import choose_point, curves_over, impact_inputs
+from .motions import curves_over, impact_inputs, motion
 from .style import tint
 
 if TYPE_CHECKING:
     import xarray as xr
 
-FRAMES = 80
 # free flight before and after the contact, over the contact time
-FREE_FLIGHT = 0.3
-# drawn radius of the smaller ball over the largest displacement: displacements are magnified, the balls are not;
-# and the largest ratio of radii, which looks like a plane
-RADIUS, PLANE = 0.6, 50.0
-# the panels beside each other only where each has room for its numbers [in]
+FRAMES, FREE_FLIGHT = 80, 0.3
+# drawn radius of the smaller ball over the largest displacement; ratios of radii: that looks plane, of the window
+RADIUS, PLANE, WINDOW = 0.6, 50.0, 2.0
+# the curves are beside each other only where each has room for its numbers [in]
 MIN_WIDTH_OF_ROW = 5.0
 COLOURS = ("#0072B2", "#D55E00")
 
 
 @dataclass(frozen=True)
 class AnimationData(CurveData):
-    """Force over time and indentation of one impact, and where the surfaces of both balls are in each frame."""
+    """Displacement and force over time, and force over indentation, of one impact.
 
-    times: tuple[float, ...] = ()  # of the points of the curves [s]
-    frames: tuple[float, ...] = ()  # times of the frames [s]
-    surfaces: tuple[tuple[float, ...], ...] = ()  # displacement of each ball in each frame [m]
-    radii: tuple[float, ...] = ()  # of the drawn balls [m]
+    The displacements are drawn as balls that move, and are larger than in proportion to them.
+    """
+
+    radii: tuple[float, ...] = ()  # of the drawn balls [m], which have equal densities
 
     takes_points: ClassVar[bool] = False
-
-    @property
-    def panel_count(self) -> int:
-        return 1 + len(self.panels)
-
-    @property
-    def names(self) -> set[str]:
-        return super().names | {"x"}
 
     def place_panels(self, figure: Figure, width: float) -> tuple[list[Axes], float]:
         """Place the balls above both curves."""
@@ -67,96 +56,62 @@ class AnimationData(CurveData):
         self, all_axes: Sequence[Axes], labels: Mapping[str, str], points: Points | None
     ) -> list[tuple[Artist, str]]:
         """Draw the last frame; a `Picture` can show the others too."""
-        scene, *curve_axes = all_axes
-        entries: list[tuple[Artist, str]] = []
-        lines, dots = [], []
-        for axes, panel in zip(curve_axes, self.panels, strict=True):
-            entries = CurveData(self.title, self.conditions, (panel,)).draw([axes], labels, None)
-            (line,) = axes.lines
-            axes.plot(line.get_xdata(), line.get_ydata(), color=tint(0.22), linewidth=0.8, zorder=1.0, label="_")
+        (scene, *curve_axes), (surfaces, *curve_panels) = all_axes, self.panels
+        entries, lines = list[tuple[Artist, str]](), list[Line2D]()
+        for axes, panel in zip(curve_axes, curve_panels, strict=True):
+            entries = CurveData(self.title, self.conditions, (panel,)).draw([axes], labels, points)
+            line = axes.lines[-1]
+            axes.plot(*line.get_data(), color=tint(0.22), linewidth=0.8, zorder=1.0, label="_")
+            # the only marker is at the end that moves
+            line.set(linestyle="-", marker="o", markevery=[-1], markerfacecolor=line.get_color())
             lines.append(line)
-            dots += axes.plot([], [], "o", color=tint(1.0), markersize=5.0, zorder=4.0, label="_")
-        balls = self._draw_balls(scene, labels)
-        show = partial(self.show_frame, balls=balls, lines=lines, dots=dots)
-        show(len(self.frames) - 1)
-        if isinstance(picture := scene.figure, Picture):
-            picture.show_frame, picture.frame_count = show, len(self.frames)
-        return entries
-
-    def _draw_balls(self, scene: Axes, labels: Mapping[str, str]) -> list[Circle]:
-        """Draw both balls over an axis of their displacements."""
         balls = [Circle((0.0, 0.0), r, fc=(c, 0.5), ec=c) for r, c in zip(self.radii, COLOURS, strict=True)]
         for ball in balls:
             scene.add_patch(ball)
-        least = min(self.radii)
-        low, high = min(self.surfaces[0]) - 2.1 * least, max(self.surfaces[1]) + 2.1 * least
-        scene.set(xlim=(low, high), ylim=(-1.1 * least, 1.1 * least), yticks=[])
-        scene.set_aspect("equal")
-        scene.grid(visible=False)
+        sizes = np.minimum(self.radii, WINDOW * min(self.radii))
+        low, high = min(surfaces.curves[0].y) - 2.1 * sizes[0], max(surfaces.curves[1].y) + 2.1 * sizes[1]
+        scene.set(xlim=(low, high), ylim=(-1.05 * max(sizes), 1.05 * max(sizes)), yticks=[], aspect="equal")
         scene.spines["left"].set_visible(False)
-        label_axis(
-            scene.xaxis, "displacement of the surfaces", "x", "m", max(map(abs, (low, high))), labels, log=False
-        )
-        return balls
+        label_axis(scene.xaxis, surfaces.y_label, "x", "m", max(-low, high), labels, log=False)
+        # a method, so that a figure can be pickled
+        show_frame = partial(self.show_frame, balls, lines)
+        show_frame(FRAMES - 1)
+        if isinstance(scene.figure, Picture):
+            scene.figure.show_frame, scene.figure.frame_count = show_frame, FRAMES
+        return entries
 
-    def show_frame(
-        self, index: int, *, balls: Sequence[Circle], lines: Sequence[Line2D], dots: Sequence[Line2D]
-    ) -> None:
-        """Move the balls, and the curves with the points at their ends, to a frame."""
-        for ball, surface, side in zip(balls, self.surfaces, (-1.0, 1.0), strict=True):
-            ball.center = surface[index] + side * ball.radius, 0.0
-        count = max(1, int(np.searchsorted(self.times, self.frames[index], side="right")))
-        for panel, line, dot in zip(self.panels, lines, dots, strict=True):
-            x, y = panel.curves[0].x[:count], panel.curves[0].y[:count]
-            line.set_data(x, y)
-            dot.set_data(x[-1:], y[-1:])
+    def show_frame(self, balls: Sequence[Circle], lines: Sequence[Line2D], index: int) -> None:
+        """Move the balls and the ends of the curves to a frame."""
+        surfaces, *curve_panels = self.panels
+        for ball, surface, side in zip(balls, surfaces.curves, (-1.0, 1.0), strict=True):
+            ball.center = surface.y[index] + side * ball.radius, 0.0
+        count = max(1, int(np.searchsorted(curve_panels[0].curves[0].x, surfaces.curves[0].x[index], "right")))
+        for panel, line in zip(curve_panels, lines, strict=True):
+            line.set_data(panel.curves[0].x[:count], panel.curves[0].y[:count])
 
 
 def animation_data(histories: Sequence[xr.Dataset], choice: Choice) -> AnimationData:
     """Follow one impact in uniform frames, from before the contact until after it; other laws are left out."""
-    shown, others = histories[:1], histories[1:]
-    curves = curves_over("Impact", shown, [("t", "F", ""), ("delta", "F", "")], choice)
-    history = shown[0]
-    t = np.asarray(history["t"].values, float)
-    frames = np.linspace(-FREE_FLIGHT * t[-1], (1.0 + FREE_FLIGHT) * t[-1], FRAMES)
-    surfaces = [_displacement(history, ball, t, frames) for ball in ("1", "2")]
-    radius = RADIUS * max(float(np.abs(surface).max()) for surface in surfaces)
-    left_out = (f"{len(others)} other laws: an animation shows one impact",) if others else ()
-    return AnimationData(
-        curves.title,
-        curves.conditions,
-        curves.panels,
-        not_drawn=(*curves.not_drawn, *left_out),
-        times=tuple(t.tolist()),
-        frames=tuple(frames.tolist()),
-        surfaces=tuple(tuple(surface.tolist()) for surface in surfaces),
-        radii=tuple(radius * ratio for ratio in _radius_ratios(history)),
-    )
+    curves = curves_over("Impact", histories[:1], [("t", "F", ""), ("delta", "F", "")], choice)
+    force, history = curves.panels[0], histories[0]
+    t = history["t"].values
+    frames = np.linspace(-FREE_FLIGHT, 1.0 + FREE_FLIGHT, FRAMES) * t[-1]
+    # velocities are constant outside the contact
+    before, after = np.minimum(frames, 0.0), np.maximum(frames - t[-1], 0.0)
+    surfaces = []
+    for ball in ("1", "2"):
+        x, v = history[f"x{ball}"].values, history[f"v{ball}"].values
+        path = np.interp(frames, t, x) + before * v[0] + after * v[-1]
+        surfaces.append(
+            replace(force.curves[0], variable="x", case=f"ball {ball}", x=tuple(frames), y=tuple(path))
+        )
+    scene = replace(force, y_label="displacement", y_name="x", y_unit="m", curves=tuple(surfaces))
+    masses = np.array([impact_inputs(history)["m1"], impact_inputs(history)["m2"]], float)
+    radii = np.minimum(np.cbrt(masses / masses.min()), PLANE) * RADIUS * np.abs([c.y for c in surfaces]).max()
+    left_out = ("the other laws: an animation shows one impact",) if len(histories) > 1 else ()
+    return AnimationData(curves.title, curves.conditions, (scene, *curves.panels), left_out, radii=tuple(radii))
 
 
-def _displacement(history: xr.Dataset, ball: str, t: Array, frames: Array) -> Array:
-    """Compute the displacement of a ball at the times of frames, with constant velocities outside the contact."""
-    x, v = history[f"x{ball}"].values, history[f"v{ball}"].values
-    outside = np.minimum(frames - t[0], 0.0) * v[0] + np.maximum(frames - t[-1], 0.0) * v[-1]
-    return np.asarray(np.interp(frames, t, x) + outside)
-
-
-def _radius_ratios(history: xr.Dataset) -> tuple[float, float]:
-    """Compute drawn radii of equal densities, of which the smaller is 1; an infinite mass looks like a plane."""
-    inputs = impact_inputs(history)
-    masses = [float(inputs.get(name, 1.0)) for name in ("m1", "m2")]
-    first, second = (
-        min((mass / min(masses)) ** (1.0 / 3.0), PLANE) if min(masses) < np.inf else 1.0 for mass in masses
-    )
-    return first, second
-
-
-ANIMATION = Kind(
-    "animation",
-    "Both balls of one impact, its force over time and over the indentation.",
-    animation_data,
-    choose_point,
-    along=(),
-    source="history",
-    in_report=False,
+ANIMATION = motion(
+    "animation", "Both balls of an impact, force over time and loop.", animation_data, in_report=False
 )

@@ -208,6 +208,7 @@ class CurveData:
             axes.margins(x=0.06 if panel.marks else 0.02, y=0.12 if panel.marks else None)
             axes.autoscale_view()
             _label_bands(axes, panel)
+            _label_floor(axes, panel)
             _label_axes(axes, panel, labels, last=axes is all_axes[-1] or len(all_axes) == 1)
             for mark in panel.marks:
                 _draw_mark(axes, mark)
@@ -349,6 +350,23 @@ def _label_bands(axes: Axes, panel: Panel) -> None:
             va="top" if is_below else "bottom",
             fontsize="x-small",
             color=BAND_COLOUR,
+            annotation_clip=False,
+        )
+
+
+def _label_floor(axes: Axes, panel: Panel) -> None:
+    """Write beside the axis that values at the floor are that or less."""
+    floor = panel.y_floor
+    if floor is not None and any(y < floor for curve in panel.curves for y in curve.y):
+        axes.annotate(
+            f"≤ $10^{{{math.log10(floor):.0f}}}$",
+            (1, floor),
+            (3, 0),
+            xycoords=("axes fraction", "data"),
+            textcoords="offset points",
+            va="center",
+            fontsize="x-small",
+            color=tint(SOFT),
             annotation_clip=False,
         )
 

@@ -207,7 +207,8 @@ def choose_point(dataset: xr.Dataset, keys: Sequence[str]) -> Choice | None:
     return None if has_fixed_steps(dataset) else choose_line(dataset, keys)
 
 
-_motion = partial(Kind, default=choose_point, along=(), source="history")
-LOOP = _motion("loop", "Force over indentation at one point: the area of a loop is the energy loss.", loop_curves)
-HISTORY = _motion("history", "Indentation, its rate and the force over time.", history_curves, in_report=False)
-IMPULSE = _motion("impulse", "Velocities over the impulse at one point.", impulse_curves, in_report=False)
+# a kind of picture of one impact
+motion = partial(Kind, default=choose_point, along=(), source="history")
+LOOP = motion("loop", "Force over indentation at one point: the area of a loop is the energy loss.", loop_curves)
+HISTORY = motion("history", "Indentation, its rate and the force over time.", history_curves, in_report=False)
+IMPULSE = motion("impulse", "Velocities over the impulse at one point.", impulse_curves, in_report=False)

@@ -136,7 +136,7 @@ def figures_of(
     choices = list(iterate_choices(dataset, keys))
     # numbered as they stand on the page: those of friction have a section of their own
     for of_friction in (False, True):
-        others: list[tuple[int, Kind, Choice, Hashable, int]] = []
+        others: list[tuple[int, Kind, Choice, Mapping[Hashable, int]]] = []
         for kind, choice, position in choices:
             if kind.of_friction != of_friction:
                 continue
@@ -151,13 +151,12 @@ def figures_of(
             except ImpactError as error:
                 left_out.append(f"The figure {kind.name} is left out: {'; '.join(error.problems)}")
                 continue
-            others += [(place_on_page, kind, choice, dim, place) for dim, place in other_values.drawn]
-        for first, kind, choice, dim, place in others:
-            choice = drawing.choice_at(choice, {dim: place})
+            others += [(place_on_page, kind, choice, index) for index in other_values.drawn]
+        for first, kind, choice, index in others:
+            choice = drawing.choice_at(choice, index)
             more = drawing.plot_data(kind, choice)
             if more is not None:
-                along = [name for name in varying_inputs(dataset) if dataset[name].dims == (dim,)]
-                caption = f"As Figure {first}, at {at_text(dataset.isel({dim: place}), along or [str(dim)])}."
+                caption = f"As Figure {first}, at {_changes_text(dataset, index)}."
                 figures.append(drawing.figure(len(figures) + 1, kind, choice, caption, more))
     return figures, left_out
 
@@ -167,7 +166,7 @@ class _OtherValues:
     """What a figure is at other values of the axes that it does not draw: sentences, and those to draw too."""
 
     sentences: list[str]
-    drawn: list[tuple[Hashable, int]]
+    drawn: list[Mapping[Hashable, int]]  # indices of the axes that differ
 
     @classmethod
     def of(cls, drawing: _Drawing, kind: Kind, choice: Choice, position: Mapping[Hashable, int]) -> _OtherValues:
@@ -201,7 +200,7 @@ def _described(
     differ: Sequence[Hashable],
     compared: Mapping[Hashable, Sequence[int]],
     position: Mapping[Hashable, int],
-) -> tuple[list[str], list[tuple[Hashable, int]]]:
+) -> tuple[list[str], list[Mapping[Hashable, int]]]:
     """Describe which axes do not matter and what is not drawn; choose the values that are drawn too."""
     equal, sentences, sizes = [dim for dim in dims if dim not in differ], [], drawing.dataset.sizes
     if equal:
@@ -212,23 +211,38 @@ def _described(
         )
         verb = "do" if len(equal) > 1 else "does"
         sentences.append(f"{_and(equal)} {verb} not matter (differences{among} below {MAX_DIFFERENCE:.1%}).")
-    # the last value of each axis first, which differs most; samples are not drawn one by one
-    columns = [
-        [
-            (dim, place)
-            for place in reversed(_spread(sizes[dim], MAX_VALUES, position[dim]))
-            if place != position[dim] and drawing.has_answer({**position, dim: place})
-        ]
-        for dim in differ
-        if dim != SAMPLE
-    ]
-    chosen = [value for row in itertools.zip_longest(*columns) for value in row if value is not None][:MAX_MORE]
-    drawn = sorted(chosen, key=lambda value: (dims.index(value[0]), value[1]))
-    left = {dim: sizes[dim] - 1 - sum(dim == of for of, _ in drawn) for dim in differ}
-    parts = [f"{number:,} value{'s' * (number > 1)} of {dim}" for dim, number in left.items() if number]
-    parts += [f"combinations of {_and(differ)}"] if len(differ) > 1 else []
+    drawn = _drawn_too(drawing, differ, position)
+    combinations = math.prod(sizes[dim] for dim in differ) - 1 - len(drawn)
+    parts = []
+    for dim in differ:
+        left = sizes[dim] - 1 - sum(index.keys() == {dim} for index in drawn)
+        combinations -= left
+        parts += [f"{left:,} value{'s' * (left > 1)} of {dim}"] if left else []
+    parts += [f"{combinations:,} combinations of {_and(differ)}"] if combinations else []
     sentences += [f"Not drawn: {_and(parts)}."] if parts else []
     return sentences, drawn
+
+
+def _drawn_too(
+    drawing: _Drawing, differ: Sequence[Hashable], position: Mapping[Hashable, int]
+) -> list[Mapping[Hashable, int]]:
+    """Choose the indices at which a figure is drawn too: all combinations if few, else along one axis at a time.
+
+    Samples are not drawn one by one.
+    """
+    sizes, dims = drawing.dataset.sizes, [dim for dim in differ if dim != SAMPLE]
+    if math.prod(sizes[dim] for dim in dims) - 1 <= MAX_MORE:
+        places = itertools.product(*(range(sizes[dim]) for dim in dims))
+        indices = [dict(zip(dims, place, strict=True)) for place in places]
+    else:
+        # the last value of each axis first, which differs most
+        columns = [
+            [{dim: place} for place in reversed(_spread(sizes[dim], MAX_VALUES, position[dim]))] for dim in dims
+        ]
+        indices = [index for row in itertools.zip_longest(*columns) for index in row if index is not None]
+    changes = [{dim: place for dim, place in index.items() if place != position[dim]} for index in indices]
+    drawn = [index for index in changes if index and drawing.has_answer({**position, **index})][:MAX_MORE]
+    return sorted(drawn, key=lambda index: [len(index), *((dims.index(dim), at) for dim, at in index.items())])
 
 
 def _spread(size: int, count: int, position: int) -> list[int]:
@@ -275,6 +289,13 @@ def _condition_sentences(
         values = at_text(point, [name for name in inputs if InputName.parse(name).model == key])
         if values:
             yield f"{'With' if key else 'At'} {values}."
+
+
+def _changes_text(dataset: xr.Dataset, index: Mapping[Hashable, int]) -> str:
+    """Write the inputs along some axes at their indices."""
+    inputs = varying_inputs(dataset)
+    along = {dim: [name for name in inputs if dataset[name].dims == (dim,)] for dim in index}
+    return at_text(dataset.isel(index), [name for dim in index for name in along[dim] or [str(dim)]])
 
 
 def at_text(point: xr.Dataset, names: Sequence[str]) -> str:

@@ -18,6 +18,9 @@ const laws = page.laws.map(law => ({
   columns: Object.fromEntries(Object.entries(law.columns).map(([name, array]) => [name, open(array)])),
 }));
 
+// of a law as in pictures, on a dark page lighter; of the impulse-momentum solution as the text
+const colorOf = law => law ? `color-mix(in srgb, ${law.color}, var(--ink) var(--lift))` : "var(--ink)";
+
 function place(axes, at) {
   return axes.reduce((cell, axis) => cell * page.axes[axis].values.length + at[axis], 0);
 }
@@ -180,7 +183,7 @@ function draw() {
       ([px, py], index) => Number.isFinite(y[index]) ? [px.toFixed(2), py.toFixed(2)] : null
     );
     const d = points.map((at, index) => at ? `${points[index - 1] ? "L" : "M"}${at.join(" ")}` : "").join("");
-    const stroke = law ? law.color : "var(--ink)", line = {d, stroke, class: "curve"};
+    const stroke = colorOf(law), line = {d, stroke, class: "curve"};
     add(svg, "path", {...line, "stroke-dasharray": law ? law.dashes : "none", "stroke-width": law ? 1.6 : 2.6});
     // values of the grid have markers, lines between them are interpolation
     if (law && points.length <= MAX_MARKERS) {
@@ -220,7 +223,7 @@ function list() {
     const number = isOnGrid ? y[share >= 1 ? after : before] : y[before] + share * (y[after] - y[before]);
     const row = body.insertRow(), name = row.insertCell();
     name.textContent = law ? law.label : page.reference;
-    name.style.borderLeft = `4px solid ${law ? law.color : "var(--ink)"}`;
+    name.style.borderLeft = `4px solid ${colorOf(law)}`;
     row.insertCell().textContent = `${isOnGrid ? "" : "≈ "}${digits(number * factor, 6)} ${unit}`.trim();
   }
 }
@@ -279,7 +282,7 @@ function setUp() {
     const label = make(byId("laws"), "label");
     const box = make(label, "input", {type: "checkbox", id: `law-${law.key}`, checked: true});
     label.append(` ${law.label}`);
-    label.style.borderLeft = `4px solid ${law.color}`;
+    label.style.borderLeft = `4px solid ${colorOf(law)}`;
     box.addEventListener("change", draw);
   }
   page.axes.forEach((axis, number) => {
