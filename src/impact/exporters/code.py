@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from ..contact.model import ForceModel
 from ..errors import UsageError
 from ..formatting import argument, number
+from .programs import Program
 
 Parameters = Mapping[str, float | str]
 # moment of inertia of a ball over m R^2, in scripts
@@ -141,7 +142,6 @@ class Code:
         version; raises a UsageError where the version has none
     read_version : converts a version as the user or the program writes it to the form in which versions are
         compared; raises a UsageError for any other text, see `impact.exporters.releases.read_release`
-    version_of : the version that a program reports, as it writes it; None if the program or the code is missing
     comment : what begins and ends a comment among the lines
     notes : remarks on a law: mixing of two materials, thresholds, clamps, versions
     warnings : what a user has to know before using the lines
@@ -154,8 +154,7 @@ class Code:
         `beta = VALUE` and the spins before `e_out`
     wall_inputs : the inputs that a wall acts with where they differ from those of a plane of infinite mass, by
         config name, from the key of the law, the version and the values of `Collision`
-    suffix, program, install : of the file of a script; what runs it, "" without one; how to get that
-    command : the command that runs a script, from the program and the file
+    suffix, program : of the file of a script, and what runs it; None without one
     """
 
     name: str
@@ -170,7 +169,6 @@ class Code:
     rough: Mapping[str, float] = field(default_factory=dict)
     law_for_version: Callable[[str, str], str] = lambda key, version: key
     read_version: Callable[[str], str] = lambda text: text
-    version_of: Callable[[str], str | None] = lambda program: None
     comment: tuple[str, str] = ("# ", "")
     notes: Callable[[Collision], list[str]] = lambda collision: []
     warnings: Callable[[Collision], list[str]] = lambda collision: []
@@ -182,9 +180,7 @@ class Code:
     oblique: Mapping[str, str] = field(default_factory=dict)
     wall_inputs: Callable[[str, str, Mapping[str, float]], Mapping[str, float]] = lambda key, version, values: {}
     suffix: str = ".py"
-    program: str = ""
-    install: str = ""
-    command: Callable[[str, str], Sequence[str]] = lambda program, file: (program, file)
+    program: Program | None = None
 
     def script(self, collision: Collision, parameters: Parameters) -> str:
         """Fill the template with the lines, the parameters, `Collision.script_values`, and material2.

@@ -12,7 +12,7 @@ from typing import Any
 from .._version import __version__
 from ..contact.numba.dispatch import is_installed
 from ..display import Block, Displayed, Table
-from .programs import find_program
+from .programs import package_version
 from .registry import CODES
 from .releases import installed_version
 
@@ -73,22 +73,15 @@ def doctor() -> Environment:
     True
     """
     required = map(PACKAGE.match, metadata.requires(DISTRIBUTION) or ())
-    packages = {name[1]: _version(name[1]) for name in required if name}
+    packages = {name[1]: package_version(name[1]) for name in required if name}
     codes = []
     for code in CODES.values():
         if code.program:
             version = installed_version(code)
-            program = find_program(code.program, None) if version else None
+            program = code.program.find() if version else None
             codes.append({"code": code.name, "version": version, "program": program})
-    core = {"numba": _version("numba") if is_installed() else None, "cache": _core_cache()}
+    core = {"numba": package_version("numba") if is_installed() else None, "cache": _core_cache()}
     return Environment(__version__, platform.python_version(), platform.platform(), packages, core, codes)
-
-
-def _version(package: str) -> str | None:
-    try:
-        return metadata.version(package)
-    except metadata.PackageNotFoundError:
-        return None
 
 
 def _core_cache() -> str | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, SupportsFloat
@@ -226,24 +226,17 @@ def export(
     # with friction that changes e, no step delivers the e that is asked for
     if code.scheme is not None and problem.requested_e > 0.0 and not problem.law.is_coupled:
         advised = needed_steps(problem.law, ADVISED_TOL, problem.e_continuous)
-    needed = None
+    if parameter and code.scheme is None:
+        raise UsageError(f"{argument('parameter')}: what {code.title} delivers at a time step is not predicted")
+    needed, name = None, parameter
     if parameter is None and given and advised is not None and advised.dt < dt:
         name = time_parameter(problem.point.config, problem.model)
-        # nobody asked for it: a law whose time scale has no such parameter is exported without
-        with suppress(UsageError):
-            needed = (
-                needed_parameter(problem.point, Plugins(), name, dt, ADVISED_TOL, problem.law, problem.outputs)
-                if name
-                else None
+    # where nobody asked for it, a law whose time scale has no such parameter is exported without
+    with nullcontext() if parameter else suppress(UsageError):
+        if name:
+            needed = needed_parameter(
+                problem.point, Plugins(), name, dt, ADVISED_TOL, problem.law, problem.outputs
             )
-    if parameter:
-        if code.scheme is None:
-            raise UsageError(
-                f"{argument('parameter')}: what {code.title} delivers at a time step is not predicted"
-            )
-        needed = needed_parameter(
-            problem.point, Plugins(), parameter, dt, ADVISED_TOL, problem.law, problem.outputs
-        )
     needed_text = str(needed or (missing_parameter(parameter, ADVISED_TOL) if parameter else ""))
     header = _header(problem, collision, at_dt, advised, needed_text)
     lines = [*comment_lines(header), code.script(collision, parameters)] if script else []

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 
 from .code import PRINT_BETA, Code, Collision, Parameters
-from .programs import python_package_version
+from .programs import python_package
 
 LAWS = {
     "kratos-hertz": "DEM_D_Hertz_viscous_Coulomb",
@@ -267,7 +267,5 @@ CODE = Code(
             "v1, v2 = balls[0].GetSolutionStepValue(Kratos.VELOCITY_X), {v2}"
         ),
     },
-    program="python",
-    install="pip install KratosDEMApplication",
-    version_of=python_package_version("KratosDEMApplication"),
+    program=python_package("KratosDEMApplication"),
 )

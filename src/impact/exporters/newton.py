@@ -6,7 +6,7 @@ import math
 
 from ..formatting import number
 from .code import PRINT_BETA, Code, Collision, Parameters
-from .programs import python_package_version
+from .programs import python_package
 
 TWO_BALLS = """\
 import newton
@@ -120,7 +120,5 @@ CODE = Code(
     frictions={"coulomb-1785": "kf and mu of ShapeConfig"},
     shortens_arms=True,
     oblique=OBLIQUE,
-    program="python",
-    install="pip install newton",
-    version_of=python_package_version("newton"),
+    program=python_package("newton"),
 )

@@ -124,7 +124,8 @@ def run_script(code: Code, program: str, script: str) -> dict[str, float]:
         file = f"two_balls{code.suffix}"
         Path(folder, file).write_text(script, encoding="utf-8")
         try:
-            done = run_program(code.command(program, file), folder, TIMEOUT_S)
+            assert code.program is not None
+            done = run_program(code.program.command(program, file), folder, TIMEOUT_S)
         except (OSError, subprocess.SubprocessError) as error:
             raise UsageError(f"{argument('verify')}: {code.title}: {error}") from None
     printed = done.stdout.strip().splitlines() or [""]
