@@ -21,7 +21,6 @@ def complete_model(incomplete: str) -> list[str]:
 
 
 def complete_friction(incomplete: str) -> list[str]:
-    """The keys of friction laws."""
     return _beginning_with(incomplete, impact.frictions())
 
 

@@ -149,7 +149,6 @@ ENGINES: Mapping[str, Engine] = {
 
 
 def find_engine(name: str) -> Engine:
-    """Find an engine by its name."""
     if name not in ENGINES:
         raise UsageError(
             f'no adapter of an engine "{name}"; {did_you_mean(name, list(ENGINES))}; or {argument("adapter")}'
@@ -169,7 +168,6 @@ class Engines(Displayed):
     program: str | None = None
 
     def as_dict(self) -> dict[str, Any]:
-        """The JSON object of the command."""
         return {"engines": list(self.records())}
 
     def records(self) -> Sequence[Mapping[str, Any]]:
@@ -191,7 +189,6 @@ class Engines(Displayed):
         return found and engine.program.version_of(found)
 
     def sections(self, width: int) -> Iterator[Block]:
-        """A row for each engine."""
         headings = ("engine", "version", "install", "settings")
         rows = [
             (row["engine"], row["version"] or "not installed", row["install"], row["settings"])

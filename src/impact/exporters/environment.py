@@ -41,11 +41,9 @@ class Environment(Displayed):
     codes: list[dict[str, str | None]]
 
     def as_dict(self) -> dict[str, Any]:
-        """The JSON object of the command."""
         return asdict(self)
 
     def sections(self, width: int) -> Iterator[Block]:
-        """The program, the packages and the codes."""
         yield Table([("impact", self.impact), ("Python", self.python), ("system", self.platform)])
         yield ""
         rows = [(name, version or "not installed") for name, version in self.packages.items()]

@@ -19,7 +19,6 @@ CODES: dict[str, Code] = {name: import_module(f".{name}", __package__).CODE for 
 
 
 def find_code(name: str) -> Code:
-    """Find a code by its name."""
     if name not in CODES:
         raise UsageError(f'{argument("to")}: no code "{name}"; {did_you_mean(name, list(CODES))}')
     return CODES[name]

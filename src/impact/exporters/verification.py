@@ -55,7 +55,6 @@ class Verification(Displayed):
     beta_uncertainty: float = 0.0
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the comparison as plain data."""
         return {
             "program": self.program,
             "agrees": self.agrees,

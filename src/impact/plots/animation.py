@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -45,8 +45,6 @@ class AnimationData(CurveData):
     frames: tuple[float, ...] = ()  # times of the frames [s]
     surfaces: tuple[tuple[float, ...], ...] = ()  # displacement of each ball in each frame [m]
     radii: tuple[float, ...] = ()  # of the drawn balls [m]
-
-    takes_points: ClassVar[bool] = False
 
     @property
     def panel_count(self) -> int:

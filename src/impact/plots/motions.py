@@ -144,7 +144,6 @@ def _series(history: xr.Dataset, name: str) -> Array:
 
 
 def _axis_label_and_unit(history: xr.Dataset, name: str) -> tuple[str, str]:
-    """Read the label and the unit of an axis."""
     if name == "tau":
         return "Impulse", "N s"
     return words_of(history[name].attrs, name), unit_of(history[name])
@@ -182,7 +181,6 @@ def _effective_mass(inputs: Mapping[str, float | str]) -> float:
 
 
 def _conditions_text(histories: Sequence[xr.Dataset]) -> str:
-    """Write the inputs of the impact."""
     inputs = impact_inputs(histories[0])
     by_model = {str(history["model"].item()): impact_inputs(history).get("n") for history in histories}
     exponents = {key: n for key, n in by_model.items() if isinstance(n, float)}
