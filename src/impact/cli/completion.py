@@ -6,6 +6,7 @@ A completion must not fail: where nothing is known, such as the axes of a file t
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from dataclasses import fields
 from importlib import import_module
 from typing import Any
@@ -43,7 +44,9 @@ complete_output = complete_key_of("contact.variables", "OUTPUTS")
 
 def complete_input(context: typer.Context, incomplete: str) -> list[str]:
     """`NAME=` of the inputs, and of the parameters of the model of --model."""
-    return _beginning_with(incomplete, [f"{name}=" for name in _inputs(context)])
+    from ..config.input_names import SWEEP_INPUTS
+
+    return _beginning_with(incomplete, [f"{name}=" for name in (*SWEEP_INPUTS, *_parameters(context))])
 
 
 def complete_unknown(context: typer.Context, incomplete: str) -> list[str]:
@@ -58,7 +61,14 @@ def complete_target(incomplete: str) -> list[str]:
 
 def complete_axis(context: typer.Context, incomplete: str) -> list[str]:
     """The axes of the result that the command line names."""
-    return _beginning_with(incomplete, _axes(context))
+    from ..errors import ImpactError
+
+    # an option without its value yet leaves the arguments unparsed
+    for path in filter(None, (context.params.get("result"), *context.args)):
+        with suppress(OSError, ImpactError):
+            axes = [str(name) for name in impact.load(path).dims if name not in ("model", "friction")]
+            return _beginning_with(incomplete, axes)
+    return []
 
 
 def complete_selection(context: typer.Context, incomplete: str) -> list[str]:
@@ -102,21 +112,3 @@ def _parameters(context: typer.Context) -> list[str]:
         for parameter in models[key].parameters
     }
     return sorted(names)
-
-
-def _inputs(context: typer.Context) -> list[str]:
-    from ..config.input_names import SWEEP_INPUTS
-
-    return [*SWEEP_INPUTS, *_parameters(context)]
-
-
-def _axes(context: typer.Context) -> list[str]:
-    from ..errors import ImpactError
-
-    # an option without its value yet leaves the arguments unparsed
-    for path in filter(None, (context.params.get("result"), *context.args)):
-        try:
-            return [str(name) for name in impact.load(path).dims if name not in ("model", "friction")]
-        except (OSError, ImpactError):
-            continue
-    return []

@@ -11,16 +11,19 @@ LAWS = {
     "kratos-hertz": "DEM_D_Hertz_viscous_Coulomb",
     "kratos-linear": "DEM_D_Linear_viscous_Coulomb",
 }
-BALL2 = """\
-Begin SubModelPart ball2
+BALL1, BALL2 = (
+    f"""\
+Begin SubModelPart ball{number}
 Begin SubModelPartNodes
-2
+{number}
 End SubModelPartNodes
 Begin SubModelPartElements
-2
+{number}
 End SubModelPartElements
 End SubModelPart
 """
+    for number in (1, 2)
+)
 # a triangle around the origin
 RIGID_WALL = '''\
 with open("ballsDEM_FEM_boundary.mdpa", "w") as mesh:
@@ -75,15 +78,8 @@ Begin NodalData RADIUS
 1 0 {R1}
 2 0 {R2}
 End NodalData
-Begin SubModelPart ball1
-Begin SubModelPartNodes
-1
-End SubModelPartNodes
-Begin SubModelPartElements
-1
-End SubModelPartElements
-End SubModelPart
 '''
+    + BALL1
     + BALL2
     + '''""")
 
