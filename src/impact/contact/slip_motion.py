@@ -238,12 +238,8 @@ class Track:
         self.damping_work[index] += np.where(begins, rest + after, 0.0) - np.where(ends, rest + before, 0.0)
         self.mode[index] = new
         self.changes[index] += old != new
-        self.see(index, new)
-
-    def see(self, index: NDArray[np.intp], mode: Array) -> None:
-        """Note modes."""
-        self.modes[index] |= np.where(mode == 0.0, 1, np.where(mode > 0.0, 2, 4)).astype(np.int8)
-        self.modes[index] |= np.where(np.abs(mode) == 2.0, 1, 0).astype(np.int8)
+        self.modes[index] |= np.where(new == 0.0, 1, np.where(new > 0.0, 2, 4)).astype(np.int8)
+        self.modes[index] |= np.where(is_held, 1, 0).astype(np.int8)
 
 
 class Local(NamedTuple):

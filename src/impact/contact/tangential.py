@@ -325,8 +325,6 @@ def _integrate(
     stopped = status == LIMIT
     press = np.sign(base.changed(track.mode, track.sign).share)
     result.sliding_impulse[stopped] = (track.impulse + press * track.v)[stopped]
-    if form.kind == "coulomb":
-        status[stopped] = LIMIT
     status[(status == STATUS_OK) & track.is_slow] = FrictionStatus.SLOW_LIMIT
     if form.kind != "coulomb":
         # whatever the reason, an answer is a number
