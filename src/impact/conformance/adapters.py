@@ -236,17 +236,14 @@ def read_facts(answer: Any) -> Facts:
     for key, value in facts.items():
         if not isinstance(value, str):
             raise AdapterError(f"{key}: got {_shown(value)}, expected text")
+    for key, words in (("kind", KIND_TOLERANCES), ("precision", ("float32", "float64"))):
+        if facts[key] not in ("", *words):
+            raise AdapterError(f"{key}: got {_shown(facts[key])}, expected {' or '.join(words)}")
+    for key, noun, laws in (("law", "friction law", frictions()), ("model", "law", catalogue())):
+        if facts[key] and facts[key] not in laws:
+            raise AdapterError(f'{key}: no {noun} "{facts[key]}"; {did_you_mean(facts[key], list(laws))}')
     kind: Kind = "compliant" if facts["kind"] == "compliant" else "impulse"
-    if facts["kind"] not in ("", *KIND_TOLERANCES):
-        raise AdapterError(f"kind: got {_shown(facts['kind'])}, expected impulse or compliant")
-    if facts["precision"] not in ("", "float32", "float64"):
-        raise AdapterError(f"precision: got {_shown(facts['precision'])}, expected float32 or float64")
-    law, parameters = facts["law"], answer.get("parameters") or {}
-    if law and law not in frictions():
-        raise AdapterError(f'law: no friction law "{law}"; {did_you_mean(law, list(frictions()))}')
-    model = facts["model"] or DEFAULT_MODEL
-    if model not in catalogue():
-        raise AdapterError(f'model: no law "{model}"; {did_you_mean(model, list(catalogue()))}')
+    parameters = answer.get("parameters") or {}
     if not isinstance(parameters, Mapping):
         raise AdapterError(f"parameters: got {_shown(parameters)}, expected an object of JSON")
     return Facts(
@@ -254,8 +251,8 @@ def read_facts(answer: Any) -> Facts:
         version=safe_text(facts["version"], 60),
         kind=kind,
         is_float32=facts["precision"] == "float32",
-        law=law,
-        model=model,
+        law=facts["law"],
+        model=facts["model"] or DEFAULT_MODEL,
         parameters=dict(parameters),
     )
 

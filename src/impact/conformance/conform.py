@@ -128,11 +128,9 @@ def _selected(trials: Mapping[str, Trial], only: Sequence[str]) -> list[Trial]:
 
 def _adapter_name(word: object) -> str:
     """Name an adapter by what it was called, without folders."""
-    return (
-        re.sub(r"[^\s'\"]*/", "", word)
-        if isinstance(word, str)
-        else str(getattr(word, "__name__", type(word).__name__))
-    )
+    if isinstance(word, str):
+        return re.sub(r"[^\s'\"]*/", "", word)
+    return str(getattr(word, "__name__", type(word).__name__))
 
 
 def _unique(name: str, others: Sequence[str]) -> str:
