@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 from ..config.files import parse_document
 from ..errors import UsageError, did_you_mean
@@ -27,7 +27,7 @@ QUESTION_KEYS = (
 )
 ANSWER_KEYS = ("v1", "v2", "u1", "u2", "omega1", "omega2")
 OTHER_BALL = str.maketrans("12", "21")
-RELATIONS: tuple[Relation, ...] = ("frame", "mirror", "exchange", "scale", "step")
+RELATIONS: tuple[Relation, ...] = get_args(Relation)[1:]
 
 
 @dataclass(frozen=True)
