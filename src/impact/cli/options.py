@@ -8,67 +8,58 @@ from typing import Annotated, Any
 
 import typer
 
-from .completion import (
-    complete_friction,
-    complete_input,
-    complete_model,
-    complete_selection,
-    complete_setting,
-    complete_target,
-)
-from .parsing import (
-    NamedValue,
-    parse_number,
-    parse_setting,
-    parse_target,
-    parse_tolerance,
-    parse_whole_number,
-    reject_duplicates,
-)
+from . import completion, parsing
+from .parsing import NamedValue
 
 
 def whole_number(*names: str, help: str) -> Any:
     """Declare an option whose value is a whole number of at least 1."""
-    return typer.Option(*names, metavar="N", parser=parse_whole_number, help=help)
+    return typer.Option(*names, metavar="N", parser=parsing.parse_whole_number, help=help)
 
 
 def number(name: str, metavar: str, help: str) -> Any:
     """Declare an option whose value is a number, which may be in percent."""
-    return typer.Option(name, metavar=metavar, parser=parse_number, help=help)
+    return typer.Option(name, metavar=metavar, parser=parsing.parse_number, help=help)
 
 
-def pairs(name: str, completion: Callable[..., list[str]], help: str) -> Any:
+def pairs(name: str, complete: Callable[..., list[str]], help: str) -> Any:
     """Declare an option that is repeated for several names."""
     return typer.Option(
         name,
         metavar="NAME=VALUE",
-        autocompletion=completion,
-        parser=parse_setting,
-        callback=reject_duplicates,
+        autocompletion=complete,
+        parser=parsing.parse_setting,
+        callback=parsing.reject_duplicates,
         help=help,
     )
 
 
 def tolerance(metavar: str, help: str) -> Any:
     """Declare an option for a tolerance of all, or of one by its name."""
-    return typer.Option("--tol", metavar=metavar, parser=parse_tolerance, callback=reject_duplicates, help=help)
+    return typer.Option(
+        "--tol", metavar=metavar, parser=parsing.parse_tolerance, callback=parsing.reject_duplicates, help=help
+    )
 
 
 def target(help: str) -> Any:
     """Declare the option for the wanted output."""
     return typer.Option(
-        "--target", metavar="NAME=VALUE", parser=parse_target, autocompletion=complete_target, help=help
+        "--target",
+        metavar="NAME=VALUE",
+        parser=parsing.parse_target,
+        autocompletion=completion.complete_target,
+        help=help,
     )
 
 
 def model(help: str) -> Any:
     """Declare an option for the key of a model."""
-    return typer.Option("--model", metavar="KEY", autocompletion=complete_model, help=help)
+    return typer.Option("--model", metavar="KEY", autocompletion=completion.complete_model, help=help)
 
 
 def friction(help: str) -> Any:
     """Declare an option for the key of a friction law."""
-    return typer.Option("--friction", metavar="KEY", autocompletion=complete_friction, help=help)
+    return typer.Option("--friction", metavar="KEY", autocompletion=completion.complete_friction, help=help)
 
 
 Result = Annotated[Path, typer.Argument(help="A result of `impact sweep`.")]
@@ -76,7 +67,8 @@ Source = Annotated[
     Path | None, typer.Argument(help="A TOML file, a result or a calibration. \\[default: Table 1 of the paper]")
 ]
 At = Annotated[
-    list[NamedValue] | None, pairs("--at", complete_input, "Value of an input, such as e=0.05; may be repeated.")
+    list[NamedValue] | None,
+    pairs("--at", completion.complete_input, "Value of an input, such as e=0.05; may be repeated."),
 ]
 ModelKey = Annotated[str, model("The model.")]
 Parameter = Annotated[
@@ -118,7 +110,7 @@ Set = Annotated[
     typer.Option(
         "--set",
         metavar="PATH=VALUE",
-        autocompletion=complete_setting,
+        autocompletion=completion.complete_setting,
         help="Change the config, such as sweep.m2=2.0; may be repeated.",
     ),
 ]
@@ -128,7 +120,7 @@ Plugins = Annotated[
 ]
 Select = Annotated[
     list[NamedValue] | None,
-    pairs("--sel", complete_selection, "Value of an axis, such as m2=1.0; may be repeated."),
+    pairs("--sel", completion.complete_selection, "Value of an axis, such as m2=1.0; may be repeated."),
 ]
 Models = Annotated[list[str] | None, model("Only this model; may be repeated.")]
 Frictions = Annotated[list[str] | None, friction("Only this friction law; may be repeated.")]
