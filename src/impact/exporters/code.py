@@ -14,6 +14,8 @@ from .programs import Program
 Parameters = Mapping[str, float | str]
 # moment of inertia of a ball over m R^2, in scripts
 SOLID = 0.4
+# largest difference of e between a code and the map of its scheme
+ROUNDING = 1e-9
 # of scripts in Python, before e_out: prints from u1, u2, omega1 and omega2
 PRINT_BETA = """\
 print("beta =", -(u1 + {R1} * omega1 - u2 + {rim2} * omega2) / {slip})
@@ -136,8 +138,7 @@ class Code:
     tested : what was run, or what was read instead
     parameters : in the units and conventions of the code, by the code's own names
     scheme : see `impact.contact.fixed_step.SCHEMES`; None if its restitution at a time step is not predicted
-    uncertainty : largest difference of e between the code and the map of its scheme
-    rough : the same by law, where the code itself finds the damping only roughly
+    uncertainty : largest difference of e between the code and the map of its scheme, by law; ROUNDING for others
     law_for_version : the entry of the catalogue that holds in a version, from the key of another one and the
         version; raises a UsageError where the version has none
     read_version : converts a version as the user or the program writes it to the form in which versions are
@@ -165,8 +166,7 @@ class Code:
     parameters: Callable[[Collision], dict[str, float | str]]
     lines: Callable[[Collision, Parameters], list[str]]
     scheme: str | None = None
-    uncertainty: float = 1e-9
-    rough: Mapping[str, float] = field(default_factory=dict)
+    uncertainty: Mapping[str, float] = field(default_factory=dict)
     law_for_version: Callable[[str, str], str] = lambda key, version: key
     read_version: Callable[[str], str] = lambda text: text
     comment: tuple[str, str] = ("# ", "")
@@ -199,11 +199,3 @@ class Code:
         material2 = "material2" if any(line.startswith("material2 = ") for line in lines) else "material1"
         values = {**parameters, **collision.script_values(), "lines": "\n".join(lines), "material2": material2}
         return template.format(**values)
-
-    def frictions_of(self, key: str) -> list[str]:
-        """List the friction laws that the code has with a law."""
-        return [friction for friction in self.frictions if self.has_friction(key, friction)]
-
-    def uncertainty_of(self, key: str) -> float:
-        """Return the tolerance on e of a law."""
-        return self.rough.get(key, self.uncertainty)

@@ -78,14 +78,9 @@ def doctor() -> Environment:
             version = installed_version(code)
             program = code.program.find() if version else None
             codes.append({"code": code.name, "version": version, "program": program})
-    core = {"numba": package_version("numba") if is_installed() else None, "cache": _core_cache()}
+    core: dict[str, str | None] = {"numba": None, "cache": None}
+    if is_installed():
+        from ..contact.numba.compile_cache import cache_folder
+
+        core = {"numba": package_version("numba"), "cache": cache_folder()}
     return Environment(__version__, platform.python_version(), platform.platform(), packages, core, codes)
-
-
-def _core_cache() -> str | None:
-    """Find the folder of the machine code of the compiled core."""
-    if not is_installed():
-        return None
-    from ..contact.numba.compile_cache import cache_folder
-
-    return cache_folder()

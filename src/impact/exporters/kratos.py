@@ -230,7 +230,7 @@ CODE = Code(
     tested="scripts were run in Kratos DEM 10.4.4",
     scheme="kick-drift",
     # Kratos finds the damping ratio of this law by bisection to 1e-4
-    rough={"kratos-linear": 1e-4},
+    uncertainty={"kratos-linear": 1e-4},
     parameters=parameters,
     lines=lines,
     notes=notes,

@@ -100,7 +100,7 @@ CODE = Code(
     tested="scripts were run in Newton 1.8.0 on a CPU; warp.sim has the same force and was not run",
     scheme="kick-drift",
     # single precision: a ball is a hundred times as large as its indentation, or more
-    uncertainty=1e-3,
+    uncertainty={"newton-semi-implicit": 1e-3},
     parameters=parameters,
     lines=lines,
     notes=notes,

@@ -17,7 +17,7 @@ from ..array_types import Array
 from ..display import Block, Displayed, Table
 from ..errors import UsageError
 from ..formatting import argument, decimals, number, quantity
-from .code import Code
+from .code import ROUNDING, Code
 from .problem import ExportProblem
 from .programs import run_program
 
@@ -155,6 +155,7 @@ def verify_scripts(problem: ExportProblem, program: str, dt: float, n_phases: in
     """
     problem = replace(problem, law=replace(problem.law, phases=n_phases))
     code, phases = problem.code, (np.arange(n_phases) + 0.5) / n_phases
+    tolerance = code.uncertainty.get(problem.model.key, ROUNDING)
     steps = np.array([dt] if code.scheme is not None else [dt, dt / 2, dt / 4])
     runs = [[_measure(problem, program, dt, phase) for phase in phases.tolist()] for dt in steps.tolist()]
     measured = np.array([[run["e_out"] for run in row] for row in runs])
@@ -166,7 +167,7 @@ def verify_scripts(problem: ExportProblem, program: str, dt: float, n_phases: in
             phases=(float("nan"),),
             measured=(value,),
             predicted=(problem.e_continuous,),
-            uncertainty=max(uncertainty, FLOOR, code.uncertainty_of(problem.model.key)),
+            uncertainty=max(uncertainty, FLOOR, tolerance),
         )
     predicted = (
         np.full(measured.shape, problem.e_continuous) if code.scheme is None else problem.law.restitution(steps)
@@ -177,7 +178,7 @@ def verify_scripts(problem: ExportProblem, program: str, dt: float, n_phases: in
         phases=tuple(np.tile(phases, steps.size).tolist()),
         measured=tuple(measured.ravel().tolist()),
         predicted=tuple(predicted.ravel().tolist()),
-        uncertainty=code.uncertainty_of(problem.model.key),
+        uncertainty=tolerance,
     )
     return verification if problem.law.oblique is None else _with_friction(verification, problem, steps, runs)
 
