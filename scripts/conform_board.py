@@ -95,7 +95,7 @@ def main(python: str, *older_pythons: str) -> None:
     """Run the engines, and write the board and its page."""
     boards = []
     for name, engine in ENGINES.items():
-        programs = {name: python if engine.package else None}
+        programs = {name: python if engine.is_package else None}
         if name == OLDER:
             programs |= zip((f"{name}, older", f"{name}, oldest"), older_pythons, strict=False)
         for row, program in programs.items():

@@ -202,7 +202,7 @@ def silent_programs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     from impact.exporters.registry import CODES
 
     folder = tmp_path_factory.mktemp("silent")
-    for program in {code.program for code in CODES.values()} - {"", "python"}:
+    for program in {code.program.name for code in CODES.values() if code.program} - {"python"}:
         write_program(folder / program, "")
     return folder
 

@@ -427,7 +427,7 @@ def test_an_engine_that_is_not_installed_is_named_with_how_to_get_it(cli: Run) -
     for name in (name for name, version in listed.items() if version is None):
         done = cli("conform", name)
         assert done.returncode == 2
-        assert ENGINES[name].install in done.stderr
+        assert ENGINES[name].program.install in done.stderr
 
 
 def test_a_board_is_stored_and_compared(cli: Run, tmp_path: Path) -> None:
@@ -498,7 +498,7 @@ def test_a_page_has_the_checks_of_each_engine_and_escapes_their_names(tmp_path: 
 def test_an_engine_answers_every_collision(name: str) -> None:
     """What it delivers is on the board; here, it answers, finite and the same again."""
     venv = os.environ.get("PEERS_VENV")
-    python = str(Path(venv, "bin", "python").absolute()) if venv and ENGINES[name].package else None
+    python = str(Path(venv, "bin", "python").absolute()) if venv and ENGINES[name].is_package else None
     try:
         board = impact.conform(name, program=python)
     except UsageError as error:

@@ -734,7 +734,9 @@ def test_a_program_that_reports_no_release_is_one_line(cli: Run, tmp_path: Path,
     assert done.stderr == (
         f'version of {lmp}: got "{reported}", expected the date of a release, such as 22Jul2025\n'
     )
-    assert installed_version(replace(CODES["lammps"], program=str(lmp))) is None
+    code = CODES["lammps"]
+    assert code.program is not None
+    assert installed_version(replace(code, program=replace(code.program, name=str(lmp)))) is None
 
 
 EXAMPLES = examples_of("docs/export.md")

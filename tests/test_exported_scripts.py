@@ -50,7 +50,8 @@ def code_and_version(name: str, key: str) -> tuple[Code, str, str]:
     """A code, the program that runs its scripts, and its version; skips the test where it has no such law."""
     code = CODES[name]
     try:
-        program, version = choose_version(code, PROGRAMS.get(code.program), None, verify=True)
+        assert code.program is not None
+        program, version = choose_version(code, PROGRAMS.get(code.program.name), None, verify=True)
         law_of_code(code, key, version)
     except UsageError as error:
         pytest.skip(str(error))

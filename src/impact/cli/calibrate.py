@@ -10,18 +10,7 @@ import typer
 import impact
 
 from ..display import TableForm, show, write_table
-from . import exits
-from .completion import complete_model
-from .options import (
-    DecimalOption,
-    DigitsOption,
-    JobsOption,
-    JsonOption,
-    OverwriteOption,
-    PluginOption,
-    RowsOption,
-    SetOption,
-)
+from . import exits, options
 
 
 def calibrate(
@@ -32,27 +21,19 @@ def calibrate(
             "-o", "--output", help="The result file, or of its table .csv, .tex or .parquet. \\[default: none]"
         ),
     ] = None,
-    overwrite: OverwriteOption = False,
+    overwrite: options.Overwrite = False,
     best: Annotated[
         Path | None,
         typer.Option("--best", metavar="FILE", help="Write the config of the best law with its parameters."),
     ] = None,
-    model: Annotated[
-        str | None,
-        typer.Option(
-            "--model",
-            metavar="KEY",
-            autocompletion=complete_model,
-            help="The law of --best, in place of the one that fits best.",
-        ),
-    ] = None,
-    sets: SetOption = None,
-    plugins: PluginOption = None,
-    jobs: JobsOption = 1,
-    rows: RowsOption = None,
-    digits: DigitsOption = None,
-    decimal: DecimalOption = "point",
-    as_json: JsonOption = False,
+    model: Annotated[str | None, options.model("The law of --best, in place of the one that fits best.")] = None,
+    sets: options.Set = None,
+    plugins: options.Plugins = None,
+    jobs: options.Jobs = 1,
+    rows: options.Rows = None,
+    digits: options.Digits = None,
+    decimal: options.Decimal = "point",
+    as_json: options.Json = False,
 ) -> None:
     """Fit laws to measurements, and rank them.
 
@@ -75,6 +56,4 @@ def calibrate(
     if output is not None and form != TableForm():
         write_table(described, output, form, overwrite=True)
     show(described, as_json=as_json)
-    for path in (output, best):
-        if path is not None:
-            exits.print_line(f"{path}: written")
+    exits.print_written(output, best)

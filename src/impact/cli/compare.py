@@ -14,9 +14,8 @@ import impact
 from ..atomic import check_output
 from ..display import dump, show
 from ..errors import ImpactError, UsageError
-from . import exits
+from . import exits, options
 from .execution import Execution
-from .options import MaxPointsOption, PluginOption, QuietOption, ResultArgument, ToleranceOption
 
 if TYPE_CHECKING:
     from ..comparison.formats import NoVerdict
@@ -48,7 +47,7 @@ PlotOption = Annotated[
 def compare(
     new: NewArgument,
     baseline: BaselineArgument,
-    tol: ToleranceOption = None,
+    tol: options.Tolerance = None,
     subset: SubsetOption = False,
     format: FormatOption = Format.table,
     plot: PlotOption = None,
@@ -69,7 +68,7 @@ def bless(
     new: NewArgument,
     baseline: Annotated[Path, typer.Argument(help="The baseline to replace or create.")],
     reason: Annotated[str, typer.Option("--reason", help="Why the numbers changed; stored in the baseline.")],
-    tol: ToleranceOption = None,
+    tol: options.Tolerance = None,
     allow_failed: Annotated[
         bool, typer.Option("--allow-failed", help="Accept a result with failed points.")
     ] = False,
@@ -95,14 +94,14 @@ def bless(
 
 
 def rerun(
-    result: ResultArgument,
-    plugins: PluginOption = None,
-    tol: ToleranceOption = None,
+    result: options.Result,
+    plugins: options.Plugins = None,
+    tol: options.Tolerance = None,
     subset: SubsetOption = False,
-    max_points: MaxPointsOption = 10**9,
+    max_points: options.MaxPoints = 10**9,
     format: FormatOption = Format.table,
     plot: PlotOption = None,
-    quiet: QuietOption = False,
+    quiet: options.Quiet = False,
 ) -> None:
     """Repeat a sweep or a calibration from its result alone, and compare the new values with the stored ones."""
     with exits.catch_signals() as should_stop:

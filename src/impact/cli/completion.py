@@ -5,8 +5,10 @@ A completion must not fail: where nothing is known, such as the axes of a file t
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from contextlib import suppress
 from dataclasses import fields
+from importlib import import_module
 from typing import Any
 
 import typer
@@ -20,60 +22,36 @@ def complete_model(incomplete: str) -> list[str]:
 
 
 def complete_friction(incomplete: str) -> list[str]:
-    """The keys of friction laws."""
     return _beginning_with(incomplete, impact.frictions())
 
 
-def complete_family(incomplete: str) -> list[str]:
-    """The families of models."""
-    from ..contact.models import FAMILIES
+def complete_key_of(module: str, table: str) -> Callable[[str], list[str]]:
+    """Make the completion of the keys of a table, whose module is imported when a key is completed."""
 
-    return _beginning_with(incomplete, FAMILIES)
+    def complete(incomplete: str) -> list[str]:
+        return _beginning_with(incomplete, getattr(import_module(f"impact.{module}"), table))
 
-
-def complete_engine(incomplete: str) -> list[str]:
-    """The engines that the program has adapters for."""
-    from ..conformance.registry import ENGINES
-
-    return _beginning_with(incomplete, ENGINES)
+    return complete
 
 
-def complete_code(incomplete: str) -> list[str]:
-    """The codes to which laws are exported."""
-    from ..exporters.registry import CODES
-
-    return _beginning_with(incomplete, CODES)
-
-
-def complete_scheme(incomplete: str) -> list[str]:
-    """The schemes with a fixed step."""
-    from ..contact.fixed_step import SCHEMES
-
-    return _beginning_with(incomplete, SCHEMES)
-
-
-def complete_kind(incomplete: str) -> list[str]:
-    """The kinds of pictures."""
-    from ..plots.kinds import KINDS
-
-    return _beginning_with(incomplete, KINDS)
+complete_family = complete_key_of("contact.models", "FAMILIES")
+complete_engine = complete_key_of("conformance.registry", "ENGINES")
+complete_code = complete_key_of("exporters.registry", "CODES")
+complete_scheme = complete_key_of("contact.fixed_step", "SCHEMES")
+complete_kind = complete_key_of("plots.kinds", "KINDS")
+complete_output = complete_key_of("contact.variables", "OUTPUTS")
 
 
 def complete_input(context: typer.Context, incomplete: str) -> list[str]:
     """`NAME=` of the inputs, and of the parameters of the model of --model."""
-    return _beginning_with(incomplete, [f"{name}=" for name in _inputs(context)])
+    from ..config.input_names import SWEEP_INPUTS
+
+    return _beginning_with(incomplete, [f"{name}=" for name in (*SWEEP_INPUTS, *_parameters(context))])
 
 
 def complete_unknown(context: typer.Context, incomplete: str) -> list[str]:
     """What `impact solve` solves for: the parameters of the model and of the friction law, K, e and mu."""
     return _beginning_with(incomplete, [*_parameters(context), "K", "e", "mu"])
-
-
-def complete_output(incomplete: str) -> list[str]:
-    """The variables of a result."""
-    from ..contact.variables import OUTPUTS
-
-    return _beginning_with(incomplete, [*OUTPUTS])
 
 
 def complete_target(incomplete: str) -> list[str]:
@@ -83,7 +61,14 @@ def complete_target(incomplete: str) -> list[str]:
 
 def complete_axis(context: typer.Context, incomplete: str) -> list[str]:
     """The axes of the result that the command line names."""
-    return _beginning_with(incomplete, _axes(context))
+    from ..errors import ImpactError
+
+    # an option without its value yet leaves the arguments unparsed
+    for path in filter(None, (context.params.get("result"), *context.args)):
+        with suppress(OSError, ImpactError):
+            axes = [str(name) for name in impact.load(path).dims if name not in ("model", "friction")]
+            return _beginning_with(incomplete, axes)
+    return []
 
 
 def complete_selection(context: typer.Context, incomplete: str) -> list[str]:
@@ -127,21 +112,3 @@ def _parameters(context: typer.Context) -> list[str]:
         for parameter in models[key].parameters
     }
     return sorted(names)
-
-
-def _inputs(context: typer.Context) -> list[str]:
-    from ..config.input_names import SWEEP_INPUTS
-
-    return [*SWEEP_INPUTS, *_parameters(context)]
-
-
-def _axes(context: typer.Context) -> list[str]:
-    from ..errors import ImpactError
-
-    # an option without its value yet leaves the arguments unparsed
-    for path in filter(None, (context.params.get("result"), *context.args)):
-        try:
-            return [str(name) for name in impact.load(path).dims if name not in ("model", "friction")]
-        except (OSError, ImpactError):
-            continue
-    return []

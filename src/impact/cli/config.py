@@ -10,13 +10,12 @@ import typer
 
 import impact
 
-from . import exits
-from .options import OverwriteOption
+from . import exits, options
 
 
 def init(
     path: Annotated[Path, typer.Argument(help="The file to write.")] = Path("config.toml"),
-    overwrite: OverwriteOption = False,
+    overwrite: options.Overwrite = False,
 ) -> None:
     """Write a commented starter config, ready to sweep."""
 
@@ -26,7 +25,7 @@ def init(
 
 def schema(
     output: Annotated[Path | None, typer.Option("-o", "--output", help="The file. \\[default: stdout]")] = None,
-    overwrite: OverwriteOption = False,
+    overwrite: options.Overwrite = False,
 ) -> None:
     """Print the JSON Schema of a config, for completion and validation in editors."""
 
@@ -34,4 +33,4 @@ def schema(
     if output is None:
         print(json.dumps(json_schema, indent=2, ensure_ascii=False))
     else:
-        exits.print_line(f"{output}: written")
+        exits.print_written(output)

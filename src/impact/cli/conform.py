@@ -10,10 +10,9 @@ import typer
 import impact
 
 from ..display import show
-from . import exits
+from . import exits, options
 from .completion import complete_engine
-from .options import JsonOption, OverwriteOption
-from .parsing import Tolerance, parse_number, parse_tolerance, reject_duplicates
+from .parsing import NamedValue
 
 
 def conform(
@@ -37,19 +36,12 @@ def conform(
         typer.Option("--only", metavar="ID", help="Judge only this collision; may be repeated."),
     ] = None,
     tol: Annotated[
-        list[Tolerance] | None,
-        typer.Option(
-            "--tol",
-            metavar="[CHECK=]VALUE",
-            parser=parse_tolerance,
-            callback=reject_duplicates,
-            help="Tolerance of all checks or of one, such as momentum=1e-6 or 5%; may be repeated.",
+        list[NamedValue] | None,
+        options.tolerance(
+            "[CHECK=]VALUE", "Tolerance of all checks or of one, such as momentum=1e-6 or 5%; may be repeated."
         ),
     ] = None,
-    timeout: Annotated[
-        float,
-        typer.Option("--timeout", metavar="SECONDS", parser=parse_number, help="Time for an answer \\[s]."),
-    ] = 60.0,
+    timeout: Annotated[float, options.number("--timeout", "SECONDS", "Time for an answer \\[s].")] = 60.0,
     program: Annotated[
         str | None,
         typer.Option(
@@ -60,9 +52,9 @@ def conform(
         Path | None,
         typer.Option("-o", "--output", help="A page (.html), or a board that impact compare reads (.h5)."),
     ] = None,
-    overwrite: OverwriteOption = False,
+    overwrite: options.Overwrite = False,
     show_engines: Annotated[bool, typer.Option("--list", help="List the engines.")] = False,
-    as_json: JsonOption = False,
+    as_json: options.Json = False,
 ) -> int:
     """Run a fixed set of impacts in an engine, and judge its answers: momentum, energy, restitution, friction.
 
@@ -84,6 +76,5 @@ def conform(
     )
     with exits.ignore_broken_pipe():
         show(board, as_json=as_json)
-    if output is not None:
-        exits.print_line(f"{output}: written")
+    exits.print_written(output)
     return exits.EXIT_OK if board.passed else exits.EXIT_NOT_EQUAL

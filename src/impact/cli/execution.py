@@ -1,23 +1,28 @@
-"""How a command integrates: its executor, its progress on stderr, and signals that stop it."""
+"""How a command integrates: its executor, its progress on stderr, signals that stop it, and its summary."""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import typer
+
 import impact
 
+from ..display import dump, show
 from ..errors import UsageError
-from .exits import print_line
+from . import exits
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from ..engine.executors import ExecutorSpec
     from ..engine.plan import Plan
+    from ..results.outcome import SweepOutcome
 
 
 @dataclass(frozen=True)
@@ -47,13 +52,13 @@ class Execution:
             return choose_executor(self.jobs, self.threads)
         from ..engine.dask import cluster
 
-        return cluster(address, self.should_stop, (lambda note: None) if self.quiet else print_line)
+        return cluster(address, self.should_stop, (lambda note: None) if self.quiet else exits.print_line)
 
     @contextmanager
     def keywords(self) -> Iterator[dict[str, Any]]:
         """Show the progress while public functions that take these keywords run."""
         backend = self._executor()
-        with impact.progress_bar(print_line, quiet=self.quiet) as on_progress:
+        with impact.progress_bar(exits.print_line, quiet=self.quiet) as on_progress:
             yield {"backend": backend, "on_progress": on_progress, "should_stop": self.should_stop}
 
     def execute(self, plan: Plan) -> xr.Dataset:
@@ -63,3 +68,19 @@ class Execution:
 
         with self.keywords() as keywords:
             return sweep_in_memory(plan, Run(keywords.pop("backend"), **keywords))
+
+
+def print_summary_and_exit(outcome: SweepOutcome, *, quiet: bool, as_json: bool, allow_failed: bool) -> None:
+    """Print the summary of a result as the options ask for it, and exit with 3 if points failed."""
+    if not quiet:
+        if outcome.is_new:
+            with exits.ignore_broken_pipe(sys.stderr):
+                show(outcome, stream=sys.stderr)
+        else:
+            exits.print_line(f"{outcome.output}: already contains this sweep; nothing to do")
+    if as_json:
+        print(dump(outcome))
+    if outcome.summary.failed and not allow_failed:
+        if quiet or not outcome.is_new:
+            exits.print_line(outcome.failed_line, error=True)
+        raise typer.Exit(exits.EXIT_POINTS_FAILED)

@@ -13,6 +13,7 @@ import tempfile
 import traceback
 import warnings
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from types import FrameType
 from typing import TextIO
 
@@ -73,6 +74,12 @@ def print_line(line: str, *, error: bool = False) -> None:
     except OSError:
         # the reader is gone or the disk is full: neither ends the command or changes its exit code
         _discard_output(sys.stderr)
+
+
+def print_written(*paths: Path | None) -> None:
+    """Name the files that were written, on stderr."""
+    for path in filter(None, paths):
+        print_line(f"{path}: written")
 
 
 def run_command_line(command: Callable[[], object], *, debug: bool) -> int:

@@ -11,36 +11,24 @@ import impact
 
 from ..display import Table, dump, print_blocks, show
 from ..errors import UsageError
-from . import exits
-from .completion import complete_code, complete_model
-from .options import (
-    AtOption,
-    FrictionKeyOption,
-    JsonOption,
-    OverwriteOption,
-    ParameterOption,
-    SetOption,
-    SourceArgument,
-)
+from . import exits, options
+from .completion import complete_code
 
 
 def export(
-    source: SourceArgument = None,
+    source: options.Source = None,
     to: Annotated[
         str | None,
         typer.Option("--to", metavar="CODE", autocompletion=complete_code, help="The code, see --list."),
     ] = None,
     model: Annotated[
         str | None,
-        typer.Option(
-            "--model",
-            metavar="KEY",
-            autocompletion=complete_model,
-            help="Key of a law that the code implements. "
-            "\\[default: the first of the source or of --list that its release has]",
+        options.model(
+            "Key of a law that the code implements. "
+            "\\[default: the first of the source or of --list that its release has]"
         ),
     ] = None,
-    at: AtOption = None,
+    at: options.At = None,
     dt: Annotated[
         str | None,
         typer.Option(
@@ -49,8 +37,8 @@ def export(
             help='The time step \\[s], or with a unit, such as "2 us". \\[default: contact time/50]',
         ),
     ] = None,
-    parameter: ParameterOption = None,
-    friction: FrictionKeyOption = None,
+    parameter: options.Parameter = None,
+    friction: options.FrictionKey = None,
     code_version: Annotated[
         str | None,
         typer.Option(
@@ -72,10 +60,10 @@ def export(
         ),
     ] = None,
     output: Annotated[Path | None, typer.Option("-o", "--output", help="The file. \\[default: stdout]")] = None,
-    overwrite: OverwriteOption = False,
+    overwrite: options.Overwrite = False,
     show_codes: Annotated[bool, typer.Option("--list", help="List the codes and their laws.")] = False,
-    sets: SetOption = None,
-    as_json: JsonOption = False,
+    sets: options.Set = None,
+    as_json: options.Json = False,
 ) -> int:
     """Write the input lines of a simulation code for a law, and what the code delivers at its time step.
 
@@ -107,8 +95,7 @@ def export(
     )
     for warning in result.warnings:
         exits.print_line(f"warning: {warning}")
-    if output is not None:
-        exits.print_line(f"{output}: written")
+    exits.print_written(output)
     if as_json or result.verification is not None:
         show(result, as_json=as_json)
     elif output is None:

@@ -9,32 +9,17 @@ import typer
 
 import impact
 
-from . import exits
-from .execution import Execution
-from .options import (
-    AllowFailedOption,
-    JobsOption,
-    JsonOption,
-    MaxPointsOption,
-    ModelOption,
-    OverwriteOption,
-    PluginOption,
-    QuietOption,
-    ResultArgument,
-    ResumeOption,
-    SelectOption,
-    ThreadsOption,
-)
-from .summary import print_summary_and_exit
+from . import exits, options
+from .execution import Execution, print_summary_and_exit
 
 
 def expand(
-    result: ResultArgument,
+    result: options.Result,
     output: Annotated[Path, typer.Option("-o", "--output", help="The file to write.")],
-    sel: SelectOption = None,
-    model: ModelOption = None,
-    overwrite: OverwriteOption = False,
-    max_points: MaxPointsOption = 10**9,
+    sel: options.Select = None,
+    model: options.Models = None,
+    overwrite: options.Overwrite = False,
+    max_points: options.MaxPoints = 10**9,
 ) -> None:
     """Write all values of a result, or of a part of it, as netCDF for programs that do not use impact."""
     with exits.catch_signals() as should_stop:
@@ -51,7 +36,7 @@ def expand(
 
 
 def extend(
-    result: ResultArgument,
+    result: options.Result,
     sets: Annotated[
         list[str],
         typer.Option(
@@ -64,15 +49,15 @@ def extend(
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="The larger result. \\[default: the result itself]")
     ] = None,
-    plugins: PluginOption = None,
-    overwrite: OverwriteOption = False,
-    allow_failed: AllowFailedOption = False,
-    resume: ResumeOption = False,
-    jobs: JobsOption = 1,
-    threads: ThreadsOption = 1,
-    max_points: MaxPointsOption = 10**9,
-    quiet: QuietOption = False,
-    as_json: JsonOption = False,
+    plugins: options.Plugins = None,
+    overwrite: options.Overwrite = False,
+    allow_failed: options.AllowFailed = False,
+    resume: options.Resume = False,
+    jobs: options.Jobs = 1,
+    threads: options.Threads = 1,
+    max_points: options.MaxPoints = 10**9,
+    quiet: options.Quiet = False,
+    as_json: options.Json = False,
 ) -> None:
     """Add values to the axes of a result; only what it does not hold is integrated."""
     with exits.catch_signals() as should_stop:

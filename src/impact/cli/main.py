@@ -29,7 +29,7 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
         "results.h5 --tol 2% --sel m2=1.0",
     ),
     "report": ("report", "Write a report as one HTML page.", "results.h5 -o report.html"),
-    "page": ("page", "Write a page with sliders for a browser.", "results.h5 -o page.html"),
+    "page": ("report", "Write a page with sliders for a browser.", "results.h5 -o page.html"),
     "run": ("run", "Run one impact.", "--model gharib-hurmuzlu-2012 --at e=0.05 --at m2=2.0 --history out.h5"),
     "solve": (
         "solve",
@@ -53,12 +53,12 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
     "bless": ("compare", "Replace a baseline by a result.", 'results.h5 baseline.h5 --reason "finer tolerance"'),
     "rerun": ("compare", "Repeat the sweep of a result, and compare.", "baseline.h5"),
     "models": ("models", "Show the catalogue of models.", "gharib-hurmuzlu-2012"),
-    "cite": ("cite", "Write BibTeX of laws.", "tsuji-1992 lammps-mindlin"),
-    "materials": ("materials", "Show common materials.", "steel"),
+    "cite": ("models", "Write BibTeX of laws.", "tsuji-1992 lammps-mindlin"),
+    "materials": ("models", "Show common materials.", "steel"),
     "info": ("info", "Show the contents of a file.", "results.h5"),
     "init": ("config", "Write a starter config.", "my_sweep.toml"),
     "schema": ("config", "Print the JSON Schema of a config.", "-o impact.schema.json"),
-    "doctor": ("doctor", "Show the versions of what is installed.", "--json"),
+    "doctor": ("info", "Show the versions of what is installed.", "--json"),
     "help": ("main", "Show the help of a command.", "sweep"),
 }
 

@@ -1,8 +1,9 @@
-"""The command `models`: the catalogues, one law, or the checks of a user-defined law."""
+"""The commands that show the catalogues: models, one law or the checks of one, materials, and cite."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,15 +12,18 @@ import typer
 import impact
 
 from ..display import Table, dump, print_blocks, show
-from ..errors import UsageError
-from . import exits
+from ..errors import UsageError, did_you_mean
+from . import exits, options
 from .completion import complete_family, complete_model
-from .options import JsonOption, PluginOption
 
 if TYPE_CHECKING:
     from ..contact.model import ForceModel
     from ..engine.friction_catalogue import Frictions
     from ..engine.model_catalogue import Models
+
+# units of the properties of a material in a table
+DISPLAY_UNITS = {"E": "GPa", "nu": "-", "rho": "kg/m3", "yield_strength": "MPa"}
+SI_PER_UNIT = {"GPa": 1e9, "MPa": 1e6}
 
 
 def models(
@@ -50,8 +54,8 @@ def models(
         typer.Option("--check", metavar="FILE", help="Check the models of a Python file against the contract."),
     ] = None,
     frictions: Annotated[bool, typer.Option("--frictions", help="List friction laws, not models.")] = False,
-    plugins: PluginOption = None,
-    as_json: JsonOption = False,
+    plugins: options.Plugins = None,
+    as_json: options.Json = False,
 ) -> None:
     """List the contact force models, or the friction laws: equations, references, domains, restitution."""
     if frictions and (family or check):
@@ -97,3 +101,49 @@ def _check_contract(models: Sequence[ForceModel], *, as_json: bool) -> None:
             exits.print_line(note)
     if not all(result.holds for result in results):
         raise typer.Exit(exits.EXIT_NOT_EQUAL)
+
+
+def materials(
+    name: Annotated[str | None, typer.Argument(help="A material to show alone. \\[default: list them]")] = None,
+    as_json: options.Json = False,
+) -> None:
+    """List common materials, which need no table in a config: E, nu, rho, yield strength, source."""
+
+    catalogue = impact.materials()
+    if name is not None and name not in catalogue:
+        raise UsageError(f'no material "{name}"; {did_you_mean(name, list(catalogue))}')
+    shown = catalogue if name is None else {name: catalogue[name]}
+    if as_json:
+        print(dump(shown))
+        return
+    rows = [
+        (key, *map(partial(_display_value, record), DISPLAY_UNITS), record["about"], record["source"])
+        for key, record in shown.items()
+    ]
+    headings = ("material", *(f"{key} [{unit}]" for key, unit in DISPLAY_UNITS.items()), "what", "source")
+    print_blocks([Table(rows, headings, text=(0, -2, -1))])
+
+
+def _display_value(record: Mapping[str, float | str], name: str) -> float | str:
+    """Convert a property to its unit in the table."""
+    return float(record[name]) / SI_PER_UNIT.get(DISPLAY_UNITS[name], 1.0) if name in record else "–"
+
+
+def cite(
+    laws: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="LAW...",
+            autocompletion=complete_model,
+            help="Keys of models and friction laws, or results, of which every law is cited.",
+        ),
+    ],
+    plugins: options.Plugins = None,
+    as_json: options.Json = False,
+) -> None:
+    """Write BibTeX of laws, from their references, with the evidence for their formulas."""
+    citations = impact.cite(*laws, plugins=plugins or ())
+    if as_json:
+        print(dump(citations.as_list()))
+    else:
+        show(citations)

@@ -1,41 +1,77 @@
-"""Options and arguments that several commands have, each declared once."""
+"""Options and arguments that several commands have, each declared once, and kinds of options."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-from .completion import complete_friction, complete_input, complete_model, complete_selection, complete_setting
-from .parsing import (
-    Setting,
-    Tolerance,
-    parse_setting,
-    parse_tolerance,
-    parse_whole_number,
-    reject_duplicates,
-)
+from . import completion, parsing
+from .parsing import NamedValue
 
-ResultArgument = Annotated[Path, typer.Argument(help="A result of `impact sweep`.")]
-SourceArgument = Annotated[
+
+def whole_number(*names: str, help: str) -> Any:
+    """Declare an option whose value is a whole number of at least 1."""
+    return typer.Option(*names, metavar="N", parser=parsing.parse_whole_number, help=help)
+
+
+def number(name: str, metavar: str, help: str) -> Any:
+    """Declare an option whose value is a number, which may be in percent."""
+    return typer.Option(name, metavar=metavar, parser=parsing.parse_number, help=help)
+
+
+def pairs(name: str, complete: Callable[..., list[str]], help: str) -> Any:
+    """Declare an option that is repeated for several names."""
+    return typer.Option(
+        name,
+        metavar="NAME=VALUE",
+        autocompletion=complete,
+        parser=parsing.parse_setting,
+        callback=parsing.reject_duplicates,
+        help=help,
+    )
+
+
+def tolerance(metavar: str, help: str) -> Any:
+    """Declare an option for a tolerance of all, or of one by its name."""
+    return typer.Option(
+        "--tol", metavar=metavar, parser=parsing.parse_tolerance, callback=parsing.reject_duplicates, help=help
+    )
+
+
+def target(help: str) -> Any:
+    """Declare the option for the wanted output."""
+    return typer.Option(
+        "--target",
+        metavar="NAME=VALUE",
+        parser=parsing.parse_target,
+        autocompletion=completion.complete_target,
+        help=help,
+    )
+
+
+def model(help: str) -> Any:
+    """Declare an option for the key of a model."""
+    return typer.Option("--model", metavar="KEY", autocompletion=completion.complete_model, help=help)
+
+
+def friction(help: str) -> Any:
+    """Declare an option for the key of a friction law."""
+    return typer.Option("--friction", metavar="KEY", autocompletion=completion.complete_friction, help=help)
+
+
+Result = Annotated[Path, typer.Argument(help="A result of `impact sweep`.")]
+Source = Annotated[
     Path | None, typer.Argument(help="A TOML file, a result or a calibration. \\[default: Table 1 of the paper]")
 ]
-AtOption = Annotated[
-    list[Setting] | None,
-    typer.Option(
-        "--at",
-        metavar="NAME=VALUE",
-        autocompletion=complete_input,
-        parser=parse_setting,
-        callback=reject_duplicates,
-        help="Value of an input, such as e=0.05; may be repeated.",
-    ),
+At = Annotated[
+    list[NamedValue] | None,
+    pairs("--at", completion.complete_input, "Value of an input, such as e=0.05; may be repeated."),
 ]
-ModelKeyOption = Annotated[
-    str, typer.Option("--model", metavar="KEY", autocompletion=complete_model, help="The model.")
-]
-ParameterOption = Annotated[
+ModelKey = Annotated[str, model("The model.")]
+Parameter = Annotated[
     str | None,
     typer.Option(
         "--for",
@@ -44,112 +80,61 @@ ParameterOption = Annotated[
         "is within the tolerance at the given --dt.",
     ),
 ]
-FrictionKeyOption = Annotated[
-    str | None,
-    typer.Option(
-        "--friction",
-        metavar="KEY",
-        autocompletion=complete_friction,
-        help="The friction law. \\[default: the first of the source, if it has any]",
-    ),
+FrictionKey = Annotated[
+    str | None, friction("The friction law. \\[default: the first of the source, if it has any]")
 ]
-OutputOption = Annotated[Path, typer.Option("-o", "--output", help="The result file.")]
-OverwriteOption = Annotated[bool, typer.Option("--overwrite", help="Replace the output if it exists.")]
-RowsOption = Annotated[
+Output = Annotated[Path, typer.Option("-o", "--output", help="The result file.")]
+Page = Annotated[Path | None, typer.Option("-o", "--output", help="The page: .html. \\[default: RESULT.html]")]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace the output if it exists.")]
+Rows = Annotated[
     int | None,
-    typer.Option(
-        "--rows",
-        metavar="N",
-        parser=parse_whole_number,
-        help="Write at most N rows of a table, evenly spread. \\[default: all]",
-    ),
+    whole_number("--rows", help="Write at most N rows of a table, evenly spread. \\[default: all]"),
 ]
-DigitsOption = Annotated[
-    int | None,
-    typer.Option(
-        "--digits",
-        metavar="N",
-        parser=parse_whole_number,
-        help="Significant digits of a table. \\[default: all, in .tex 6]",
-    ),
+Digits = Annotated[
+    int | None, whole_number("--digits", help="Significant digits of a table. \\[default: all, in .tex 6]")
 ]
-DecimalOption = Annotated[
+Decimal = Annotated[
     str,
     typer.Option("--decimal", metavar="NAME", help="point, comma (semicolons separate columns) or locale."),
 ]
-TableOption = Annotated[
+Table = Annotated[
     Path | None,
     typer.Option("-o", "--output", metavar="FILE", help="Write the table: .csv, .tex or .parquet."),
 ]
-JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON on stdout.")]
-QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")]
-AllowFailedOption = Annotated[bool, typer.Option("--allow-failed", help="Exit 0 even if points failed.")]
-ResumeOption = Annotated[bool, typer.Option("--resume", help="Continue an interrupted sweep.")]
-SetOption = Annotated[
+Json = Annotated[bool, typer.Option("--json", help="Print JSON on stdout.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")]
+AllowFailed = Annotated[bool, typer.Option("--allow-failed", help="Exit 0 even if points failed.")]
+Resume = Annotated[bool, typer.Option("--resume", help="Continue an interrupted sweep.")]
+Set = Annotated[
     list[str] | None,
     typer.Option(
         "--set",
         metavar="PATH=VALUE",
-        autocompletion=complete_setting,
+        autocompletion=completion.complete_setting,
         help="Change the config, such as sweep.m2=2.0; may be repeated.",
     ),
 ]
-PluginOption = Annotated[
+Plugins = Annotated[
     list[Path] | None,
     typer.Option("--plugin", metavar="FILE", help="Python file with user-defined models; may be repeated."),
 ]
-SelectOption = Annotated[
-    list[Setting] | None,
-    typer.Option(
-        "--sel",
-        metavar="NAME=VALUE",
-        autocompletion=complete_selection,
-        parser=parse_setting,
-        callback=reject_duplicates,
-        help="Value of an axis, such as m2=1.0; may be repeated.",
-    ),
+Select = Annotated[
+    list[NamedValue] | None,
+    pairs("--sel", completion.complete_selection, "Value of an axis, such as m2=1.0; may be repeated."),
 ]
-ModelOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--model", metavar="KEY", autocompletion=complete_model, help="Only this model; may be repeated."
-    ),
-]
-FrictionOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--friction",
-        metavar="KEY",
-        autocompletion=complete_friction,
-        help="Only this friction law; may be repeated.",
-    ),
-]
-JobsOption = Annotated[
-    int, typer.Option("--jobs", "-j", metavar="N", parser=parse_whole_number, help="Number of processes.")
-]
-ThreadsOption = Annotated[
+Models = Annotated[list[str] | None, model("Only this model; may be repeated.")]
+Frictions = Annotated[list[str] | None, friction("Only this friction law; may be repeated.")]
+Jobs = Annotated[int, whole_number("--jobs", "-j", help="Number of processes.")]
+Threads = Annotated[int, whole_number("--threads", help="Number of threads, instead of processes.")]
+MaxPoints = Annotated[
     int,
-    typer.Option(
-        "--threads", metavar="N", parser=parse_whole_number, help="Number of threads, instead of processes."
-    ),
+    whole_number("--max-points", help="Largest number of points in layout full, of trajectories otherwise."),
 ]
-MaxPointsOption = Annotated[
-    int,
-    typer.Option(
-        "--max-points",
-        metavar="N",
-        parser=parse_whole_number,
-        help="Largest number of points in layout full, of trajectories otherwise.",
-    ),
-]
-ToleranceOption = Annotated[
-    list[Tolerance] | None,
-    typer.Option(
-        "--tol",
-        metavar="[NAME=]VALUE",
-        parser=parse_tolerance,
-        callback=reject_duplicates,
-        help="Tolerance relative to the scale of a point, such as 1e-8 or 5%, for all variables or for one; may "
+Tolerance = Annotated[
+    list[NamedValue] | None,
+    tolerance(
+        "[NAME=]VALUE",
+        "Tolerance relative to the scale of a point, such as 1e-8 or 5%, for all variables or for one; may "
         "be repeated. \\[default: the baseline's, else 10 times its solver's rtol]",
     ),
 ]

@@ -3,78 +3,54 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import typer
 
 from ..formatting import safe_text
 
 
-class Setting(NamedTuple):
-    """A word NAME=VALUE; a value that reads as a number is one."""
+class NamedValue(NamedTuple):
+    """A word NAME=VALUE; a tolerance of all has the name "all"."""
 
     name: str
-    value: float | str
+    value: Any
 
 
-class Tolerance(NamedTuple):
-    """A word VALUE, for all variables, or NAME=VALUE."""
-
-    name: str
-    value: float
-
-
-class Target(NamedTuple):
-    """A word NAME=NUMBER."""
-
-    name: str
-    value: float
-
-
-class InputRange(NamedTuple):
-    """Several values of an input, as in a config."""
-
-    name: str
-    values: object
-
-
-T = TypeVar("T", Setting, Tolerance)
-
-
-def parse_setting(word: str) -> Setting:
-    """Parse NAME=VALUE.
+def parse_setting(word: str) -> NamedValue:
+    """Parse NAME=VALUE; a value that reads as a number is one.
 
     >>> parse_setting("m2=1e3"), parse_setting("material=steel")
-    (Setting(name='m2', value=1000.0), Setting(name='material', value='steel'))
+    (NamedValue(name='m2', value=1000.0), NamedValue(name='material', value='steel'))
     """
     name, _, value = word.partition("=")
     if not name or not value:
         raise invalid_value(word, "NAME=VALUE, such as m2=1.0")
     try:
-        return Setting(name, float(value))
+        return NamedValue(name, float(value))
     except ValueError:
-        return Setting(name, value)
+        return NamedValue(name, value)
 
 
-def parse_target(word: str) -> Target:
+def parse_target(word: str) -> NamedValue:
     """Parse NAME=NUMBER, where the number may be in percent.
 
     >>> parse_target("e_out=0.6")
-    Target(name='e_out', value=0.6)
+    NamedValue(name='e_out', value=0.6)
     """
     name, _, text = word.partition("=")
     value = _float_or_nan(text)
     if not name or math.isnan(value):
         raise invalid_value(word, "NAME=NUMBER, such as e_out=0.6")
-    return Target(name, value)
+    return NamedValue(name, value)
 
 
-def parse_range(word: str) -> InputRange:
+def parse_range(word: str) -> NamedValue:
     """Parse NAME=FIRST:LAST:COUNT, evenly spaced values, or NAME=VALUES with a TOML list or range.
 
     >>> parse_range("v1=0.1:3:30")
-    InputRange(name='v1', values={'linspace': [0.1, 3, 30]})
-    >>> parse_range("v1={geomspace = [0.1, 3, 30]}").values, parse_range("m2=[1.0, 2.0]").values
+    NamedValue(name='v1', value={'linspace': [0.1, 3, 30]})
+    >>> parse_range("v1={geomspace = [0.1, 3, 30]}").value, parse_range("m2=[1.0, 2.0]").value
     ({'geomspace': [0.1, 3, 30]}, [1.0, 2.0])
     """
     from ..config.files import read_value
@@ -84,23 +60,23 @@ def parse_range(word: str) -> InputRange:
     values = read_value(text if len(parts) != 3 else f"{{linspace = [{', '.join(parts)}]}}")
     if not name or not isinstance(values, list | dict):
         raise invalid_value(word, "NAME=FIRST:LAST:COUNT, such as v1=0.1:3:30, or NAME=[VALUE, ...]")
-    return InputRange(name, values)
+    return NamedValue(name, values)
 
 
-def parse_tolerance(word: str) -> Tolerance:
+def parse_tolerance(word: str) -> NamedValue:
     """Parse VALUE or NAME=VALUE, where VALUE may be in percent.
 
     >>> parse_tolerance("1e-8"), parse_tolerance("v1_post=5%")
-    (Tolerance(name='all', value=1e-08), Tolerance(name='v1_post', value=0.05))
+    (NamedValue(name='all', value=1e-08), NamedValue(name='v1_post', value=0.05))
     """
     name, _, value = word.rpartition("=")
     read = _float_or_nan(value)
     if math.isnan(read):
         raise invalid_value(word, "VALUE or NAME=VALUE, such as 1e-8, 5% or v1_post=1e-6")
-    return Tolerance(name or "all", read)
+    return NamedValue(name or "all", read)
 
 
-def reject_duplicates(settings: list[T] | None) -> list[T] | None:
+def reject_duplicates(settings: list[NamedValue] | None) -> list[NamedValue] | None:
     """Raise an error if a name occurs twice among the values of a repeated option."""
     names = [name for name, _ in settings or ()]
     for name in names:

@@ -14,19 +14,8 @@ from ..display import dump
 from ..errors import UsageError
 from ..formatting import safe_text
 from ..plots.kinds import KINDS, WIDTHS
-from . import exits
+from . import exits, options
 from .completion import complete_axis, complete_kind, complete_output
-from .options import (
-    DecimalOption,
-    DigitsOption,
-    FrictionOption,
-    JsonOption,
-    ModelOption,
-    OverwriteOption,
-    PluginOption,
-    RowsOption,
-    SelectOption,
-)
 
 if TYPE_CHECKING:
     from ..plots.data import PlotData
@@ -80,9 +69,9 @@ def plot(
             help="Variable of a map or of bands. \\[default: e_error of a map, e_out of bands]",
         ),
     ] = None,
-    sel: SelectOption = None,
-    model: ModelOption = None,
-    friction: FrictionOption = None,
+    sel: options.Select = None,
+    model: options.Models = None,
+    friction: options.Frictions = None,
     log: Annotated[str, typer.Option("--log", metavar="AXES", help="Logarithmic axes: x, y or xy.")] = "",
     points: Annotated[
         Path | None,
@@ -143,12 +132,12 @@ def plot(
             "--data-form", metavar="FORM", help="wide: a column for each curve; long: a row for each point."
         ),
     ] = "wide",
-    rows: RowsOption = None,
-    digits: DigitsOption = None,
-    decimal: DecimalOption = "point",
-    overwrite: OverwriteOption = False,
-    plugin: PluginOption = None,
-    as_json: JsonOption = False,
+    rows: options.Rows = None,
+    digits: options.Digits = None,
+    decimal: options.Decimal = "point",
+    overwrite: options.Overwrite = False,
+    plugin: options.Plugins = None,
+    as_json: options.Json = False,
 ) -> None:
     """Plot a stored result: by default the final-velocity comparison, Figure 6 of the paper.
 
@@ -193,13 +182,13 @@ def plot(
         print(dump({name: asdict(plot_data) for name, plot_data in files.plot_data.items()}))
 
 
-def _parse_labels(options: list[str] | None) -> dict[str, str]:
+def _parse_labels(words: list[str] | None) -> dict[str, str]:
     """KEY=TEXT options."""
     labels: dict[str, str] = {}
-    for option in options or ():
-        key, equals, text = option.partition("=")
+    for word in words or ():
+        key, equals, text = word.partition("=")
         if not (key and equals and text):
-            raise UsageError(f"--label: got {option}, expected KEY=TEXT, such as e='Restitution $e$'")
+            raise UsageError(f"--label: got {word}, expected KEY=TEXT, such as e='Restitution $e$'")
         labels[key] = text
     return labels
 

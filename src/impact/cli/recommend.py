@@ -4,58 +4,34 @@ from __future__ import annotations
 
 from typing import Annotated
 
-import typer
-
 import impact
 
 from ..display import TableForm, check_table_output, show, write_table
-from . import exits
-from .completion import complete_target
-from .options import (
-    DecimalOption,
-    DigitsOption,
-    FrictionOption,
-    JsonOption,
-    ModelOption,
-    OverwriteOption,
-    ResultArgument,
-    RowsOption,
-    SelectOption,
-    TableOption,
-)
-from .parsing import Target, parse_number, parse_target
+from . import exits, options
+from .parsing import NamedValue
 
 
 def recommend(
-    result: ResultArgument,
+    result: options.Result,
     tol: Annotated[
         float,
-        typer.Option(
-            "--tol",
-            metavar="VALUE",
-            parser=parse_number,
-            help="Largest accepted |e_out − e|, or distance from the target, such as 0.02 or 2%.",
+        options.number(
+            "--tol", "VALUE", "Largest accepted |e_out − e|, or distance from the target, such as 0.02 or 2%."
         ),
     ] = 0.01,
     target: Annotated[
-        Target | None,
-        typer.Option(
-            "--target",
-            metavar="NAME=VALUE",
-            parser=parse_target,
-            autocompletion=complete_target,
-            help="The wanted output, such as beta=0.4. \\[default: e_out, compared with e]",
-        ),
+        NamedValue | None,
+        options.target("The wanted output, such as beta=0.4. \\[default: e_out, compared with e]"),
     ] = None,
-    sel: SelectOption = None,
-    model: ModelOption = None,
-    friction: FrictionOption = None,
-    output: TableOption = None,
-    rows: RowsOption = None,
-    digits: DigitsOption = None,
-    decimal: DecimalOption = "point",
-    overwrite: OverwriteOption = False,
-    as_json: JsonOption = False,
+    sel: options.Select = None,
+    model: options.Models = None,
+    friction: options.Frictions = None,
+    output: options.Table = None,
+    rows: options.Rows = None,
+    digits: options.Digits = None,
+    decimal: options.Decimal = "point",
+    overwrite: options.Overwrite = False,
+    as_json: options.Json = False,
 ) -> None:
     """Rank the models of a result by the error of their restitution over the swept range.
 
@@ -75,5 +51,4 @@ def recommend(
     if output is not None:
         write_table(ranking, output, form, overwrite=overwrite)
     show(ranking, as_json=as_json)
-    if output is not None:
-        exits.print_line(f"{output}: written")
+    exits.print_written(output)

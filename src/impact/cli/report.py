@@ -1,26 +1,22 @@
-"""The command `report`: a result as one page of HTML."""
+"""The commands that write a result as one page of HTML: report and page."""
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
 import impact
 
-from . import exits
-from .options import ModelOption, OverwriteOption, PluginOption
+from . import exits, options
 
 
 def report(
-    result: Annotated[Path, typer.Argument(help="A result of `impact sweep`.")],
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="The page: .html. \\[default: RESULT.html]")
-    ] = None,
-    overwrite: OverwriteOption = False,
-    plugin: PluginOption = None,
-    model: ModelOption = None,
+    result: options.Result,
+    output: options.Page = None,
+    overwrite: options.Overwrite = False,
+    plugin: options.Plugins = None,
+    model: options.Models = None,
     section: Annotated[
         list[str] | None,
         typer.Option(
@@ -42,3 +38,18 @@ def report(
     figures = page.count("<figure")
     size = f"{len(page.encode()) / 1000:,.0f} kB"
     exits.print_line(f"{output}: {figures} figure{'' if figures == 1 else 's'}, {size}")
+
+
+def page(
+    result: options.Result,
+    output: options.Page = None,
+    overwrite: options.Overwrite = False,
+    model: options.Models = None,
+) -> None:
+    """Write a page that draws a result over any axis, with a slider for each other axis and a choice of models.
+
+    The page is a single file for any browser. It needs neither Python nor a network, and has the numbers as CSV.
+    """
+    output = output or result.with_suffix(".html")
+    text = impact.page(result, output=output, overwrite=overwrite, models=model)
+    exits.print_line(f"{output}: {len(text.encode()) / 1000:,.0f} kB")

@@ -12,53 +12,31 @@ import impact
 from ..atomic import check_output, write_file
 from ..display import show
 from ..errors import UsageError
-from . import exits
-from .completion import complete_model
-from .options import (
-    AtOption,
-    FrictionKeyOption,
-    JsonOption,
-    OverwriteOption,
-    PluginOption,
-    SetOption,
-    SourceArgument,
-)
-from .parsing import parse_whole_number
+from . import exits, options
 
 # files of a time history: netCDF-4, which is HDF5, and a table
 HISTORY_SUFFIXES = (".h5", ".hdf5", ".nc", ".csv")
 
 
 def run(
-    source: SourceArgument = None,
-    model: Annotated[
-        str | None,
-        typer.Option(
-            "--model",
-            metavar="KEY",
-            autocompletion=complete_model,
-            help="The model. \\[default: the first of the source]",
-        ),
-    ] = None,
-    friction: FrictionKeyOption = None,
-    at: AtOption = None,
-    sets: SetOption = None,
-    plugins: PluginOption = None,
+    source: options.Source = None,
+    model: Annotated[str | None, options.model("The model. \\[default: the first of the source]")] = None,
+    friction: options.FrictionKey = None,
+    at: options.At = None,
+    sets: options.Set = None,
+    plugins: options.Plugins = None,
     history: Annotated[
         Path | None,
         typer.Option("--history", metavar="FILE", help="Write the time history: .h5, .hdf5, .nc or .csv."),
     ] = None,
     times: Annotated[
         int | None,
-        typer.Option(
-            "--times",
-            metavar="N",
-            parser=parse_whole_number,
-            help="Number of uniform times of the history. \\[default: steps of the integrator]",
+        options.whole_number(
+            "--times", help="Number of uniform times of the history. \\[default: steps of the integrator]"
         ),
     ] = None,
-    overwrite: OverwriteOption = False,
-    as_json: JsonOption = False,
+    overwrite: options.Overwrite = False,
+    as_json: options.Json = False,
 ) -> None:
     """Run one impact: inputs, outputs and estimated errors."""
     from ..plots.data import encode_history

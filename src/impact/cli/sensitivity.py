@@ -10,20 +10,9 @@ import typer
 import impact
 
 from ..display import dump, show
-from . import exits
+from . import exits, options
 from .completion import complete_output
 from .execution import Execution
-from .options import (
-    AllowFailedOption,
-    JobsOption,
-    JsonOption,
-    MaxPointsOption,
-    OverwriteOption,
-    PluginOption,
-    QuietOption,
-    SetOption,
-    ThreadsOption,
-)
 
 
 def sensitivity(
@@ -40,15 +29,15 @@ def sensitivity(
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="The result file. \\[default: none]")
     ] = None,
-    overwrite: OverwriteOption = False,
-    sets: SetOption = None,
-    plugins: PluginOption = None,
-    jobs: JobsOption = 1,
-    threads: ThreadsOption = 1,
-    max_points: MaxPointsOption = 10**9,
-    allow_failed: AllowFailedOption = False,
-    quiet: QuietOption = False,
-    as_json: JsonOption = False,
+    overwrite: options.Overwrite = False,
+    sets: options.Set = None,
+    plugins: options.Plugins = None,
+    jobs: options.Jobs = 1,
+    threads: options.Threads = 1,
+    max_points: options.MaxPoints = 10**9,
+    allow_failed: options.AllowFailed = False,
+    quiet: options.Quiet = False,
+    as_json: options.Json = False,
 ) -> None:
     """Find which uncertain input matters: Sobol indices of an output, its mean and quantiles.
 
@@ -79,7 +68,6 @@ def sensitivity(
             if position:
                 print()
             show(description)
-    if output is not None:
-        exits.print_line(f"{output}: written")
+    exits.print_written(output)
     if any(int(result["failed"].sum()) for result in results) and not allow_failed:
         raise typer.Exit(exits.EXIT_POINTS_FAILED)

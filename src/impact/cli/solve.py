@@ -9,21 +9,13 @@ import typer
 import impact
 
 from ..display import show
-from .completion import complete_input, complete_target, complete_unknown
-from .options import (
-    AtOption,
-    FrictionKeyOption,
-    JsonOption,
-    ModelKeyOption,
-    PluginOption,
-    SetOption,
-    SourceArgument,
-)
-from .parsing import InputRange, Target, parse_range, parse_target
+from . import options
+from .completion import complete_input, complete_unknown
+from .parsing import NamedValue, parse_range
 
 
 def solve(
-    model: ModelKeyOption,
+    model: options.ModelKey,
     name: Annotated[
         str,
         typer.Option(
@@ -33,21 +25,12 @@ def solve(
             help="What to solve for: a parameter of the model or of the friction law, e (to enter), K, or mu.",
         ),
     ],
-    target: Annotated[
-        Target,
-        typer.Option(
-            "--target",
-            metavar="NAME=VALUE",
-            parser=parse_target,
-            autocompletion=complete_target,
-            help="The wanted output, such as e_out=0.6 or beta=0.4.",
-        ),
-    ],
-    source: SourceArgument = None,
-    friction: FrictionKeyOption = None,
-    at: AtOption = None,
+    target: Annotated[NamedValue, options.target("The wanted output, such as e_out=0.6 or beta=0.4.")],
+    source: options.Source = None,
+    friction: options.FrictionKey = None,
+    at: options.At = None,
     over: Annotated[
-        InputRange | None,
+        NamedValue | None,
         typer.Option(
             "--over",
             metavar="NAME=FIRST:LAST:COUNT",
@@ -56,9 +39,9 @@ def solve(
             help="Find the value that serves best over a range of an input, such as v1=0.1:3:30.",
         ),
     ] = None,
-    sets: SetOption = None,
-    plugins: PluginOption = None,
-    as_json: JsonOption = False,
+    sets: options.Set = None,
+    plugins: options.Plugins = None,
+    as_json: options.Json = False,
 ) -> None:
     """Find the parameter, K, mu, or requested e that produces a target output.
 

@@ -11,34 +11,20 @@ import impact
 
 from ..display import Wrapped, dump, print_blocks, show
 from ..errors import UnfinishedError, UsageError
-from . import exits
-from .execution import Execution
-from .options import (
-    AllowFailedOption,
-    JobsOption,
-    JsonOption,
-    MaxPointsOption,
-    OutputOption,
-    OverwriteOption,
-    PluginOption,
-    QuietOption,
-    ResumeOption,
-    SetOption,
-    ThreadsOption,
-)
-from .summary import print_summary_and_exit
+from . import exits, options
+from .execution import Execution, print_summary_and_exit
 
 
 def sweep(
     config: Annotated[Path, typer.Argument(help="The sweep, a TOML file; `impact init` writes one.")],
-    output: OutputOption = Path("results.h5"),
-    sets: SetOption = None,
-    plugins: PluginOption = None,
-    overwrite: OverwriteOption = False,
-    allow_failed: AllowFailedOption = False,
-    resume: ResumeOption = False,
-    jobs: JobsOption = 1,
-    threads: ThreadsOption = 1,
+    output: options.Output = Path("results.h5"),
+    sets: options.Set = None,
+    plugins: options.Plugins = None,
+    overwrite: options.Overwrite = False,
+    allow_failed: options.AllowFailed = False,
+    resume: options.Resume = False,
+    jobs: options.Jobs = 1,
+    threads: options.Threads = 1,
     scheduler: Annotated[
         str | None,
         typer.Option(
@@ -54,12 +40,12 @@ def sweep(
         str | None,
         typer.Option("--shard", metavar="K/N", help="Only part K of N; impact merge joins the parts."),
     ] = None,
-    max_points: MaxPointsOption = 10**9,
+    max_points: options.MaxPoints = 10**9,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Only print the number of points and trajectories, bytes and time.")
     ] = False,
-    quiet: QuietOption = False,
-    as_json: JsonOption = False,
+    quiet: options.Quiet = False,
+    as_json: options.Json = False,
 ) -> None:
     """Run every model over a sweep and store post-impact velocities and their errors."""
     with exits.catch_signals() as should_stop:
@@ -102,12 +88,12 @@ def sweep(
 
 def merge(
     folders: Annotated[list[Path], typer.Argument(help="Work folders written by `impact sweep --shard K/N`.")],
-    output: OutputOption = Path("results.h5"),
-    plugins: PluginOption = None,
-    overwrite: OverwriteOption = False,
-    allow_failed: AllowFailedOption = False,
-    quiet: QuietOption = False,
-    as_json: JsonOption = False,
+    output: options.Output = Path("results.h5"),
+    plugins: options.Plugins = None,
+    overwrite: options.Overwrite = False,
+    allow_failed: options.AllowFailed = False,
+    quiet: options.Quiet = False,
+    as_json: options.Json = False,
 ) -> None:
     """Join the shards of a sweep into its result; the work folders are not deleted."""
     with (

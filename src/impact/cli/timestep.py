@@ -9,38 +9,20 @@ import typer
 import impact
 
 from ..display import TableForm, check_table_output, show, write_table
-from . import exits
+from . import exits, options
 from .completion import complete_scheme
-from .options import (
-    AtOption,
-    DecimalOption,
-    DigitsOption,
-    FrictionKeyOption,
-    JsonOption,
-    ModelKeyOption,
-    OverwriteOption,
-    ParameterOption,
-    PluginOption,
-    RowsOption,
-    SetOption,
-    SourceArgument,
-    TableOption,
-)
-from .parsing import parse_number, parse_whole_number
 
 
 def timestep(
-    model: ModelKeyOption,
-    source: SourceArgument = None,
-    at: AtOption = None,
+    model: options.ModelKey,
+    source: options.Source = None,
+    at: options.At = None,
     steps_per_contact: Annotated[
         list[float] | None,
-        typer.Option(
+        options.number(
             "--steps-per-contact",
-            metavar="N",
-            parser=parse_number,
-            help="Contact time of the continuous law over the time step; may be repeated. "
-            "\\[default: 10, 20, 50, 100]",
+            "N",
+            "Contact time of the continuous law over the time step; may be repeated. \\[default: 10, 20, 50, 100]",
         ),
     ] = None,
     dt: Annotated[
@@ -51,26 +33,17 @@ def timestep(
             help='A time step \\[s], or with a unit, such as "2 us"; may be repeated.',
         ),
     ] = None,
-    phases: Annotated[
-        int,
-        typer.Option(
-            "--phases",
-            metavar="N",
-            parser=parse_whole_number,
-            help="Phases at which the contact begins.",
-        ),
-    ] = 400,
+    phases: Annotated[int, options.whole_number("--phases", help="Phases at which the contact begins.")] = 400,
     tol: Annotated[
         float | None,
-        typer.Option(
+        options.number(
             "--tol",
-            metavar="VALUE",
-            parser=parse_number,
-            help="Find the number of steps per contact with which every phase is within this relative tolerance, "
+            "VALUE",
+            "Find the number of steps per contact with which every phase is within this relative tolerance, "
             "such as 0.01 or 1%.",
         ),
     ] = None,
-    parameter: ParameterOption = None,
+    parameter: options.Parameter = None,
     scheme: Annotated[
         str | None,
         typer.Option(
@@ -82,15 +55,15 @@ def timestep(
             autocompletion=complete_scheme,
         ),
     ] = None,
-    friction: FrictionKeyOption = None,
-    sets: SetOption = None,
-    plugins: PluginOption = None,
-    output: TableOption = None,
-    rows: RowsOption = None,
-    digits: DigitsOption = None,
-    decimal: DecimalOption = "point",
-    overwrite: OverwriteOption = False,
-    as_json: JsonOption = False,
+    friction: options.FrictionKey = None,
+    sets: options.Set = None,
+    plugins: options.Plugins = None,
+    output: options.Table = None,
+    rows: options.Rows = None,
+    digits: options.Digits = None,
+    decimal: options.Decimal = "point",
+    overwrite: options.Overwrite = False,
+    as_json: options.Json = False,
 ) -> None:
     """Show which restitution a code delivers at a fixed time step, and which e to enter.
 
@@ -122,7 +95,6 @@ def timestep(
     if output is not None:
         write_table(result, output, form, overwrite=overwrite)
     show(result, as_json=as_json)
-    if output is not None:
-        exits.print_line(f"{output}: written")
+    exits.print_written(output)
     if any(row.failed for row in result.rows):
         raise typer.Exit(exits.EXIT_POINTS_FAILED)

@@ -97,5 +97,4 @@ def _check_tolerances(tolerances: Mapping[str, Any]) -> None:
 
 
 def _is_number(value: object) -> TypeGuard[float]:
-    """Return whether a value is a real number."""
     return isinstance(value, int | float | np.number) and not isinstance(value, bool)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import xarray as xr
 
@@ -15,16 +15,9 @@ from ..display import Block, Displayed, Table, Wrapped
 from ..formatting import number, prefixed, safe_text
 from ..results.replay_command import describe_point, replay_command
 
-DifferenceKind = Literal["nothing in common", "physics config", "labels", "units", "missing variable", "values"]
 # in the order of a verdict: kinds that explain others first
-DIFFERENCE_KINDS: tuple[DifferenceKind, ...] = (
-    "nothing in common",
-    "physics config",
-    "labels",
-    "units",
-    "missing variable",
-    "values",
-)
+DifferenceKind = Literal["nothing in common", "physics config", "labels", "units", "missing variable", "values"]
+DIFFERENCE_KINDS: tuple[DifferenceKind, ...] = get_args(DifferenceKind)
 VERDICT_HEADINGS = ("variable", "judged", "tolerance", "differ", "worst", "x tolerance")
 MAX_NAMES = 4  # names per kind in the first line
 # a narrower terminal shows no table

@@ -67,12 +67,10 @@ class Facts:
 
 
 class AdapterError(UsageError):
-    """An adapter does not answer as the protocol says."""
+    """An adapter does not answer as the protocol says; the message names the argument."""
 
-
-def adapter_error(text: str) -> AdapterError:
-    """Make the error of an adapter, which names the argument."""
-    return AdapterError(f"{argument('adapter')}: {text}")
+    def __init__(self, text: str) -> None:
+        super().__init__(f"{argument('adapter')}: {text}")
 
 
 @contextmanager
@@ -100,7 +98,7 @@ def open_adapter(adapter: object, timeout_s: float, folder: str | None = None) -
                 start_new_session=True,
             )
         except OSError as error:
-            raise adapter_error(f"{words[0]}: {error.strerror}") from None
+            raise AdapterError(f"{words[0]}: {error.strerror}") from None
         try:
             yield _Conversation(process, errors.fileno(), timeout_s).ask
         finally:
@@ -119,21 +117,21 @@ def _command(adapter: object) -> list[str]:
         if " " not in path or Path(path).is_file():
             return python_command(sys.executable, Path(path), name)
     if not isinstance(adapter, str | Sequence) or not adapter:
-        raise adapter_error(f'got {adapter!r}, expected FILE.py:FUNCTION or "PROGRAM ARGUMENTS"')
+        raise AdapterError(f'got {adapter!r}, expected FILE.py:FUNCTION or "PROGRAM ARGUMENTS"')
     try:
         words = shlex.split(adapter) if isinstance(adapter, str) else [str(word) for word in adapter]
     except ValueError as error:
-        raise adapter_error(f"{adapter}: {error}") from None
+        raise AdapterError(f"{adapter}: {error}") from None
     program = find_program(words[0], None)
     if program is None:
-        raise adapter_error(f'no program "{words[0]}"; expected FILE.py:FUNCTION or "PROGRAM ARGUMENTS"')
+        raise AdapterError(f'no program "{words[0]}"; expected FILE.py:FUNCTION or "PROGRAM ARGUMENTS"')
     return [program, *words[1:]]
 
 
 def python_command(python: str, path: Path, name: str) -> list[str]:
     """Make the command that runs a function of a Python file as an adapter."""
     if not path.is_file():
-        raise adapter_error(f"{path}: {'is no file' if path.exists() else 'does not exist'}")
+        raise AdapterError(f"{path}: {'is no file' if path.exists() else 'does not exist'}")
     return [python, str(SERVE), f"{path.absolute()}:{name}"]
 
 
@@ -164,18 +162,18 @@ class _Conversation:
                 return json.loads(NOT_A_NUMBER.sub(_python_number, text))
         except ValueError:
             shown = safe_text(line.decode(errors="replace"), 80)
-            raise adapter_error(f'{name}: got "{shown}", expected one line of JSON on stdout') from None
+            raise AdapterError(f'{name}: got "{shown}", expected one line of JSON on stdout') from None
 
     def _read_line(self, name: str) -> bytes:
         assert self.process.stdout is not None
         deadline, descriptor = time.monotonic() + self.timeout_s, self.process.stdout.fileno()
         while b"\n" not in self.received:
             if time.monotonic() > deadline:
-                raise adapter_error(f"{name}: no answer after {number(self.timeout_s)} s ({argument('timeout')})")
+                raise AdapterError(f"{name}: no answer after {number(self.timeout_s)} s ({argument('timeout')})")
             if len(self.received) > MAX_LINE_BYTES:
-                raise adapter_error(f"{name}: a line of more than {MAX_LINE_BYTES >> 10} KiB")
+                raise AdapterError(f"{name}: a line of more than {MAX_LINE_BYTES >> 10} KiB")
             if os.fstat(self.errors).st_size > MAX_OUTPUT_BYTES:
-                raise adapter_error(f"{name}: more than {MAX_OUTPUT_BYTES >> 20} MiB on stderr")
+                raise AdapterError(f"{name}: more than {MAX_OUTPUT_BYTES >> 20} MiB on stderr")
             # Windows cannot wait for a pipe, so that a silent adapter is not stopped there
             if sys.platform == "win32" or select.select([descriptor], [], [], POLL_INTERVAL_S)[0]:
                 content = os.read(descriptor, MAX_LINE_BYTES)
@@ -196,7 +194,7 @@ class _Conversation:
         kept = os.read(self.errors, KEPT_OUTPUT_BYTES)
         lines = kept.decode(errors="replace").strip().splitlines()
         last = f": {safe_text(lines[-1])}" if lines else ""
-        return adapter_error(f"{name}: the adapter ended with {code}{last}")
+        return AdapterError(f"{name}: the adapter ended with {code}{last}")
 
 
 def _python_number(match: re.Match[str]) -> str:
@@ -216,18 +214,18 @@ def read_answer(question: Question, answer: object) -> Answer | None:
     """
     name = f"collision {question['id']}"
     if not isinstance(answer, Mapping):
-        raise adapter_error(f"{name}: got {_shown(answer)}, expected an object of JSON")
+        raise AdapterError(f"{name}: got {_shown(answer)}, expected an object of JSON")
     if answer.get("id") != question["id"]:
-        raise adapter_error(f"{name}: got an answer to {_shown(answer.get('id'))}")
+        raise AdapterError(f"{name}: got an answer to {_shown(answer.get('id'))}")
     if answer.get("error") is not None:
         return None
     values = {}
     for key in (f"{quantity}{ball}" for quantity in ("v", "u", "omega") for ball in balls_of(question)):
         if key not in answer:
-            raise adapter_error(f"{name}: the answer has no {key}")
+            raise AdapterError(f"{name}: the answer has no {key}")
         value = answer[key]
         if isinstance(value, str | bool) or not isinstance(value, SupportsFloat | None):
-            raise adapter_error(f"{name}: {key}: got {_shown(value)}, expected a number")
+            raise AdapterError(f"{name}: {key}: got {_shown(value)}, expected a number")
         values[key] = float("nan") if value is None else float(value)
     return values
 
@@ -237,27 +235,24 @@ def read_facts(answer: Any) -> Facts:
     facts = {key: answer.get(key, "") for key in FACTS}
     for key, value in facts.items():
         if not isinstance(value, str):
-            raise adapter_error(f"{key}: got {_shown(value)}, expected text")
+            raise AdapterError(f"{key}: got {_shown(value)}, expected text")
+    for key, words in (("kind", KIND_TOLERANCES), ("precision", ("float32", "float64"))):
+        if facts[key] not in ("", *words):
+            raise AdapterError(f"{key}: got {_shown(facts[key])}, expected {' or '.join(words)}")
+    for key, noun, laws in (("law", "friction law", frictions()), ("model", "law", catalogue())):
+        if facts[key] and facts[key] not in laws:
+            raise AdapterError(f'{key}: no {noun} "{facts[key]}"; {did_you_mean(facts[key], list(laws))}')
     kind: Kind = "compliant" if facts["kind"] == "compliant" else "impulse"
-    if facts["kind"] not in ("", *KIND_TOLERANCES):
-        raise adapter_error(f"kind: got {_shown(facts['kind'])}, expected impulse or compliant")
-    if facts["precision"] not in ("", "float32", "float64"):
-        raise adapter_error(f"precision: got {_shown(facts['precision'])}, expected float32 or float64")
-    law, parameters = facts["law"], answer.get("parameters") or {}
-    if law and law not in frictions():
-        raise adapter_error(f'law: no friction law "{law}"; {did_you_mean(law, list(frictions()))}')
-    model = facts["model"] or DEFAULT_MODEL
-    if model not in catalogue():
-        raise adapter_error(f'model: no law "{model}"; {did_you_mean(model, list(catalogue()))}')
+    parameters = answer.get("parameters") or {}
     if not isinstance(parameters, Mapping):
-        raise adapter_error(f"parameters: got {_shown(parameters)}, expected an object of JSON")
+        raise AdapterError(f"parameters: got {_shown(parameters)}, expected an object of JSON")
     return Facts(
         engine=safe_text(facts["engine"], 60),
         version=safe_text(facts["version"], 60),
         kind=kind,
         is_float32=facts["precision"] == "float32",
-        law=law,
-        model=model,
+        law=facts["law"],
+        model=facts["model"] or DEFAULT_MODEL,
         parameters=dict(parameters),
     )
 

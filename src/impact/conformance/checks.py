@@ -12,6 +12,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal, NamedTuple
 
+import numpy as np
+
 from ..results.board import CHECKS, excess_of
 from .suite import ANSWER_KEYS, RELATIONS, Question, Trial, transform
 
@@ -132,7 +134,7 @@ def momentum(rebound: Rebound) -> Delivered:
         return abs(rebound.change(lambda read, ball: rebound.before(f"m{ball}") * read(f"{name}{ball}")))
 
     scale = rebound.total(rebound.before, size) or rebound.m * rebound.speed
-    return Delivered(0.0, _largest(change("v"), change("u")) / scale)
+    return Delivered(0.0, float(np.max([change("v"), change("u")])) / scale)
 
 
 def angular_momentum(rebound: Rebound) -> Delivered:
@@ -207,7 +209,7 @@ def spin(rebound: Rebound) -> Delivered:
         impulse = rebound.before(f"inertia{ball}") * change / rebound.before(f"R{ball}")
         return abs(impulse + rebound.tangential_impulse(ball))
 
-    return Delivered(0.0, _largest(*map(difference, rebound.balls)) / (rebound.m * rebound.speed))
+    return Delivered(0.0, float(np.max([*map(difference, rebound.balls)])) / (rebound.m * rebound.speed))
 
 
 def related(rebound: Rebound, trial: Trial, base: Rebound) -> Delivered:
@@ -221,7 +223,7 @@ def related(rebound: Rebound, trial: Trial, base: Rebound) -> Delivered:
         length = rebound.before(f"R{name[-1]}") if name.startswith("omega") else 1.0
         return length * abs(rebound.answer[name] - expected[name])
 
-    return Delivered(0.0, _largest(*map(difference, rebound.answer)) / rebound.speed)
+    return Delivered(0.0, float(np.max([*map(difference, rebound.answer)])) / rebound.speed)
 
 
 def repeat(rebound: Rebound, again: Answer) -> Delivered:
@@ -237,11 +239,6 @@ def step(coarse: Rebound, middle: Rebound, fine: Rebound) -> Delivered:
         return related(second, Trial(second.question, relation="step"), first).delivered
 
     return Delivered(change(coarse, middle), change(middle, fine))
-
-
-def _largest(*values: float) -> float:
-    """Return the largest; NaN if one is NaN."""
-    return math.nan if any(map(math.isnan, values)) else max(values)
 
 
 # checks of one answer alone

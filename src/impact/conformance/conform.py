@@ -16,21 +16,8 @@ from ..reporting.report import report
 from ..results.board import CHECKS, Board, EngineChecks, board_dataset
 from ..results.schema import CHECK_STATUSES
 from ..results.xarray_backend import save
+from . import checks
 from .adapters import DEFAULT_TIMEOUT_S, Ask, Facts, open_adapter, read_answer, read_facts
-from .checks import (
-    EXACT,
-    OF_AN_ANSWER,
-    Answer,
-    Delivered,
-    Rebound,
-    checks_of,
-    friction,
-    passes,
-    related,
-    repeat,
-    step,
-    tolerances,
-)
 from .friction_laws import betas_of_law
 from .registry import find_engine
 from .suite import ANSWER_KEYS, DEFAULT_SUITE, Question, Trial, read_suite
@@ -106,7 +93,7 @@ def conform(
         # an adapter may name its engine; names are labels of the board
         facts = replace(facts, engine=_unique(facts.engine or name, [engine.engine for engine in engines]))
         engines.append(_judge(facts, trials, judged, answers, again, requested))
-    labels = [(trial.id, name) for trial in judged for name in checks_of(trial, trials)]
+    labels = [(trial.id, name) for trial in judged for name in checks.checks_of(trial, trials)]
     board = Board(board_dataset(suite, labels, engines))
     if path is not None and path.suffix.lower() in PAGE_SUFFIXES:
         report(board.dataset, output=path, overwrite=overwrite)
@@ -118,7 +105,7 @@ def conform(
 def _check_tolerances(tol: float | Mapping[str, float] | None) -> dict[str, float]:
     """Return tolerances by check, "all" for the others."""
     requested = dict(tol) if isinstance(tol, Mapping) else {} if tol is None else {"all": tol}
-    known = ["all", *(name for name in CHECKS if name not in EXACT)]
+    known = ["all", *(name for name in CHECKS if name not in checks.EXACT)]
     for name, value in requested.items():
         if name not in known:
             raise UsageError(
@@ -141,11 +128,9 @@ def _selected(trials: Mapping[str, Trial], only: Sequence[str]) -> list[Trial]:
 
 def _adapter_name(word: object) -> str:
     """Name an adapter by what it was called, without folders."""
-    return (
-        re.sub(r"[^\s'\"]*/", "", word)
-        if isinstance(word, str)
-        else str(getattr(word, "__name__", type(word).__name__))
-    )
+    if isinstance(word, str):
+        return re.sub(r"[^\s'\"]*/", "", word)
+    return str(getattr(word, "__name__", type(word).__name__))
 
 
 def _unique(name: str, others: Sequence[str]) -> str:
@@ -156,7 +141,7 @@ def _unique(name: str, others: Sequence[str]) -> str:
 
 def _ask_all(
     ask: Ask, trials: Mapping[str, Trial], judged: Sequence[Trial]
-) -> tuple[Facts, dict[str, Answer | None], dict[str, Answer | None]]:
+) -> tuple[Facts, dict[str, checks.Answer | None], dict[str, checks.Answer | None]]:
     """Ask for all collisions in their order, then in reverse; an answer is None where it is not supported."""
     needed: dict[str, Trial] = {}
     for trial in judged:
@@ -178,49 +163,53 @@ def _judge(
     facts: Facts,
     trials: Mapping[str, Trial],
     judged: Sequence[Trial],
-    answers: Mapping[str, Answer | None],
-    again: Mapping[str, Answer | None],
+    answers: Mapping[str, checks.Answer | None],
+    again: Mapping[str, checks.Answer | None],
     tol: Mapping[str, float],
 ) -> EngineChecks:
     """Judge the answers of one engine; a check that needs an answer which is not supported is not supported."""
-    tolerance = tolerances(facts.kind, float32=facts.is_float32, tol=tol)
-    with_friction = [trial.question for trial in judged if "friction" in checks_of(trial, trials)]
+    tolerance = checks.tolerances(facts.kind, float32=facts.is_float32, tol=tol)
+    with_friction = [trial.question for trial in judged if "friction" in checks.checks_of(trial, trials)]
     betas: Mapping[str, float] = {}
     if facts.law and with_friction:
         betas = betas_of_law(with_friction, facts.law, facts.model, facts.parameters)
     rebounds = {
-        name: None if answer is None else Rebound(trials[name].question, answer)
+        name: None if answer is None else checks.Rebound(trials[name].question, answer)
         for name, answer in answers.items()
     }
 
-    def deliver(trial: Trial, name: str) -> Delivered | None:
+    def deliver(trial: Trial, name: str) -> checks.Delivered | None:
         rebound, base = rebounds[trial.id], rebounds.get(trial.of)
         if rebound is None:
             return None
         if name == "repeat":
             other = again[trial.id]
-            return Delivered(0.0, float(len(rebound.answer))) if other is None else repeat(rebound, other)
+            return (
+                checks.Delivered(0.0, float(len(rebound.answer)))
+                if other is None
+                else checks.repeat(rebound, other)
+            )
         if name == "friction":
-            return friction(rebound, betas.get(trial.id))
-        if name in OF_AN_ANSWER:
-            return OF_AN_ANSWER[name](rebound)
+            return checks.friction(rebound, betas.get(trial.id))
+        if name in checks.OF_AN_ANSWER:
+            return checks.OF_AN_ANSWER[name](rebound)
         if base is None:
             return None
         if name != "step":
-            return related(rebound, trial, base)
+            return checks.related(rebound, trial, base)
         coarse = rebounds[trials[trial.of].of]
-        return None if coarse is None else step(coarse, base, rebound)
+        return None if coarse is None else checks.step(coarse, base, rebound)
 
     rows = []
     for trial in judged:
-        for name in checks_of(trial, trials):
+        for name in checks.checks_of(trial, trials):
             delivered = deliver(trial, name)
             if delivered is None:
                 # what is asked for is independent of the answer, but for friction
-                silent = Rebound(trial.question, dict.fromkeys(ANSWER_KEYS, float("nan")))
-                asked = OF_AN_ANSWER[name](silent).asked if name in OF_AN_ANSWER else float("nan")
+                silent = checks.Rebound(trial.question, dict.fromkeys(ANSWER_KEYS, float("nan")))
+                asked = checks.OF_AN_ANSWER[name](silent).asked if name in checks.OF_AN_ANSWER else float("nan")
                 rows.append((asked, float("nan"), tolerance[name], CHECK_STATUSES["not_supported"]))
             else:
-                word = "pass" if passes(name, delivered, tolerance[name]) else "fail"
+                word = "pass" if checks.passes(name, delivered, tolerance[name]) else "fail"
                 rows.append((*delivered, tolerance[name], CHECK_STATUSES[word]))
     return EngineChecks(facts.engine, facts.version, facts.kind, *zip(*rows, strict=True))

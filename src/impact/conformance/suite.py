@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 from ..config.files import parse_document
 from ..errors import UsageError, did_you_mean
@@ -26,7 +26,8 @@ QUESTION_KEYS = (
     *("e", "mu", "contact_time", "dt"),
 )
 ANSWER_KEYS = ("v1", "v2", "u1", "u2", "omega1", "omega2")
-RELATIONS: tuple[Relation, ...] = ("frame", "mirror", "exchange", "scale", "step")
+OTHER_BALL = str.maketrans("12", "21")
+RELATIONS: tuple[Relation, ...] = get_args(Relation)[1:]
 
 
 @dataclass(frozen=True)
@@ -121,7 +122,7 @@ def transform(relation: Relation, change: Any, values: Mapping[str, Any]) -> dic
             # the sum has no negative zero
             result |= {key: 0.0 - value for key, value in values.items() if key[:-1] in ("u", "omega")}
         case "exchange":
-            pairs = {key: values[_other_ball(key)] for key in values if key[-1] in "12"}
+            pairs = {key: values[key.translate(OTHER_BALL)] for key in values if key[-1] in "12"}
             result |= {key: 0.0 - value if key[:-1] in ("v", "u") else value for key, value in pairs.items()}
         case "scale":
             powers = {"m": 3, "R": 1, "inertia": 5, "omega": -1}
@@ -133,7 +134,3 @@ def transform(relation: Relation, change: Any, values: Mapping[str, Any]) -> dic
         case "step":
             result |= {key: value * change for key, value in values.items() if key == "dt"}
     return result
-
-
-def _other_ball(key: str) -> str:
-    return key[:-1] + {"1": "2", "2": "1"}[key[-1]]

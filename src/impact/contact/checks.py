@@ -106,7 +106,6 @@ class ContractResult(list[ClauseResult], Displayed):
         return {"model": self.model.key, "holds": self.holds, "clauses": self.records()}
 
     def records(self) -> Sequence[Mapping[str, Any]]:
-        """List the clauses."""
         return [
             {"clause": result.clause, "holds": result.holds, "worst": result.worst, "bound": result.bound}
             for result in self

@@ -17,19 +17,10 @@ from numpy.typing import NDArray
 
 from ..array_types import Array
 from ..errors import ModelError
+from . import fixed_step_slip
 from .closed_forms.dashpot import gap_damping
 from .dimensionless import LawValues, required_quantities, with_coefficients, with_units
 from .evidence import Evidence
-from .fixed_step_slip import (
-    COUPLING,
-    LIMIT_POSITIVE,
-    PREFIX,
-    RADIUS,
-    SLIP,
-    SLIP_SCALE,
-    TANGENTIAL_DAMPING,
-    TANGENTIAL_STIFFNESS,
-)
 from .force_expressions import spring
 from .formula_calls import Formula, argument_names, call_by_name
 from .impacts import Impacts
@@ -188,23 +179,23 @@ def friction_values(pair: Pair, oblique: ObliqueImpacts) -> dict[str, Array]:
         The kind "coulomb" has no `SLIP`: one trajectory of it is that of every slip
     """
     law, impacts, mu = pair.friction, oblique.impacts, oblique.mu
-    values = {} if law.kind == "cone" else {LIMIT_POSITIVE: _value(law, oblique, "limit")}
+    values = {} if law.kind == "cone" else {fixed_step_slip.LIMIT_POSITIVE: _value(law, oblique, "limit")}
     if law.kind == "coulomb":
         return values
     values |= _spring_values(pair, oblique)
     with np.errstate(all="ignore"):
-        values[SLIP] = np.abs(oblique.G0)
+        values[fixed_step_slip.SLIP] = np.abs(oblique.G0)
         if law.kind == "cone":
-            values[COUPLING] = np.square(mu) * _cone_compliance(law, oblique)
+            values[fixed_step_slip.COUPLING] = np.square(mu) * _cone_compliance(law, oblique)
         if law.stiffness == "classic":
-            values[RADIUS] = np.sqrt(impacts.R_eff * impacts.length)
+            values[fixed_step_slip.RADIUS] = np.sqrt(impacts.R_eff * impacts.length)
         if law.kind == "regularized":
             dynamic = _parameter(law, oblique, "mu_d")
             speed = _value(law, oblique, next(p.name for p in law.parameters if p.unit == "m/s"))
-            values[SLIP_SCALE] = mu / oblique.mass_ratio * (impacts.v0 / speed)
-            values[f"{PREFIX}ratio"] = _ones(impacts) if dynamic is None else dynamic / mu
+            values[fixed_step_slip.SLIP_SCALE] = mu / oblique.mass_ratio * (impacts.v0 / speed)
+            values[f"{fixed_step_slip.PREFIX}ratio"] = _ones(impacts) if dynamic is None else dynamic / mu
             if "viscous" in argument_names(law.coefficient):
-                values[f"{PREFIX}viscous"] = _value(law, oblique, "mu_v") * speed / mu
+                values[f"{fixed_step_slip.PREFIX}viscous"] = _value(law, oblique, "mu_v") * speed / mu
     return values
 
 
@@ -306,9 +297,9 @@ def _spring_values(pair: Pair, oblique: ObliqueImpacts) -> dict[str, Array]:
     law, values = pair.friction, {}
     with np.errstate(all="ignore"):
         if law.stiffness and law.kind == "spring":
-            values[TANGENTIAL_STIFFNESS] = _stiffness(pair, oblique) / oblique.mass_ratio
+            values[fixed_step_slip.TANGENTIAL_STIFFNESS] = _stiffness(pair, oblique) / oblique.mass_ratio
         if law.damping:
-            values[TANGENTIAL_DAMPING] = _damping(pair, oblique) / oblique.mass_ratio
+            values[fixed_step_slip.TANGENTIAL_DAMPING] = _damping(pair, oblique) / oblique.mass_ratio
     return values
 
 

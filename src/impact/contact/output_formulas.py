@@ -228,17 +228,6 @@ def _friction_status(
     return _replace_where(own, not_integrated, status)
 
 
-def _slip_after(
-    oblique: ObliqueImpacts,
-    tangential: TangentialResult,
-    kind: str,
-    friction_status: NDArray[np.int8],
-    missed: Mask | None,
-) -> Array:
-    """G1/G0: 1 where nothing changes the slip, NaN where it is not known or G0 is 0."""
-    return _slip_share(oblique, tangential.slip, tangential.sliding_impulse, kind, friction_status, missed)
-
-
 def _slip_share(
     oblique: ObliqueImpacts,
     slip: Array,
@@ -247,6 +236,7 @@ def _slip_share(
     friction_status: NDArray[np.int8],
     missed: Mask | None,
 ) -> Array:
+    """G1/G0: 1 where nothing changes the slip, NaN where it is not known or G0 is 0."""
     size = np.abs(oblique.G0)
     after = np.maximum(size - sliding_impulse, 0.0) if kind == "coulomb" else slip
     share = _replace_where(after / size, _mask_if_any(oblique.mu == 0.0), 1.0)
@@ -368,7 +358,9 @@ FORMULAS: dict[str, Callable[..., Any]] = {
     "separation_time": _separation_time,
     # of friction
     "friction_status": _friction_status,
-    "slip_share": _slip_after,
+    "slip_share": lambda oblique, tangential, kind, friction_status, missed: _slip_share(
+        oblique, tangential.slip, tangential.sliding_impulse, kind, friction_status, missed
+    ),
     "impulse": _impulse,
     "regime": _regime,
     # impacts with a slip, friction and a complete tangential motion

@@ -32,7 +32,6 @@ class Record:
 
     @classmethod
     def columns(cls) -> tuple[str, ...]:
-        """List the names of the arrays."""
         return tuple(field.name for field in fields(cls))
 
     @classmethod
@@ -50,7 +49,6 @@ class Record:
         return sum(array.nbytes for array in vars(cls.blank(1)).values())
 
     def put(self, rows: Positions | NDArray[np.bool_], part: Self) -> None:
-        """Write the arrays of a part to its positions."""
         for name in self.columns():
             getattr(self, name)[rows] = getattr(part, name)
 

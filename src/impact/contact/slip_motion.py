@@ -238,12 +238,8 @@ class Track:
         self.damping_work[index] += np.where(begins, rest + after, 0.0) - np.where(ends, rest + before, 0.0)
         self.mode[index] = new
         self.changes[index] += old != new
-        self.see(index, new)
-
-    def see(self, index: NDArray[np.intp], mode: Array) -> None:
-        """Note modes."""
-        self.modes[index] |= np.where(mode == 0.0, 1, np.where(mode > 0.0, 2, 4)).astype(np.int8)
-        self.modes[index] |= np.where(np.abs(mode) == 2.0, 1, 0).astype(np.int8)
+        self.modes[index] |= np.where(new == 0.0, 1, np.where(new > 0.0, 2, 4)).astype(np.int8)
+        self.modes[index] |= np.where(is_held, 1, 0).astype(np.int8)
 
 
 class Local(NamedTuple):
@@ -303,11 +299,9 @@ class SlipPhase:
 
     @property
     def has_spring(self) -> bool:
-        """Whether there is a tangential spring."""
         return self.form.kind == "spring"
 
     def columns(self, params: Params) -> Columns:
-        """Find the columns among the params."""
         return Columns(*params[self.first : self.first + len(Columns._fields)])
 
     def problem(self) -> Problem:
@@ -615,16 +609,6 @@ class SlipPhase:
         ahead, behind = (self._held_slip(y + sign * step, params, direction)[0] for sign in (1.0, -1.0))
         return np.asarray((behind - ahead) / (2.0 * small * k[TIME_ROW]))
 
-    def friction_at(self, y: Array, params: Params) -> tuple[Array, Array, Array]:
-        """Compute Gamma, the friction force phi and its part phi_e in the spring, over G0, from rows of a step."""
-        near = np.array([_away_from_zero(y[0]), *y[1:N_COMPONENTS]])
-        near = self._released(near, params)
-        k = self.rates(near, params)
-        mode, force = self.columns(params).mode, -k[SLIP_ROW] / k[TIME_ROW]
-        if (np.abs(mode) == 2.0).any():
-            force = np.where(np.abs(mode) == 2.0, self._held_force(near, params, np.sign(mode)), force)
-        return near[SLIP_ROW], force, self.local(near, k, params).spring_force
-
     def _held_margin(self, y: Array, params: Params, direction: Array | None = None) -> tuple[Array, Mask]:
         """Compute a margin, positive while the force is between slip and stick, and where it is nearer to slip."""
         columns, y = self.columns(params), y[:N_COMPONENTS]
@@ -782,7 +766,6 @@ class SlipPhase:
 
 
 def _taken(params: Params, rows: NDArray[np.intp]) -> Params:
-    """Take the params of some trajectories."""
     return tuple(column[rows] for column in params)
 
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ..array_types import Array, Mask
 from ..ode.problem import Params, Problem, Solution, Step
 from ..ode.rk45 import integrate
-from . import motion
+from . import motion, simulate
 from .dimensionless import exact_restitution, with_coefficients, with_units
 from .fixed_step import EXACT
 from .fixed_step_slip import (
@@ -33,20 +33,6 @@ from .formula_calls import argument_names
 from .model import ForceModel
 from .piecewise import in_parts
 from .records import Record
-from .simulate import (
-    ComputeCollisions,
-    DistinctProblems,
-    Recovery,
-    SimulatePart,
-    ValueArrays,
-    check_coefficients,
-    collide_at_fixed_steps,
-    distinct_problems,
-    integrate_collisions,
-    simulate_fixed_steps,
-    simulate_parts,
-    solve_phases,
-)
 from .slip_motion import (
     ORDER_TOLERANCE,
     SLIP_ROW,
@@ -110,7 +96,7 @@ class PairOfLaws(Protocol):
 def simulate_friction(
     pair: PairOfLaws,
     n: Array,
-    values: ValueArrays,
+    values: simulate.ValueArrays,
     status: NDArray[np.int8],
     *,
     rtol: float,
@@ -136,18 +122,18 @@ def simulate_friction(
     ------
     ModelError : of the errors of a law, only what is raised outside its formulas
     """
-    simulate_part: SimulatePart[TangentialResult] = partial(
+    simulate_part: simulate.SimulatePart[TangentialResult] = partial(
         _simulate_distinct, pair, rtol=rtol, max_steps=max_steps
     )
     if integrator != EXACT:
-        compute = partial(integrate_collisions, rtol=rtol, max_steps=max_steps, core=core)
+        compute = partial(simulate.integrate_collisions, rtol=rtol, max_steps=max_steps, core=core)
         collide_part = partial(_slip_at_fixed_steps, pair, scheme=integrator, compute=compute, max_steps=max_steps)
-        simulate_part = partial(simulate_fixed_steps, collide_part=collide_part)
-    return simulate_parts(TangentialResult, pair.key, n, values, status, simulate_part, collapse, errors)
+        simulate_part = partial(simulate.simulate_fixed_steps, collide_part=collide_part)
+    return simulate.simulate_parts(TangentialResult, pair.key, n, values, status, simulate_part, collapse, errors)
 
 
 def record_friction(
-    pair: PairOfLaws, n: float, values: ValueArrays, *, rtol: float, max_steps: int
+    pair: PairOfLaws, n: float, values: simulate.ValueArrays, *, rtol: float, max_steps: int
 ) -> list[RecordedSlip]:
     """Integrate the slip of one impact, a batch of length one, and record it; empty for Coulomb's friction."""
     recorded: list[RecordedSlip] = []
@@ -161,7 +147,7 @@ def record_friction(
 def _simulate_distinct(
     pair: PairOfLaws,
     n: float,
-    values: ValueArrays,
+    values: simulate.ValueArrays,
     count: int,
     *,
     rtol: float,
@@ -173,7 +159,7 @@ def _simulate_distinct(
     form = pair.form(n)
     model = _smooth_model(pair.model, form)
     law_values = with_coefficients(model, with_units(values, n), count)
-    status = check_coefficients(model, law_values, values, count)
+    status = simulate.check_coefficients(model, law_values, values, count)
     given = _tangential_columns(form, values, count)
     status[(status == STATUS_OK) & given.is_invalid] = Status.OUT_OF_RANGE
     names = _coefficient_arguments(form)
@@ -184,7 +170,7 @@ def _simulate_distinct(
     chosen = (status == STATUS_OK) & ~given.is_trivial
     parts = [
         (problems.rows, _integrate(form, problems, rtol, max_steps, recorded).take(problems.row_of_impact))
-        for problems in distinct_problems(model, n, law_values, chosen, collapse, columns)
+        for problems in simulate.distinct_problems(model, n, law_values, chosen, collapse, columns)
     ]
     result = TangentialResult.joined(count, status, parts)
     if form.kind == "coulomb":
@@ -213,7 +199,7 @@ class TangentialColumns(NamedTuple):
         return ~self.is_trivial & ~(np.isfinite(self.stiffness) & np.isfinite(self.damping))
 
 
-def _tangential_columns(form: TangentialForm, values: ValueArrays, count: int) -> TangentialColumns:
+def _tangential_columns(form: TangentialForm, values: simulate.ValueArrays, count: int) -> TangentialColumns:
     """Find the values of tangential problems among those of impacts; zero where the form has none."""
     zero = np.zeros(count)
     return TangentialColumns(
@@ -227,18 +213,18 @@ def _tangential_columns(form: TangentialForm, values: ValueArrays, count: int) -
 def _slip_at_fixed_steps(
     pair: PairOfLaws,
     n: float,
-    values: ValueArrays,
+    values: simulate.ValueArrays,
     count: int,
     *,
     scheme: str,
-    compute: ComputeCollisions,
+    compute: simulate.ComputeCollisions,
     max_steps: int,
     collapse: bool,
 ) -> TangentialResult:
     """Integrate slips at a fixed step; those without slip or friction as contacts without slip."""
     form, given = pair.form(n), _tangential_columns(pair.form(n), values, count)
     slip = FixedStepSlip.of(form, values, count)
-    collisions = collide_at_fixed_steps(
+    collisions = simulate.collide_at_fixed_steps(
         pair.model,
         n,
         values,
@@ -285,7 +271,7 @@ def _coefficient_arguments(form: TangentialForm) -> tuple[str, ...]:
 
 def _integrate(
     form: TangentialForm,
-    problems: DistinctProblems,
+    problems: simulate.DistinctProblems,
     rtol: float,
     max_steps: int,
     recorded: list[RecordedSlip] | None,
@@ -302,7 +288,7 @@ def _integrate(
     states: list[Array] = []
 
     def solve(
-        law: motion.MotionLaw, problem: Problem, start: Array, params: Params, recovery: Recovery | None
+        law: motion.MotionLaw, problem: Problem, start: Array, params: Params, recovery: simulate.Recovery | None
     ) -> Solution:
         if recovery is None:
             columns, rows = (*base, *coefficient), np.vstack([start, np.ones(n), np.zeros(n)])
@@ -326,7 +312,7 @@ def _integrate(
             recorded.append(RecordedSlip(phase, solution.recorded))
         return solution
 
-    phases = solve_phases(law, problems.params, n, solve)
+    phases = simulate.solve_phases(law, problems.params, n, solve)
     state, steps = states[0].copy(), phases.approach.steps.copy()
     if phases.restitution is not None:
         state[:, phases.rows] = states[1]
@@ -339,8 +325,6 @@ def _integrate(
     stopped = status == LIMIT
     press = np.sign(base.changed(track.mode, track.sign).share)
     result.sliding_impulse[stopped] = (track.impulse + press * track.v)[stopped]
-    if form.kind == "coulomb":
-        status[stopped] = LIMIT
     status[(status == STATUS_OK) & track.is_slow] = FrictionStatus.SLOW_LIMIT
     if form.kind != "coulomb":
         # whatever the reason, an answer is a number

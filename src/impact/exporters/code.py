@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from ..contact.model import ForceModel
 from ..errors import UsageError
 from ..formatting import argument, number
+from .programs import Program
 
 Parameters = Mapping[str, float | str]
 # moment of inertia of a ball over m R^2, in scripts
 SOLID = 0.4
+# largest difference of e between a code and the map of its scheme
+ROUNDING = 1e-9
 # of scripts in Python, before e_out: prints from u1, u2, omega1 and omega2
 PRINT_BETA = """\
 print("beta =", -(u1 + {R1} * omega1 - u2 + {rim2} * omega2) / {slip})
@@ -135,13 +138,11 @@ class Code:
     tested : what was run, or what was read instead
     parameters : in the units and conventions of the code, by the code's own names
     scheme : see `impact.contact.fixed_step.SCHEMES`; None if its restitution at a time step is not predicted
-    uncertainty : largest difference of e between the code and the map of its scheme
-    rough : the same by law, where the code itself finds the damping only roughly
+    uncertainty : largest difference of e between the code and the map of its scheme, by law; ROUNDING for others
     law_for_version : the entry of the catalogue that holds in a version, from the key of another one and the
         version; raises a UsageError where the version has none
     read_version : converts a version as the user or the program writes it to the form in which versions are
         compared; raises a UsageError for any other text, see `impact.exporters.releases.read_release`
-    version_of : the version that a program reports, as it writes it; None if the program or the code is missing
     comment : what begins and ends a comment among the lines
     notes : remarks on a law: mixing of two materials, thresholds, clamps, versions
     warnings : what a user has to know before using the lines
@@ -154,8 +155,7 @@ class Code:
         `beta = VALUE` and the spins before `e_out`
     wall_inputs : the inputs that a wall acts with where they differ from those of a plane of infinite mass, by
         config name, from the key of the law, the version and the values of `Collision`
-    suffix, program, install : of the file of a script; what runs it, "" without one; how to get that
-    command : the command that runs a script, from the program and the file
+    suffix, program : of the file of a script, and what runs it; None without one
     """
 
     name: str
@@ -166,11 +166,9 @@ class Code:
     parameters: Callable[[Collision], dict[str, float | str]]
     lines: Callable[[Collision, Parameters], list[str]]
     scheme: str | None = None
-    uncertainty: float = 1e-9
-    rough: Mapping[str, float] = field(default_factory=dict)
+    uncertainty: Mapping[str, float] = field(default_factory=dict)
     law_for_version: Callable[[str, str], str] = lambda key, version: key
     read_version: Callable[[str], str] = lambda text: text
-    version_of: Callable[[str], str | None] = lambda program: None
     comment: tuple[str, str] = ("# ", "")
     notes: Callable[[Collision], list[str]] = lambda collision: []
     warnings: Callable[[Collision], list[str]] = lambda collision: []
@@ -182,9 +180,7 @@ class Code:
     oblique: Mapping[str, str] = field(default_factory=dict)
     wall_inputs: Callable[[str, str, Mapping[str, float]], Mapping[str, float]] = lambda key, version, values: {}
     suffix: str = ".py"
-    program: str = ""
-    install: str = ""
-    command: Callable[[str, str], Sequence[str]] = lambda program, file: (program, file)
+    program: Program | None = None
 
     def script(self, collision: Collision, parameters: Parameters) -> str:
         """Fill the template with the lines, the parameters, `Collision.script_values`, and material2.
@@ -203,11 +199,3 @@ class Code:
         material2 = "material2" if any(line.startswith("material2 = ") for line in lines) else "material1"
         values = {**parameters, **collision.script_values(), "lines": "\n".join(lines), "material2": material2}
         return template.format(**values)
-
-    def frictions_of(self, key: str) -> list[str]:
-        """List the friction laws that the code has with a law."""
-        return [friction for friction in self.frictions if self.has_friction(key, friction)]
-
-    def uncertainty_of(self, key: str) -> float:
-        """Return the tolerance on e of a law."""
-        return self.rough.get(key, self.uncertainty)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from .code import PRINT_BETA, Code, Collision, Parameters
-from .programs import python_package_version
+from .programs import python_package
 
 # slip over the closing speed below which TAMSI takes less friction than mu N
 STICTION = 1e-5
@@ -166,7 +166,5 @@ CODE = Code(
     frictions={"coulomb-1785": "CoulombFriction, TAMSI"},
     shortens_arms=True,
     oblique=OBLIQUE,
-    program="python",
-    install="pip install drake",
-    version_of=python_package_version("drake"),
+    program=python_package("drake"),
 )

@@ -12,7 +12,7 @@ from typing import Any
 from .._version import __version__
 from ..contact.numba.dispatch import is_installed
 from ..display import Block, Displayed, Table
-from .programs import find_program
+from .programs import package_version
 from .registry import CODES
 from .releases import installed_version
 
@@ -41,11 +41,9 @@ class Environment(Displayed):
     codes: list[dict[str, str | None]]
 
     def as_dict(self) -> dict[str, Any]:
-        """The JSON object of the command."""
         return asdict(self)
 
     def sections(self, width: int) -> Iterator[Block]:
-        """The program, the packages and the codes."""
         yield Table([("impact", self.impact), ("Python", self.python), ("system", self.platform)])
         yield ""
         rows = [(name, version or "not installed") for name, version in self.packages.items()]
@@ -73,28 +71,16 @@ def doctor() -> Environment:
     True
     """
     required = map(PACKAGE.match, metadata.requires(DISTRIBUTION) or ())
-    packages = {name[1]: _version(name[1]) for name in required if name}
+    packages = {name[1]: package_version(name[1]) for name in required if name}
     codes = []
     for code in CODES.values():
         if code.program:
             version = installed_version(code)
-            program = find_program(code.program, None) if version else None
+            program = code.program.find() if version else None
             codes.append({"code": code.name, "version": version, "program": program})
-    core = {"numba": _version("numba") if is_installed() else None, "cache": _core_cache()}
+    core: dict[str, str | None] = {"numba": None, "cache": None}
+    if is_installed():
+        from ..contact.numba.compile_cache import cache_folder
+
+        core = {"numba": package_version("numba"), "cache": cache_folder()}
     return Environment(__version__, platform.python_version(), platform.platform(), packages, core, codes)
-
-
-def _version(package: str) -> str | None:
-    try:
-        return metadata.version(package)
-    except metadata.PackageNotFoundError:
-        return None
-
-
-def _core_cache() -> str | None:
-    """Find the folder of the machine code of the compiled core."""
-    if not is_installed():
-        return None
-    from ..contact.numba.compile_cache import cache_folder
-
-    return cache_folder()

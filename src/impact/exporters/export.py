@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, SupportsFloat
@@ -18,17 +18,7 @@ from ..display import Block, Displayed
 from ..engine.plugins import Plugins
 from ..errors import UsageError
 from ..formatting import argument, decimals, number, quantity, safe_text
-from ..inverse.timestep import (
-    NeededParameter,
-    NeededSteps,
-    TimestepRow,
-    missing_parameter,
-    needed_parameter,
-    needed_steps,
-    time_parameter,
-    time_steps,
-    timestep_rows,
-)
+from ..inverse import timestep
 from ..results.single_impact import ConfigSource
 from .code import Collision, Parameters
 from .problem import ExportProblem, prepare_export
@@ -78,8 +68,8 @@ class Export(Displayed):
     e: float
     e_continuous: float
     contact_time: float
-    at_dt: TimestepRow
-    needed: NeededParameter | None
+    at_dt: timestep.TimestepRow
+    needed: timestep.NeededParameter | None
     parameters: Parameters
     header: tuple[str, ...]
     lines: tuple[str, ...]
@@ -218,33 +208,26 @@ def export(
         raise UsageError(f"{argument('script')}: there is none for {code.title}: {code.tested}")
     contact_time = problem.law.contact_time
     given = [] if dt is None else [read_number(dt, SWEEP_QUANTITIES["dt"], argument("dt"))]
-    (dt,) = time_steps(contact_time, [] if given else [STEPS_PER_CONTACT], given)
+    (dt,) = timestep.time_steps(contact_time, [] if given else [STEPS_PER_CONTACT], given)
     collision = problem.collision(dt, 0.5)
     parameters = code.parameters(collision)
     at_dt = _row(problem, dt)
     advised = None
     # with friction that changes e, no step delivers the e that is asked for
     if code.scheme is not None and problem.requested_e > 0.0 and not problem.law.is_coupled:
-        advised = needed_steps(problem.law, ADVISED_TOL, problem.e_continuous)
-    needed = None
+        advised = timestep.needed_steps(problem.law, ADVISED_TOL, problem.e_continuous)
+    if parameter and code.scheme is None:
+        raise UsageError(f"{argument('parameter')}: what {code.title} delivers at a time step is not predicted")
+    needed, name = None, parameter
     if parameter is None and given and advised is not None and advised.dt < dt:
-        name = time_parameter(problem.point.config, problem.model)
-        # nobody asked for it: a law whose time scale has no such parameter is exported without
-        with suppress(UsageError):
-            needed = (
-                needed_parameter(problem.point, Plugins(), name, dt, ADVISED_TOL, problem.law, problem.outputs)
-                if name
-                else None
+        name = timestep.time_parameter(problem.point.config, problem.model)
+    # where nobody asked for it, a law whose time scale has no such parameter is exported without
+    with nullcontext() if parameter else suppress(UsageError):
+        if name:
+            needed = timestep.needed_parameter(
+                problem.point, Plugins(), name, dt, ADVISED_TOL, problem.law, problem.outputs
             )
-    if parameter:
-        if code.scheme is None:
-            raise UsageError(
-                f"{argument('parameter')}: what {code.title} delivers at a time step is not predicted"
-            )
-        needed = needed_parameter(
-            problem.point, Plugins(), parameter, dt, ADVISED_TOL, problem.law, problem.outputs
-        )
-    needed_text = str(needed or (missing_parameter(parameter, ADVISED_TOL) if parameter else ""))
+    needed_text = str(needed or (timestep.missing_parameter(parameter, ADVISED_TOL) if parameter else ""))
     header = _header(problem, collision, at_dt, advised, needed_text)
     lines = [*comment_lines(header), code.script(collision, parameters)] if script else []
     result = Export(
@@ -299,7 +282,7 @@ def export_codes() -> list[dict[str, Any]]:
     ]
 
 
-def _warnings(problem: ExportProblem, collision: Collision, row: TimestepRow) -> list[str]:
+def _warnings(problem: ExportProblem, collision: Collision, row: timestep.TimestepRow) -> list[str]:
     """List what a user has to know before using the lines."""
     warnings = list(problem.code.warnings(collision))
     if problem.better_fit:
@@ -321,20 +304,20 @@ def _better_fit(problem: ExportProblem) -> str:
     return f"the law that fits best, {problem.better_fit}, is none of {problem.code.title}"
 
 
-def _row(problem: ExportProblem, dt: float) -> TimestepRow:
+def _row(problem: ExportProblem, dt: float) -> timestep.TimestepRow:
     """Compute what the code delivers at a time step [s]; NaN without a scheme."""
     if problem.code.scheme is None:
         nan = math.nan
-        return TimestepRow(dt, problem.law.contact_time / dt, nan, nan, nan, nan)
-    (row,) = timestep_rows(problem.law, [dt])
+        return timestep.TimestepRow(dt, problem.law.contact_time / dt, nan, nan, nan, nan)
+    (row,) = timestep.timestep_rows(problem.law, [dt])
     return row
 
 
 def _header(
     problem: ExportProblem,
     collision: Collision,
-    row: TimestepRow,
-    advised: NeededSteps | None,
+    row: timestep.TimestepRow,
+    advised: timestep.NeededSteps | None,
     needed: str,
 ) -> list[str]:
     """Write what a comment above the lines says."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from .code import Code, Collision, Parameters
-from .programs import python_package_version
+from .programs import python_package
 
 # impactModel of each law; linear damping is added to the other two where it is not 0
 IMPACT_MODELS = {"exudyn-carvalho-gonthier": 2, "hunt-crossley-1975": 1, "kelvin-voigt": 0}
@@ -73,7 +73,5 @@ CODE = Code(
             "mbs.CreateSphereQuadContact(itemNumbers=balls, sphereRadius={R1}, quadPoints=corners"
         ),
     },
-    program="python",
-    install="pip install exudyn",
-    version_of=python_package_version("exudyn"),
+    program=python_package("exudyn"),
 )

@@ -5,22 +5,25 @@ from __future__ import annotations
 import json
 
 from .code import PRINT_BETA, Code, Collision, Parameters
-from .programs import python_package_version
+from .programs import python_package
 
 LAWS = {
     "kratos-hertz": "DEM_D_Hertz_viscous_Coulomb",
     "kratos-linear": "DEM_D_Linear_viscous_Coulomb",
 }
-BALL2 = """\
-Begin SubModelPart ball2
+BALL1, BALL2 = (
+    f"""\
+Begin SubModelPart ball{number}
 Begin SubModelPartNodes
-2
+{number}
 End SubModelPartNodes
 Begin SubModelPartElements
-2
+{number}
 End SubModelPartElements
 End SubModelPart
 """
+    for number in (1, 2)
+)
 # a triangle around the origin
 RIGID_WALL = '''\
 with open("ballsDEM_FEM_boundary.mdpa", "w") as mesh:
@@ -75,15 +78,8 @@ Begin NodalData RADIUS
 1 0 {R1}
 2 0 {R2}
 End NodalData
-Begin SubModelPart ball1
-Begin SubModelPartNodes
-1
-End SubModelPartNodes
-Begin SubModelPartElements
-1
-End SubModelPartElements
-End SubModelPart
 '''
+    + BALL1
     + BALL2
     + '''""")
 
@@ -234,7 +230,7 @@ CODE = Code(
     tested="scripts were run in Kratos DEM 10.4.4",
     scheme="kick-drift",
     # Kratos finds the damping ratio of this law by bisection to 1e-4
-    rough={"kratos-linear": 1e-4},
+    uncertainty={"kratos-linear": 1e-4},
     parameters=parameters,
     lines=lines,
     notes=notes,
@@ -267,7 +263,5 @@ CODE = Code(
             "v1, v2 = balls[0].GetSolutionStepValue(Kratos.VELOCITY_X), {v2}"
         ),
     },
-    program="python",
-    install="pip install KratosDEMApplication",
-    version_of=python_package_version("KratosDEMApplication"),
+    program=python_package("KratosDEMApplication"),
 )

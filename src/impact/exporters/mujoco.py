@@ -7,7 +7,7 @@ import math
 from ..errors import UsageError
 from ..formatting import argument
 from .code import PRINT_BETA, Code, Collision, Parameters
-from .programs import python_package_version
+from .programs import python_package
 
 # least and largest impedance are equal: with the default, 0.9 and 0.95, the restitution depends on the indentation
 SOLIMP = "{d!r} {d!r} 0.001 0.5 2"
@@ -160,7 +160,5 @@ CODE = Code(
     frictions={"mujoco-elliptic": "elliptic cone, solreffriction"},
     shortens_arms=True,
     oblique=OBLIQUE,
-    program="python",
-    install="pip install mujoco",
-    version_of=python_package_version("mujoco"),
+    program=python_package("mujoco"),
 )

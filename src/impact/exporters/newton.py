@@ -6,7 +6,7 @@ import math
 
 from ..formatting import number
 from .code import PRINT_BETA, Code, Collision, Parameters
-from .programs import python_package_version
+from .programs import python_package
 
 TWO_BALLS = """\
 import newton
@@ -100,7 +100,7 @@ CODE = Code(
     tested="scripts were run in Newton 1.8.0 on a CPU; warp.sim has the same force and was not run",
     scheme="kick-drift",
     # single precision: a ball is a hundred times as large as its indentation, or more
-    uncertainty=1e-3,
+    uncertainty={"newton-semi-implicit": 1e-3},
     parameters=parameters,
     lines=lines,
     notes=notes,
@@ -120,7 +120,5 @@ CODE = Code(
     frictions={"coulomb-1785": "kf and mu of ShapeConfig"},
     shortens_arms=True,
     oblique=OBLIQUE,
-    program="python",
-    install="pip install newton",
-    version_of=python_package_version("newton"),
+    program=python_package("newton"),
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from .code import Code, Collision, Parameters
-from .programs import python_package_version
+from .programs import python_package
 
 MATERIALS = {
     "opensees-hertzdamp": "Hertzdamp",
@@ -106,7 +106,5 @@ CODE = Code(
         "gap = -{gap}\n": "ops.fix(2, 1)\ngap = -{gap}\n",
         'ops.setNodeVel(2, 1, {v2}, "-commit")\n': "",
     },
-    program="python",
-    install="pip install openseespy",
-    version_of=python_package_version("openseespy"),
+    program=python_package("openseespy"),
 )

@@ -174,7 +174,7 @@ def _choose_friction(
     code: Code, source: PointSource, model: str, friction: str | None
 ) -> tuple[str | None, tuple[str, ...]]:
     """Choose the friction law that is asked for, or the first of the source that a code has; else list those."""
-    known = code.frictions_of(model)
+    known = [law for law in code.frictions if code.has_friction(model, law)]
     if friction is not None and friction not in known:
         beside = f" with {model}" if friction in code.frictions else ""
         reason = "" if code.frictions else ": none of it was run"

@@ -12,6 +12,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 from typing import IO
@@ -25,7 +26,29 @@ MAX_OUTPUT_BYTES, KEPT_OUTPUT_BYTES = 2**26, 2**20
 POLL_INTERVAL_S = 0.05
 
 
-def find_program(name: str, requested: str | None) -> str | None:
+@dataclass(frozen=True)
+class Program:
+    """What runs the scripts of a code.
+
+    Parameters
+    ----------
+    name : of its file; "python" for an interpreter that has a package
+    install : how to get it
+    version_of : the version that a program reports, as it writes it; None if the program or the package is missing
+    command : the command that runs a script, from the program and the file
+    """
+
+    name: str
+    install: str
+    version_of: Callable[[str], str | None]
+    command: Callable[[str, str], Sequence[str]] = lambda program, file: (program, file)
+
+    def find(self, requested: str | None = None) -> str | None:
+        """Find the requested program, or the one that is installed."""
+        return find_program(self.name, requested)
+
+
+def find_program(name: str, requested: str | None = None) -> str | None:
     """Find a program: the requested one, this interpreter for "python", else the one next to it or on the path."""
     if requested is not None:
         path = shutil.which(requested)
@@ -56,21 +79,26 @@ def printed_version(option: str, pattern: str) -> Callable[[str], str | None]:
     return version_of
 
 
-def python_package_version(package: str) -> Callable[[str], str | None]:
-    """Make a function that asks a Python interpreter for the version of a package."""
+def package_version(package: str) -> str | None:
+    """Find the version of a package that this interpreter has; None if it is not installed."""
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return None
+
+
+def python_package(package: str) -> Program:
+    """Describe a Python interpreter that has a package."""
 
     def version_of(program: str) -> str | None:
         if program == sys.executable:
-            try:
-                return metadata.version(package)
-            except metadata.PackageNotFoundError:
-                return None
+            return package_version(package)
         words = f"from importlib.metadata import version; print(version({package!r}))"
         printed = output_of([program, "-c", words]).strip()
         # a program that is no Python prints something else; what follows the digit is checked as a release
         return printed if printed[:1].isdigit() else None
 
-    return version_of
+    return Program("python", f"pip install {package}", version_of)
 
 
 def run_program(command: Sequence[str], folder: str, timeout_s: float) -> subprocess.CompletedProcess[str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from .code import PRINT_BETA, Code, Collision, Parameters
-from .programs import python_package_version
+from .programs import python_package
 
 TWO_BALLS = """\
 import pybullet as bullet
@@ -105,7 +105,5 @@ CODE = Code(
     },
     frictions={"coulomb-1785": "lateralFriction"},
     oblique=OBLIQUE,
-    program="python",
-    install="pip install pybullet",
-    version_of=python_package_version("pybullet"),
+    program=python_package("pybullet"),
 )

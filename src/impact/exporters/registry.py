@@ -2,56 +2,23 @@
 
 from __future__ import annotations
 
+from importlib import import_module
+
 from ..errors import UsageError, did_you_mean
 from ..formatting import argument
-from . import (
-    adams,
-    chrono,
-    drake,
-    exudyn,
-    kratos,
-    lammps,
-    liggghts,
-    mercurydpm,
-    modelica,
-    mujoco,
-    newton,
-    opensees,
-    physx,
-    pybullet,
-    simbody,
-    simscape,
-    yade,
-)
 from .code import Code
 
-CODES: dict[str, Code] = {
-    code.name: code
-    for code in (
-        lammps.CODE,
-        liggghts.CODE,
-        yade.CODE,
-        mujoco.CODE,
-        drake.CODE,
-        kratos.CODE,
-        opensees.CODE,
-        simbody.CODE,
-        pybullet.CODE,
-        exudyn.CODE,
-        newton.CODE,
-        # text only
-        chrono.CODE,
-        mercurydpm.CODE,
-        modelica.CODE,
-        adams.CODE,
-        simscape.CODE,
-        physx.CODE,
-    )
-}
+# the modules of the codes, in their order
+MODULES = (
+    # scripts were run
+    "lammps liggghts yade mujoco drake kratos opensees simbody pybullet exudyn newton "
+    # text only
+    "chrono mercurydpm modelica adams simscape physx"
+)
+CODES: dict[str, Code] = {name: import_module(f".{name}", __package__).CODE for name in MODULES.split()}
 
 
 def find_code(name: str) -> Code:
-    """Find a code by its name."""
     if name not in CODES:
         raise UsageError(f'{argument("to")}: no code "{name}"; {did_you_mean(name, list(CODES))}')
     return CODES[name]

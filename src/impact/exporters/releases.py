@@ -10,7 +10,6 @@ from ..contact.models import original_key
 from ..errors import UsageError, did_you_mean
 from ..formatting import argument
 from .code import Code
-from .programs import find_program
 
 # releases as codes write them; the text becomes part of a comment in the lines and the script
 RELEASE = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+() -]{0,49}")
@@ -28,16 +27,15 @@ def read_release(code: Code, text: str, origin: str) -> str:
 
 def installed_version(code: Code) -> str | None:
     """Find the version of a code that is installed here; None also for a program that reports no release."""
-    program = find_program(code.program, None) if code.program else None
     with contextlib.suppress(UsageError):
-        return None if program is None else _version_of(code, program)
+        return _version_of(code, code.program.find() if code.program else None)
     return None
 
 
-def _version_of(code: Code, program: str) -> str | None:
+def _version_of(code: Code, path: str | None) -> str | None:
     """Ask a program for its version, in the form in which versions are compared."""
-    text = code.version_of(program)
-    return None if text is None else read_release(code, text, f"version of {program}")
+    text = code.program.version_of(path) if code.program and path else None
+    return None if text is None else read_release(code, text, f"version of {path}")
 
 
 def choose_version(
@@ -51,11 +49,11 @@ def choose_version(
     must_run = verify or program is not None
     if not code.program and must_run:
         raise UsageError(f"{argument('verify')}: no script for {code.title}: {code.tested}")
-    path = find_program(code.program, program) if code.program else None
-    installed = None if path is None else _version_of(code, path)
-    if installed is None and must_run:
+    path = code.program.find(program) if code.program else None
+    installed = _version_of(code, path)
+    if code.program and installed is None and must_run:
         name = "" if program is None else f'"{program}": '
-        raise UsageError(f"{name}no {code.title} there; {code.install}, or {argument('program', 'FILE')}")
+        raise UsageError(f"{name}no {code.title} there; {code.program.install}, or {argument('program', 'FILE')}")
     if verify and version is not None and version != installed:
         origin, verified = argument("code_version"), argument("verify")
         raise UsageError(f"{origin}: got {version}, but {installed} is what {verified} runs")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from .code import Code, Collision, Parameters
-from .programs import python_package_version
+from .programs import python_package
 
 LAWS = {
     "simbody-hunt-crossley": "HuntCrossleyForce, equal materials",
@@ -120,7 +120,5 @@ CODE = Code(
             "v1, v2 = joint.getCoordinate().getSpeedValue(state), {v2}"
         ),
     },
-    program="python",
-    install="pip install opensim",
-    version_of=python_package_version("opensim"),
+    program=python_package("opensim"),
 )

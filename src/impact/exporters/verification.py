@@ -17,7 +17,7 @@ from ..array_types import Array
 from ..display import Block, Displayed, Table
 from ..errors import UsageError
 from ..formatting import argument, decimals, number, quantity
-from .code import Code
+from .code import ROUNDING, Code
 from .problem import ExportProblem
 from .programs import run_program
 
@@ -55,7 +55,6 @@ class Verification(Displayed):
     beta_uncertainty: float = 0.0
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the comparison as plain data."""
         return {
             "program": self.program,
             "agrees": self.agrees,
@@ -124,7 +123,8 @@ def run_script(code: Code, program: str, script: str) -> dict[str, float]:
         file = f"two_balls{code.suffix}"
         Path(folder, file).write_text(script, encoding="utf-8")
         try:
-            done = run_program(code.command(program, file), folder, TIMEOUT_S)
+            assert code.program is not None
+            done = run_program(code.program.command(program, file), folder, TIMEOUT_S)
         except (OSError, subprocess.SubprocessError) as error:
             raise UsageError(f"{argument('verify')}: {code.title}: {error}") from None
     printed = done.stdout.strip().splitlines() or [""]
@@ -155,6 +155,7 @@ def verify_scripts(problem: ExportProblem, program: str, dt: float, n_phases: in
     """
     problem = replace(problem, law=replace(problem.law, phases=n_phases))
     code, phases = problem.code, (np.arange(n_phases) + 0.5) / n_phases
+    tolerance = code.uncertainty.get(problem.model.key, ROUNDING)
     steps = np.array([dt] if code.scheme is not None else [dt, dt / 2, dt / 4])
     runs = [[_measure(problem, program, dt, phase) for phase in phases.tolist()] for dt in steps.tolist()]
     measured = np.array([[run["e_out"] for run in row] for row in runs])
@@ -166,7 +167,7 @@ def verify_scripts(problem: ExportProblem, program: str, dt: float, n_phases: in
             phases=(float("nan"),),
             measured=(value,),
             predicted=(problem.e_continuous,),
-            uncertainty=max(uncertainty, FLOOR, code.uncertainty_of(problem.model.key)),
+            uncertainty=max(uncertainty, FLOOR, tolerance),
         )
     predicted = (
         np.full(measured.shape, problem.e_continuous) if code.scheme is None else problem.law.restitution(steps)
@@ -177,7 +178,7 @@ def verify_scripts(problem: ExportProblem, program: str, dt: float, n_phases: in
         phases=tuple(np.tile(phases, steps.size).tolist()),
         measured=tuple(measured.ravel().tolist()),
         predicted=tuple(predicted.ravel().tolist()),
-        uncertainty=code.uncertainty_of(problem.model.key),
+        uncertainty=tolerance,
     )
     return verification if problem.law.oblique is None else _with_friction(verification, problem, steps, runs)
 

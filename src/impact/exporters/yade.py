@@ -7,7 +7,7 @@ import re
 
 from ..errors import UsageError
 from .code import PRINT_BETA, SOLID, Code, Collision, Parameters
-from .programs import printed_version
+from .programs import Program, printed_version
 
 LAWS = {
     "yade-en": "Law2_ScGeom_MindlinPhys_Mindlin, en",
@@ -202,6 +202,12 @@ def notes(collision: Collision) -> list[str]:
     ]
 
 
+PROGRAM = Program(
+    "yade",
+    "on Debian: apt-get install yade",
+    printed_version("--version", r"(\d{4}\.\d{2}[a-z]?)"),
+    lambda program, file: (program, "-j1", "-n", "-x", file),
+)
 CODE = Code(
     name="yade",
     title="YADE",
@@ -231,8 +237,5 @@ CODE = Code(
     shortens_arms=True,
     oblique=OBLIQUE,
     wall_inputs=lambda key, version, values: {"R2": WALL_RADII[is_hertzian(version)] * values["R1"]},
-    program="yade",
-    install="on Debian: apt-get install yade",
-    version_of=printed_version("--version", r"(\d{4}\.\d{2}[a-z]?)"),
-    command=lambda program, file: (program, "-j1", "-n", "-x", file),
+    program=PROGRAM,
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -42,8 +42,6 @@ class AnimationData(CurveData):
     """
 
     radii: tuple[float, ...] = ()  # of the drawn balls [m], which have equal densities
-
-    takes_points: ClassVar[bool] = False
 
     def place_panels(self, figure: Figure, width: float) -> tuple[list[Axes], float]:
         """Place the balls above both curves."""

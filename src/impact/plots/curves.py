@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import pandas as pd
@@ -22,7 +22,7 @@ from ..errors import UsageError
 from ..formatting import NO_BREAK, heading
 from .data import MEASURED, Points
 from .kinds import Choice
-from .labels import label_axis, pretty_conditions, symbol, words_of
+from .labels import LawPart, label_axis, pretty_conditions, symbol, words_of
 from .slices import unit_of
 from .style import FAINT, SOFT, is_geometric, law_key, model_styles, tint
 
@@ -107,8 +107,6 @@ class CurveData:
     not_drawn: tuple[str, ...] = ()
     measured: tuple[Points, ...] = ()
 
-    takes_points: ClassVar[bool] = True
-
     @property
     def panel_count(self) -> int:
         return len(self.panels)
@@ -126,7 +124,6 @@ class CurveData:
 
     @property
     def laws(self) -> dict[str, str]:
-        """The models and pairs that have a curve: their labels by key."""
         return {curve.law: curve.label for panel in self.panels for curve in panel.curves if curve.law}
 
     def long_table(self) -> pd.DataFrame:
@@ -175,7 +172,6 @@ class CurveData:
         return pd.DataFrame({name: pd.Series(values) for name, values in columns.items()})
 
     def place_panels(self, figure: Figure, width: float) -> tuple[list[Axes], float]:
-        """Place panels below each other."""
         heights = [panel.height for panel in self.panels]
         count = self.panel_count
         all_axes = figure.subplots(count, sharex=count > 1, squeeze=False, height_ratios=heights)
@@ -185,7 +181,6 @@ class CurveData:
     def draw(
         self, all_axes: Sequence[Axes], labels: Mapping[str, str], points: Points | None
     ) -> list[tuple[Artist, str]]:
-        """Draw curves, and measured points over them."""
         styles = model_styles([curve.law for panel in self.panels for curve in panel.curves if curve.law])
         entries: dict[str, Artist] = {}
         band: dict[str, Artist] = {}
@@ -234,6 +229,13 @@ def curve_of(
         for array in (x, y, *(band or (None, None)))
     )
     return Curve(label, model, points, values, end, variable, least=least, largest=largest, friction=friction)
+
+
+def law_curve(
+    law: LawPart, x: ArrayLike, y: ArrayLike, variable: str, end: str = "", band: Sequence[ArrayLike] = ()
+) -> Curve:
+    """Make a curve of a model or a pair, see `curve_of`."""
+    return curve_of(law.label, law.model, x, y, variable, end, band, law.friction)
 
 
 def x_axis_fields(coordinate: xr.DataArray, choice: Choice) -> dict[str, Any]:

@@ -34,8 +34,6 @@ class PlotData(Protocol):
     """The data of a picture: a frozen dataclass that makes its tables and draws itself."""
 
     __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
-    # whether measured points can be drawn over it
-    takes_points: ClassVar[bool]
 
     @property
     def title(self) -> str: ...

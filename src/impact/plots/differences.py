@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from ..comparison.verdict import VariableComparison, Verdict
+from ..comparison.verdict import Verdict
 from ..errors import UsageError
 from ..formatting import number, safe_text
 from ..results.schema import SCHEMA
@@ -62,7 +62,9 @@ def difference_data(verdict: Verdict) -> DifferenceData:
     if not verdict.worst_along:
         raise UsageError("nothing to draw: no variable was compared along an axis")
     judged = [variable for variable in verdict.variables if variable.judged != "reported"]
-    wanted = verdict.differing or tuple(sorted((v for v in judged if v.ratio), key=_sort_key))
+    wanted = verdict.differing or tuple(
+        sorted((v for v in judged if v.ratio), key=lambda variable: -variable.ratio)
+    )
     shown = [variable.name for variable in wanted[: len(COLOURS)]]
     along = verdict.worst_along
     axis_names = (
@@ -85,10 +87,6 @@ def difference_data(verdict: Verdict) -> DifferenceData:
             )
         )
     return DifferenceData(verdict.headline, tuple(panels), max(0, len(wanted) - len(shown)))
-
-
-def _sort_key(variable: VariableComparison) -> float:
-    return -variable.ratio
 
 
 def draw_differences(plot_data: DifferenceData) -> Figure:

@@ -19,6 +19,7 @@ from ..engine.plugins import read_plugins
 from ..errors import UsageError
 from ..results.single_impact import Impact, histories
 from ..results.xarray_backend import result_of
+from .curves import CurveData
 from .data import PlotData, Points, read_points
 from .kinds import DEFAULT_LEGENDS, STUDIES, Choice, Look, default_kind, find_kind
 from .labels import (
@@ -151,7 +152,7 @@ def draw(
     check_labels(look.labels or {}, label_keys(plot_data, look))
     labels = _labels(plot_data, look)
     measured = points if points is None or isinstance(points, Points) else read_points(points)
-    if measured is not None and not plot_data.takes_points:
+    if measured is not None and not isinstance(plot_data, CurveData):
         raise UsageError(f"{measured.source}: measured points are drawn over curves only")
     heading = labels.get("title", escape_mathtext(plot_data.title))
     if ax is not None:

@@ -160,7 +160,6 @@ def check_kind(name: str) -> None:
 
 
 def find_kind(name: str) -> Kind:
-    """Find a kind of picture by its name."""
     check_kind(name)
     module = import_module(f".{KINDS[name]}", __package__)
     kind: Kind = getattr(module, name.upper().replace("-", "_"))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -95,8 +95,6 @@ class MapData:
     closest: tuple[tuple[str | None, ...], ...] = ()
     distance: Plane = ()  # that |e_error|
 
-    takes_points: ClassVar[bool] = False
-
     @property
     def panel_count(self) -> int:
         return 2 if self.closest else len(self.panels)
@@ -116,7 +114,6 @@ class MapData:
 
     @property
     def laws(self) -> dict[str, str]:
-        """The models and pairs that have a panel: their labels by key."""
         return {panel.key: panel.label for panel in self.panels if panel.model}
 
     def long_table(self) -> pd.DataFrame:
@@ -176,7 +173,6 @@ class MapData:
     def draw(
         self, all_axes: Sequence[Axes], labels: Mapping[str, str], points: Points | None
     ) -> list[tuple[Artist, str]]:
-        """Draw the panels with a colour bar."""
         x, y = edges_of(self.x_values, self.x_log), edges_of(self.y_values, self.y_log)
         draw_panels = _draw_closest if self.closest else _draw_fields
         mesh, entries = draw_panels(self, all_axes, x, y, labels)

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..array_types import Array
 from ..config.input_names import InputName
 from ..contact.models import catalogue
 from ..errors import UsageError
@@ -59,6 +58,7 @@ def history_curves(histories: Sequence[xr.Dataset], choice: Choice) -> CurveData
 
 def impulse_curves(histories: Sequence[xr.Dataset], choice: Choice) -> CurveData:
     """Draw velocities over the impulse, Figure 2: laws differ in where they end on the lines (8) and (9)."""
+    histories = [_with_impulse(history) for history in histories]
     pairs = [("tau", "v1", "v₁"), ("tau", "v2", "v₂")]
     lines = curves_over("Velocities over the impulse", histories, pairs, choice)
     reference = f"{REFERENCE} (8), (9)" if choice.equations else REFERENCE
@@ -76,7 +76,7 @@ def impulse_curves(histories: Sequence[xr.Dataset], choice: Choice) -> CurveData
 def _impulse_marks(histories: Sequence[xr.Dataset]) -> tuple[Mark, ...]:
     """Mark the impulse of the approach, where the lines of the balls meet, and that of the whole impact."""
     first = histories[0]
-    tau = _series(first, "tau")
+    tau = first["tau"].values
     if not np.isfinite(tau).all():
         return ()
     m1 = float(impact_inputs(first)["m1"])
@@ -121,33 +121,27 @@ def curves_over(
             curve_of(
                 _pair_label(history, is_single) if of_friction else _model_label(history, choice.equations),
                 str(history["model"].item()),
-                _series(history, x),
-                _series(history, y),
+                history[x].values,
+                history[y].values,
                 y,
                 end,
                 friction=str(history["friction"].item()) if of_friction else "",
             )
             for history in histories
         ]
-        (x_label, x_unit), (y_label, y_unit) = _axis_label_and_unit(first, x), _axis_label_and_unit(first, y)
+        x_label, y_label = (words_of(first[name].attrs, name) for name in (x, y))
+        x_unit, y_unit = (unit_of(first[name]) for name in (x, y))
         panels.append(Panel(x_label, y_label, tuple(curves), x_unit, y_unit, x_name=x, y_name=y))
     model = _model_label(first, choice.equations) if of_friction and is_single else ""
     conditions = ", ".join(filter(None, (model, _conditions_text(histories))))
     return CurveData(title, conditions, tuple(panels))
 
 
-def _series(history: xr.Dataset, name: str) -> Array:
-    """Read a variable of a history, or compute the impulse "tau" that reduced the closing speed to v."""
+def _with_impulse(history: xr.Dataset) -> xr.Dataset:
+    """Add the impulse that has reduced the closing speed to v."""
     v = np.asarray(history["v"].values, float)
-    is_impulse = name == "tau"
-    return _effective_mass(impact_inputs(history)) * (v[0] - v) if is_impulse else history[name].values
-
-
-def _axis_label_and_unit(history: xr.Dataset, name: str) -> tuple[str, str]:
-    """Read the label and the unit of an axis."""
-    if name == "tau":
-        return "Impulse", "N s"
-    return words_of(history[name].attrs, name), unit_of(history[name])
+    impulse = _effective_mass(impact_inputs(history)) * (v[0] - v)
+    return history.assign(tau=("t", impulse, {"units": "N s", "long_name": "Impulse"}))
 
 
 def _pair_label(history: xr.Dataset, is_single: bool) -> str:
@@ -182,7 +176,6 @@ def _effective_mass(inputs: Mapping[str, float | str]) -> float:
 
 
 def _conditions_text(histories: Sequence[xr.Dataset]) -> str:
-    """Write the inputs of the impact."""
     inputs = impact_inputs(histories[0])
     by_model = {str(history["model"].item()): impact_inputs(history).get("n") for history in histories}
     exponents = {key: n for key, n in by_model.items() if isinstance(n, float)}

@@ -16,7 +16,7 @@ from ..contact.variables import OUTPUTS
 from ..errors import UsageError
 from ..formatting import argument, number
 from ..results.selection import select
-from .curves import Curve, CurveData, Panel, curve_of
+from .curves import Curve, CurveData, Panel, curve_of, law_curve
 from .kinds import Choice, Kind
 from .labels import LawPart, split_by_law
 from .motions import choose_point, curves_over
@@ -87,7 +87,7 @@ def psi_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     for pair, (before, after) in zip(pairs, slips, strict=True):
         order = np.argsort(before, kind="stable")
         order = order[np.abs(before[order]) <= most]
-        curves.append(_curve(pair, before[order], after[order], "psi2"))
+        curves.append(law_curve(pair, before[order], after[order], "psi2"))
     if any((np.abs(before) > most).any() for before, _ in slips):
         beyond = f"slips beyond psi1 = {number(float(most), 3)}, {SHOWN_PSI} times the largest that is stopped"
         line = line._replace(not_drawn=(*line.not_drawn, beyond))
@@ -157,14 +157,8 @@ def _reason(data: xr.Dataset) -> str:
 def _panel(
     line: Line, pairs: Sequence[LawPart], name: str, y_label: str, guides: Sequence[Curve] = (), end: str = ""
 ) -> Panel:
-    """Make a panel with a curve for each pair."""
-    curves = [_curve(pair, line.coordinate, pair.data[name], name, end) for pair in pairs]
+    curves = [law_curve(pair, line.coordinate, pair.data[name], name, end) for pair in pairs]
     return Panel("", y_label, (*guides, *curves), y_unit=OUTPUTS[name].unit, y_name=name)
-
-
-def _curve(pair: LawPart, x: ArrayLike, y: ArrayLike, name: str, end: str = "") -> Curve:
-    """Make the curve of a pair."""
-    return curve_of(pair.label, pair.model, x, y, name, end, friction=pair.friction)
 
 
 def _guide(x: ArrayLike, y: ArrayLike, text: str) -> Curve:

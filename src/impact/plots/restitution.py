@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -11,7 +11,7 @@ import numpy as np
 from ..contact.variables import OUTPUTS
 from ..errors import UsageError
 from ..formatting import argument, label as number_label, safe_text
-from .curves import Curve, CurveData, Panel, curve_of, x_axis_fields
+from .curves import Curve, CurveData, Panel, curve_of, law_curve, x_axis_fields
 from .kinds import Choice, Kind
 from .labels import REFERENCE, LawPart, model_label, split_by_law
 from .slices import Line, choose_line, conditions_of, is_ordered, numeric_axes, read, take_line
@@ -40,11 +40,7 @@ def velocity_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
         curve_of(reference, None, line.coordinate, line.data[f"v{ball}_reference"], f"v{ball}_post", end)
         for ball, end in balls
     ]
-    curves = [
-        curve_of(law.label, law.model, line.coordinate, law.data[f"v{ball}_post"], f"v{ball}_post", end)
-        for law in split_by_law(line.data, numbered=choice.equations)
-        for ball, end in balls
-    ]
+    curves = _law_curves(line, choice, {f"v{ball}_post": end for ball, end in balls})
     all_curves = (*_without_empty(references), *curves)
     panel = Panel("", "Velocity after the impact", all_curves, y_unit="m/s", y_name="v_post")
     return complete(dataset, line, FIGURE_6, [panel], choice)
@@ -56,10 +52,7 @@ def restitution_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     requested = (
         [curve_of("Requested", None, line.coordinate, line.data["e"], "e")] if "e" in line.data.coords else []
     )
-    curves = [
-        curve_of(law.label, law.model, line.coordinate, law.data["e_out"], "e_out")
-        for law in split_by_law(line.data, numbered=choice.equations)
-    ]
+    curves = _law_curves(line, choice, {"e_out": ""})
     panel = Panel("", "Delivered restitution", (*_without_empty(requested), *curves), y_name="e_out")
     return complete(dataset, line, "Delivered restitution", [panel], choice)
 
@@ -67,10 +60,7 @@ def restitution_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
 def error_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     """Read the error of every model's restitution, signed and absolute; see `velocity_curves`."""
     line = read_line(dataset, choice, "e_error")
-    signed = [
-        curve_of(law.label, law.model, line.coordinate, law.data["e_error"], "e_error")
-        for law in split_by_law(line.data, numbered=choice.equations)
-    ]
+    signed = _law_curves(line, choice, {"e_error": ""})
     if not _without_empty(signed):
         raise UsageError("this result has no error of the restitution, which needs a requested e; sweep e")
     absolute = [replace(curve, y=tuple(np.abs(curve.y).tolist()), variable="abs_e_error") for curve in signed]
@@ -118,6 +108,15 @@ def timestep_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     return complete(dataset, line, title, [panel], choice, x_log=line.x in STEP_AXES)
 
 
+def _law_curves(line: Line, choice: Choice, variables: Mapping[str, str]) -> list[Curve]:
+    """Make the curves of every law over a line, of variables with the texts at their ends."""
+    return [
+        law_curve(law, line.coordinate, law.data[name], name, end)
+        for law in split_by_law(line.data, numbered=choice.equations)
+        for name, end in variables.items()
+    ]
+
+
 def _split_by_restitution(line: Line) -> list[tuple[str, xr.Dataset]]:
     """Split a line at fixed steps at each value of e that is neither along x nor along the phase; names each."""
     taken = {*line.data[line.x].dims, *line.data["phase"].dims}
@@ -138,7 +137,7 @@ def _curve_over_phase(law: LawPart, line: Line, values: xr.DataArray) -> Curve:
     (x_dim,) = line.data[line.x].dims
     by_phase = np.asarray(values.transpose(x_dim, ...).values, float).reshape(values.sizes[x_dim], -1)
     band = (by_phase.min(axis=1), by_phase.max(axis=1)) if by_phase.shape[1] > 1 else ()
-    return curve_of(law.label, law.model, line.coordinate, by_phase.mean(axis=1), "e_out", band=band)
+    return law_curve(law, line.coordinate, by_phase.mean(axis=1), "e_out", band=band)
 
 
 def _have_equal_values(curve: Curve, other: Curve) -> bool:

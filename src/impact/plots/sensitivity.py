@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -57,8 +57,6 @@ class BarData:
     panels: tuple[BarPanel, ...]
     not_drawn: tuple[str, ...] = ()
 
-    takes_points: ClassVar[bool] = False
-
     @property
     def panel_count(self) -> int:
         return len(self.panels)
@@ -70,7 +68,6 @@ class BarData:
 
     @property
     def laws(self) -> dict[str, str]:
-        """The models that have a panel: their labels by key."""
         return {panel.model: panel.label for panel in self.panels}
 
     def long_table(self) -> pd.DataFrame:
@@ -99,14 +96,12 @@ class BarData:
         return table.reset_index()
 
     def place_panels(self, figure: Figure, width: float) -> tuple[list[Axes], float]:
-        """Place panels below each other."""
         all_axes = figure.subplots(self.panel_count, sharex=True, squeeze=False)
         return list(all_axes.ravel()), self.panel_count * (PANEL_INCHES + INPUT_INCHES * len(self.inputs)) + 0.3
 
     def draw(
         self, all_axes: Sequence[Axes], labels: Mapping[str, str], points: Points | None
     ) -> list[tuple[Artist, str]]:
-        """Draw the bars of each model."""
         entries: dict[str, Artist] = {}
         positions = np.arange(len(self.inputs))[::-1]
         for axes, panel in zip(all_axes, self.panels, strict=True):

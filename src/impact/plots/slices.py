@@ -242,7 +242,6 @@ def conditions_of(dataset: xr.Dataset, *drawn: str) -> str:
 
 
 def units_of(dataset: xr.Dataset) -> dict[str, str]:
-    """Read the units of all coordinates."""
     # of a variable alone: to make an array finds its coordinates among all others, a thousand times for a report
     return {str(name): unit_of(dataset.variables[name]) for name in dataset.coords}
 

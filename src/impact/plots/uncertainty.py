@@ -14,7 +14,7 @@ from ..errors import UsageError
 from ..formatting import argument, safe_text
 from ..results.selection import select
 from ..results.sensitivity import distribution_texts
-from .curves import Curve, CurveData, Panel, curve_of, x_axis_fields
+from .curves import Curve, CurveData, Panel, curve_of, law_curve, x_axis_fields
 from .kinds import Choice, Kind
 from .labels import split_by_law
 from .slices import choose_line, conditions_of, numeric_axes, read, take_line
@@ -50,12 +50,11 @@ def uncertainty_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
             count = min(samples.size, MAX_DRAWN_PROBABILITIES)
             share = (np.arange(count) + 0.5) / count
             quantiles = np.quantile(samples, share, method="hazen")
-            curve = curve_of(law.label, law.model, quantiles, share, name)
+            curves.append(law_curve(law, quantiles, share, name))
         else:
             # NaN where a sample has no result
             least, median, largest = np.quantile(samples, (BAND[0], 0.5, BAND[1]), axis=-1)
-            curve = curve_of(law.label, law.model, law.data[x], median, name, band=(least, largest))
-        curves.append(replace(curve, friction=law.friction))
+            curves.append(law_curve(law, law.data[x], median, name, band=(least, largest)))
         failed = int(np.isnan(samples).sum())
         not_drawn += (f"{law.key}, where {failed:,} samples have no result",) if failed else ()
     if x is None:

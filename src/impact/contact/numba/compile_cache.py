@@ -108,5 +108,4 @@ def compiled(**options):
 
 @cache
 def _warn_once(text):
-    """Warn once in a process."""
     warnings.warn(text, stacklevel=2)
