@@ -78,7 +78,7 @@ def _run_threads(functions: Mapping[str, VectorFunction], solvers: Sequence[Call
     try:
         while len(results) < len(solvers):
             requests: dict[int, tuple[str, Array]] = {}
-            # one solver runs at a time: threads that compete for the interpreter's lock cost more than they compute
+            # one solver runs at a time: threads that compete for the interpreter's lock cost more time
             for number, thread in enumerate(threads):
                 if number in results:
                     continue
