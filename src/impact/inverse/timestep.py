@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context
 from functools import partial
 from pathlib import Path
 from typing import Any, SupportsFloat
@@ -78,6 +79,8 @@ MAX_SECANT_STEPS = 4096
 HELD_E = 1e-8
 # largest logarithm of the factor by which a parameter changes
 MAX_LOGARITHM = 50.0
+# digits of a parameter that is found, and of the contact there
+SHOWN_DIGITS = 4
 # C/K, which Drake's SAP takes in place of C
 RELAXATION_TIME = "relaxation_time"
 
@@ -189,13 +192,17 @@ class NeededParameter:
 
     def __str__(self) -> str:
         side = "from" if self.is_least else "up to"
+        # rounded to the side of the values that are enough
+        rounding = Context(prec=SHOWN_DIGITS, rounding=ROUND_CEILING if self.is_least else ROUND_FLOOR)
+        value = float(rounding.create_decimal_from_float(self.value))
         companion = f" with {self.companion}" if self.companion else ""
-        contact_time, indentation = quantity(self.contact_time, "s", 4), quantity(self.peak_indentation, "m", 4)
-        relaxation = quantity(self.relaxation_time, "s", 4)
+        contact_time = quantity(self.contact_time, "s", SHOWN_DIGITS)
+        indentation = quantity(self.peak_indentation, "m", SHOWN_DIGITS)
+        relaxation = quantity(self.relaxation_time, "s", SHOWN_DIGITS)
         relaxation = "" if math.isnan(self.relaxation_time) else f", relaxation_time = C/K = {relaxation}"
         return (
             f"at dt = {quantity(self.dt, 's')} every phase is within {number(100.0 * self.tol)} % {side} "
-            f"{self.parameter} = {quantity(self.value, self.unit, 4)}{companion}: contact of {contact_time}, "
+            f"{self.parameter} = {quantity(value, self.unit, SHOWN_DIGITS)}{companion}: contact of {contact_time}, "
             f"indentation of {indentation}{relaxation}"
         )
 
