@@ -112,7 +112,7 @@ def test_a_stored_config_needs_no_file(folder: Path) -> None:
         # not "scale", which takes no specimens
         (
             "e_out, specimen\n0.5, a\n0.4, b\n",
-            "data: got a column specimen without standard deviations, expected a column sigma or the key sigma, that",
+            "data: got a column specimen without standard deviations, expected a column sigma or the key sigma",
         ),
         ("v1 [m/s], e_out, specimn\n1, 0.5, a\n", 'specimn: no such input or output; did you mean "specimen"?'),
     ],

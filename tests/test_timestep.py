@@ -301,9 +301,7 @@ def test_the_relaxation_time_of_drakes_sap_is_named_beside_a_stiffness() -> None
         ("anagnostopoulos-1988", {"e": 0.8, "K": 1e6}, 1e-3, "K"),
     ],
 )
-def test_the_value_that_is_printed_is_enough(
-    model: str, at: dict[str, float], dt: float, parameter: str
-) -> None:
+def test_the_value_that_is_printed_is_enough(model: str, at: dict[str, float], dt: float, parameter: str) -> None:
     """It has four digits, and is rounded to the side where every phase is within the tolerance."""
     found = impact.timestep(model, at=at, dt=[dt], tol=0.01, parameter=parameter).needed_parameter
     printed = float(str(found).split(f"{parameter} = ")[1].split()[0])

@@ -13,7 +13,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from decimal import ROUND_CEILING, ROUND_FLOOR, Context
 from functools import partial
 from pathlib import Path
 from typing import Any, SupportsFloat
@@ -58,7 +57,7 @@ from ..engine.build_impacts import build_impacts, build_oblique, rayleigh_time_a
 from ..engine.plan import Plan
 from ..engine.plugins import Plugins, read_plugins
 from ..errors import UsageError
-from ..formatting import argument, decimals, number, quantity
+from ..formatting import argument, decimals, number, quantity, rounded
 from ..results.single_impact import open_source
 from .solve import PointWithE, config_name, point_with_e, solve_damping, unknown_of, warn_of_point
 
@@ -193,17 +192,16 @@ class NeededParameter:
     def __str__(self) -> str:
         side = "from" if self.is_least else "up to"
         # rounded to the side of the values that are enough
-        rounding = Context(prec=SHOWN_DIGITS, rounding=ROUND_CEILING if self.is_least else ROUND_FLOOR)
-        value = float(rounding.create_decimal_from_float(self.value))
-        companion = f" with {self.companion}" if self.companion else ""
+        value = rounded(self.value, SHOWN_DIGITS, up=self.is_least)
+        found = f"{self.parameter} = {quantity(value, self.unit, SHOWN_DIGITS)}"
+        found += f" with {self.companion}" if self.companion else ""
         contact_time = quantity(self.contact_time, "s", SHOWN_DIGITS)
         indentation = quantity(self.peak_indentation, "m", SHOWN_DIGITS)
         relaxation = quantity(self.relaxation_time, "s", SHOWN_DIGITS)
         relaxation = "" if math.isnan(self.relaxation_time) else f", relaxation_time = C/K = {relaxation}"
         return (
             f"at dt = {quantity(self.dt, 's')} every phase is within {number(100.0 * self.tol)} % {side} "
-            f"{self.parameter} = {quantity(value, self.unit, SHOWN_DIGITS)}{companion}: contact of {contact_time}, "
-            f"indentation of {indentation}{relaxation}"
+            f"{found}: contact of {contact_time}, indentation of {indentation}{relaxation}"
         )
 
 
@@ -290,7 +288,7 @@ class TimestepResult(Displayed):
         if self.needed is None:
             yield f"no number of steps per contact keeps every phase within {percent}"
         else:
-            steps, dt = self.needed.steps_per_contact, quantity(self.needed.dt, "s")
+            steps, dt = self.needed.steps_per_contact, quantity(rounded(self.needed.dt, 6, up=False), "s")
             yield f"within {percent} at every phase: {steps} steps per contact, dt <= {dt}"
         if self.parameter:
             yield str(self.needed_parameter or missing_parameter(self.parameter, self.tol))
