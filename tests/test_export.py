@@ -739,6 +739,15 @@ def test_a_program_that_reports_no_release_is_one_line(cli: Run, tmp_path: Path,
     assert installed_version(replace(code, program=replace(code.program, name=str(lmp)))) is None
 
 
+@pytest.mark.parametrize(("code", "e"), [("mujoco", 0.9), ("liggghts", 0.5)])
+def test_the_step_that_is_recommended_is_small_enough_as_it_is_printed(cli: Run, code: str, e: float) -> None:
+    """It has three digits, rounded down; rounded to the nearest, both would be too long."""
+    done = cli("export", "--to", code, "--at", f"e={e}", "--at", "v1=1")
+    dt = float(re.findall(r"recommended: dt <= (\S+) s", done.stdout)[0])
+    (row,) = impact.timestep(default_law(code), at={"e": e, "v1": 1.0}, dt=[dt]).rows
+    assert max(row.e_largest - e, e - row.e_least) <= 0.01 * e
+
+
 EXAMPLES = examples_of("docs/export.md")
 
 

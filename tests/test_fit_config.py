@@ -109,7 +109,11 @@ def test_a_stored_config_needs_no_file(folder: Path) -> None:
             "drops.csv:2: specimen: got nothing, expected a value in each column",
         ),
         ("e_out, sigma, specimen\n0.5, 0.1, a\n0.4, 0.1, a\n", "data: got one specimen, expected at least two"),
-        ("e_out, specimen\n0.5, a\n0.4, b\n", "standard deviations, expected a column sigma or the key sigma"),
+        # not "scale", which takes no specimens
+        (
+            "e_out, specimen\n0.5, a\n0.4, b\n",
+            "data: got a column specimen without standard deviations, expected a column sigma or the key sigma",
+        ),
         ("v1 [m/s], e_out, specimn\n1, 0.5, a\n", 'specimn: no such input or output; did you mean "specimen"?'),
     ],
 )

@@ -21,7 +21,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -621,6 +621,31 @@ def test_a_code_delivers_the_restitution_of_the_map_of_its_scheme_at_coarse_step
     if entry.code is DRAKE:
         stiffness = entry.collisions[0]["K"] * (1 + WRONG_FORCE)
         assert float(np.abs(theirs - by_maps({"K": stiffness})).max()) > tolerance
+
+
+@pytest.mark.parametrize(("factor", "is_enough"), [(1.0, True), (2.0, True), (0.8, False)])
+def test_sap_of_drake_is_within_the_tolerance_from_the_relaxation_time_on(
+    factor: float, is_enough: bool, tmp_path: Path
+) -> None:
+    """At a step of 2 ms, with the stiffness that keeps e: the answer of `timestep --for relaxation_time`."""
+    key, tol = "kelvin-voigt-no-tension", 0.05
+    result = impact.timestep(
+        key,
+        at={"e": 0.7, "v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 1e6, "n": 1.0},
+        dt=[2e-3],
+        tol=tol,
+        parameter="relaxation_time",
+        scheme="drake-sap",
+    )
+    needed = result.needed_parameter
+    assert needed is not None
+    K, contact_time = needed.K / factor**2, factor * needed.contact_time
+    collision = BALLS[0] | {"m1": 1.0, "m2": 1.0, "v1": 1.0, "v2": 0.0, "K": K, "C": factor * needed.value * K}
+    (sap,) = (entry for entry in ENTRIES if entry.variant == "sap")
+    entry = replace(sap, collisions=(collision,))
+    _, restitutions = by_code(entry, [contact_time], tmp_path, [contact_time / 2e-3])
+    print("relaxation time", factor * needed.value, "restitutions", restitutions)
+    assert bool((np.abs(restitutions - 0.7) <= tol * 0.7).all()) == is_enough
 
 
 # entries of codes that no package of PyPI or Debian can check, by key or by its first word

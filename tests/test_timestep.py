@@ -292,6 +292,73 @@ def test_the_relaxation_time_of_drakes_sap_is_named_beside_a_stiffness() -> None
     assert "relaxation_time" not in {*other.as_dict(), *str(other).split()}
 
 
+@pytest.mark.parametrize(
+    ("model", "at", "dt", "parameter"),
+    [
+        ("mujoco-solref", {"e": 0.6}, 2e-4, "timeconst"),
+        ("liggghts-hertz", {"e": 0.7, "K": 1e9}, 2e-5, "K"),
+        ("liggghts-hertz", {"e": 0.8, "K": 1e9}, 2e-5, "K"),
+        ("anagnostopoulos-1988", {"e": 0.8, "K": 1e6}, 1e-3, "K"),
+    ],
+)
+def test_the_value_that_is_printed_is_enough(model: str, at: dict[str, float], dt: float, parameter: str) -> None:
+    """It has four digits, and is rounded to the side where every phase is within the tolerance."""
+    found = impact.timestep(model, at=at, dt=[dt], tol=0.01, parameter=parameter).needed_parameter
+    printed = float(str(found).split(f"{parameter} = ")[1].split()[0])
+    assert found is not None
+    assert printed == pytest.approx(found.value, rel=1e-3)
+    needed = impact.timestep(model, at={**at, parameter: printed}, dt=[dt], tol=0.01).needed
+    assert needed is not None
+    assert needed.dt >= dt
+
+
+SAP = ("--model", "kelvin-voigt-no-tension", "--scheme", "drake-sap", "--at", "n=1", "--at", "K=1e6")
+
+
+def test_the_relaxation_time_of_drakes_sap_is_found_with_its_stiffness(cli: Run) -> None:
+    """From that time on every phase is within the tolerance at the step, and a tenth below it is not."""
+    words = ("timestep", *SAP, "--at", "e=0.7", "--dt", "2 ms", "--tol", "5%", "--for")
+    done = cli(*words, "relaxation_time", "--json")
+    assert done.returncode == 0, done.stderr
+    needed = json.loads(done.stdout)["for"]
+    assert list(needed) == ["parameter", "value", "contact_time", "peak_indentation", "tol", "K"]
+    for factor, is_enough in ((1.0, True), (1.5, True), (4.0, True), (0.9, False), (0.5, False)):
+        # at the same e, K falls with the square of the relaxation time
+        relaxation_time, stiffness = factor * needed["value"], needed["K"] / factor**2
+        result = impact.timestep(
+            "kelvin-voigt-no-tension",
+            at={"n": 1.0, "K": stiffness, "C": relaxation_time * stiffness},
+            dt=["2 ms"],
+            scheme="drake-sap",
+        )
+        (row,) = result.rows
+        assert result.e_continuous == pytest.approx(0.7, abs=1e-8)
+        assert (max(row.e_largest - 0.7, 0.7 - row.e_least) <= 0.035 * (1.0 + 1e-9)) == is_enough
+    # the same impact is found from the side of the stiffness
+    other = json.loads(cli(*words, "K", "--json").stdout)["for"]
+    assert (other["value"], other["relaxation_time"]) == (needed["K"], needed["value"])
+    text = cli(*words, "relaxation_time").stdout.splitlines()[-1]
+    assert "every phase is within 5 % from relaxation_time = 0.01391 s with K = 154.5 N/m: contact of" in text
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ((*SAP, "--at", "C=100"), "sets e at a given K, and not the contact time: expected --at e=0.8 or another"),
+        ((*SAP, "--at", "e=1"), "sets e at a given K, and not the contact time: expected --at e=0.8 or another"),
+        (
+            ("--model", "drake-point-contact", "--at", "e=0.7"),
+            "is C/K of Drake's SAP: impact timestep --model kelvin-voigt-no-tension --scheme drake-sap finds it",
+        ),
+    ],
+)
+def test_a_relaxation_time_needs_an_e_to_keep_and_the_scheme_of_sap(
+    cli: Run, words: tuple[str, ...], message: str
+) -> None:
+    done = cli("timestep", *words, "--dt", "2 ms", "--tol", "1%", "--for", "relaxation_time")
+    assert_refused(done, message)
+
+
 def test_a_parameter_that_does_not_set_the_time_scale_is_refused(cli: Run) -> None:
     words = ("timestep", "--model", "mujoco-solref", "--at", "dampratio=0.1", "--dt", "2ms")
     for parameter, tol, message in (

@@ -6,6 +6,7 @@ import json
 import math
 import re
 import shlex
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context
 from pathlib import Path
 from unicodedata import category
 
@@ -125,6 +126,16 @@ def label(value: object) -> str:
     """
     short, long = number(value), number(value, 12)
     return long if isinstance(value, float) and value == value and float(short) != float(long) else short
+
+
+def rounded(value: float, digits: int, *, up: bool) -> float:
+    """Round a number to digits, to the side where a bound of it still holds.
+
+    >>> rounded(1.16977e-05, 3, up=False), rounded(0.0242711, 4, up=True)
+    (1.16e-05, 0.02428)
+    """
+    rounding = ROUND_CEILING if up else ROUND_FLOOR
+    return float(Context(prec=digits, rounding=rounding).create_decimal_from_float(value))
 
 
 def quantity(value: object, unit: str = "1", digits: int = 6) -> str:

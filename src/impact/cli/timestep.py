@@ -50,7 +50,7 @@ def timestep(
             "--scheme",
             metavar="NAME",
             help="How a step is computed: kick-drift, drake-tamsi (also LAGGED and SIMILAR), drake-sap "
-            "or pybullet. "
+            "(where --for takes relaxation_time too) or pybullet. "
             "\\[default: drake-tamsi for laws of Drake, else kick-drift]",
             autocompletion=complete_scheme,
         ),

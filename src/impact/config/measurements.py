@@ -560,6 +560,10 @@ def _noise_problems(
     if missing and len(outputs) > 1:
         expected = f"a column {SIGMA}_{missing[0]}: each of several outputs needs one"
         return [(("data",), f"got no standard deviation of {missing[0]}, expected {expected}")]
+    if missing and specimens:
+        # the noise "scale" takes no specimens
+        expected = f"a column {SIGMA} or the key {SIGMA}, that of one measurement"
+        return [(("data",), f"got a column {SPECIMEN} without standard deviations, expected {expected}")]
     if missing and noise in ("given", "excess"):
         expected = f'a column {SIGMA} or the key {SIGMA}, or noise = "scale"'
         return [(path, f'got "{noise}" without standard deviations, expected {expected}')]

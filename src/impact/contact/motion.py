@@ -259,6 +259,8 @@ def _formula_arguments(
 def _rates(law: MotionLaw, formula: Formula, extra: tuple[str, ...]) -> Rates:
     p, n_law_params = law.model.coordinate_power, len(law.names)
     names = {*argument_names(formula)}
+    # as an array: NumPy converts a number on every call
+    power_factor = np.array(float(p))
 
     def rates(y: Array, params: Params, out: Array | None = None) -> Array:
         s, arguments = y[0], _formula_arguments(law, names, extra, y, params)
@@ -270,7 +272,7 @@ def _rates(law: MotionLaw, formula: Formula, extra: tuple[str, ...]) -> Rates:
         # rows: the rates of s, v (or its substitute), t and W, then the force; `out` may lack the last ones
         out = np.empty((5, s.size)) if out is None else out
         n_rows = len(out)
-        weight = np.multiply(integer_power(s, p - 1), p, out[2] if n_rows > 2 else None)
+        weight = np.multiply(integer_power(s, p - 1), power_factor, out[2] if n_rows > 2 else None)
         out[0], second = v, out[1]
         np.multiply(weight, force, second)
         if n_rows > 3:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cache, reduce
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,12 +37,14 @@ def power(base: Array, exponent: float) -> Array:
     if exponent < 0:
         return 1.0 / power(base, -exponent)
     whole, rest = divmod(quarters, 4)
-    factors = [integer_power(base, whole)] if whole or not rest else []
-    if rest:
-        root = np.sqrt(base)
-        factors += [root] if rest >= 2 else []
-        factors += [np.sqrt(root)] if rest % 2 else []
-    return reduce(np.multiply, factors)
+    if not rest:
+        return integer_power(base, whole)
+    # of the factors base^whole, base^(1/2) and base^(1/4), in this order
+    root = np.sqrt(base)
+    result = root if rest >= 2 else np.sqrt(root)
+    if whole:
+        result = integer_power(base, whole) * result
+    return result * np.sqrt(root) if rest == 3 else result
 
 
 @cache
@@ -101,7 +103,10 @@ def integer_power(base: Array, exponent: int) -> Array:
     array([-32., 243.])
     """
     if exponent == 0:
-        return np.ones_like(base)
+        # faster than ones_like for the short arrays of a fit
+        ones = np.empty_like(base)
+        ones.fill(1.0)
+        return ones
     square = base
     while exponent % 2 == 0:
         square = square * square

@@ -17,7 +17,7 @@ from ..config.tables import SWEEP_QUANTITIES
 from ..display import Block, Displayed
 from ..engine.plugins import Plugins
 from ..errors import UsageError
-from ..formatting import argument, decimals, number, quantity, safe_text
+from ..formatting import argument, decimals, number, quantity, rounded, safe_text
 from ..inverse import timestep
 from ..results.single_impact import ConfigSource
 from .code import Collision, Parameters
@@ -365,7 +365,8 @@ def _header(
             )
         if advised is not None:
             within = f"within {number(100.0 * ADVISED_TOL)} % of {number(problem.requested_e)}"
-            header.append(f"recommended: dt <= {quantity(advised.dt, 's', 3)} keeps e {within} whatever the phase")
+            dt = quantity(rounded(advised.dt, 3, up=False), "s", 3)
+            header.append(f"recommended: dt <= {dt} keeps e {within} whatever the phase")
         if needed:
             header.append(needed)
     return [*header, *code.notes(collision), code.tested]

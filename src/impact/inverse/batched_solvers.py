@@ -1,8 +1,8 @@
 """Run many solvers at the same time, and evaluate what they ask for in one batch.
 
 A solver such as `scipy.optimize.least_squares` asks for one value at a time, and a vectorised function is fast
-only for many. Here each solver runs in a thread; when all of them wait for a value, their requests are evaluated
-together.
+only for many. Here each solver runs in a thread, one after the other until it asks for a value; when all of them
+wait, their requests are evaluated together.
 """
 
 from __future__ import annotations
@@ -52,12 +52,12 @@ def run_together(functions: Mapping[str, VectorFunction], solvers: Sequence[Call
 
 
 def _run_threads(functions: Mapping[str, VectorFunction], solvers: Sequence[Callable[[Evaluate], T]]) -> list[T]:
-    # what threads send: their number, and a request, a result or an exception
-    messages: SimpleQueue[tuple[int, str, object]] = SimpleQueue()
+    # what the running thread sends: a request, a result or an exception
+    messages: SimpleQueue[tuple[str, object]] = SimpleQueue()
     answers: list[SimpleQueue[Array | None]] = [SimpleQueue() for _ in solvers]
 
     def evaluate(number: int, key: str, rows: Array) -> Array:
-        messages.put((number, "request", (key, rows)))
+        messages.put(("request", (key, rows)))
         answer = answers[number].get()
         if answer is None:
             raise _Stopped
@@ -65,31 +65,37 @@ def _run_threads(functions: Mapping[str, VectorFunction], solvers: Sequence[Call
 
     def solve(number: int) -> None:
         try:
-            messages.put((number, "result", solvers[number](partial(evaluate, number))))
+            messages.put(("result", solvers[number](partial(evaluate, number))))
         except _Stopped:
             pass
         except BaseException as error:
-            messages.put((number, "error", error))
+            messages.put(("error", error))
 
     threads = [threading.Thread(target=solve, args=(number,), daemon=True) for number in range(len(solvers))]
-    for thread in threads:
-        thread.start()
+    started: list[threading.Thread] = []
     results: dict[int, T] = {}
-    requests: dict[int, tuple[str, Array]] = {}
+    values: dict[int, Array] = {}
     try:
         while len(results) < len(solvers):
-            number, kind, content = messages.get()
-            if kind == "error":
-                raise content  # type: ignore[misc]
-            (requests if kind == "request" else results)[number] = content  # type: ignore[assignment]
-            if len(requests) + len(results) == len(solvers):
-                for number, values in _evaluate_all(functions, requests).items():
-                    answers[number].put(values)
-                requests = {}
+            requests: dict[int, tuple[str, Array]] = {}
+            # one solver runs at a time: threads that compete for the interpreter's lock cost more time
+            for number, thread in enumerate(threads):
+                if number in results:
+                    continue
+                if number in values:
+                    answers[number].put(values[number])
+                else:
+                    thread.start()
+                    started.append(thread)
+                kind, content = messages.get()
+                if kind == "error":
+                    raise content  # type: ignore[misc]
+                (requests if kind == "request" else results)[number] = content  # type: ignore[assignment]
+            values = _evaluate_all(functions, requests)
     finally:
         for answer in answers:
             answer.put(None)
-        for thread in threads:
+        for thread in started:
             thread.join()
     return [results[number] for number in range(len(solvers))]
 

@@ -57,7 +57,7 @@ from ..engine.build_impacts import build_impacts, build_oblique, rayleigh_time_a
 from ..engine.plan import Plan
 from ..engine.plugins import Plugins, read_plugins
 from ..errors import UsageError
-from ..formatting import argument, decimals, number, quantity
+from ..formatting import argument, decimals, number, quantity, rounded
 from ..results.single_impact import open_source
 from .solve import PointWithE, config_name, point_with_e, solve_damping, unknown_of, warn_of_point
 
@@ -80,6 +80,10 @@ EXACT_ERROR = 1e-300
 HELD_E = 1e-8
 # largest logarithm of the factor by which a parameter changes
 MAX_LOGARITHM = 50.0
+# digits of a parameter that is found, and of the contact there
+SHOWN_DIGITS = 4
+# C/K, which Drake's SAP takes in place of C
+RELAXATION_TIME = "relaxation_time"
 
 
 @dataclass(frozen=True)
@@ -161,39 +165,45 @@ class NeededParameter:
     ----------
     parameter, unit : its name, and its SI unit
     is_least : whether larger values are within the tolerance too, and not smaller ones
-    damping : the damping parameter there with its value, where it was solved for; else ""
+    companion : what changes with it and keeps e, with its value: the damping parameter or, beside a relaxation
+        time, K; "" where e is not kept
     dt, contact_time : [s]
     peak_indentation : [m]
     relaxation_time : C/K [s], what Drake's SAP takes in place of C; NaN for other schemes
+    K : beside a relaxation time that is the parameter [N/m], else NaN
     """
 
     parameter: str
     unit: str
     value: float
     is_least: bool
-    damping: str
+    companion: str
     dt: float
     contact_time: float
     peak_indentation: float
     tol: float
     relaxation_time: float = math.nan
+    K: float = math.nan
 
     def as_dict(self) -> dict[str, Any]:
         """Convert to plain data; without a relaxation time if the scheme has none."""
         names = ["parameter", "value", "contact_time", "peak_indentation", "tol"]
-        names += [] if math.isnan(self.relaxation_time) else ["relaxation_time"]
+        names += [name for name in (RELAXATION_TIME, "K") if not math.isnan(getattr(self, name))]
         return {name: getattr(self, name) for name in names}
 
     def __str__(self) -> str:
         side = "from" if self.is_least else "up to"
-        damping = f" with {self.damping}" if self.damping else ""
-        contact_time, indentation = quantity(self.contact_time, "s", 4), quantity(self.peak_indentation, "m", 4)
-        relaxation = quantity(self.relaxation_time, "s", 4)
+        # rounded to the side of the values that are enough
+        value = rounded(self.value, SHOWN_DIGITS, up=self.is_least)
+        found = f"{self.parameter} = {quantity(value, self.unit, SHOWN_DIGITS)}"
+        found += f" with {self.companion}" if self.companion else ""
+        contact_time = quantity(self.contact_time, "s", SHOWN_DIGITS)
+        indentation = quantity(self.peak_indentation, "m", SHOWN_DIGITS)
+        relaxation = quantity(self.relaxation_time, "s", SHOWN_DIGITS)
         relaxation = "" if math.isnan(self.relaxation_time) else f", relaxation_time = C/K = {relaxation}"
         return (
             f"at dt = {quantity(self.dt, 's')} every phase is within {number(100.0 * self.tol)} % {side} "
-            f"{self.parameter} = {quantity(self.value, self.unit, 4)}{damping}: contact of {contact_time}, "
-            f"indentation of {indentation}{relaxation}"
+            f"{found}: contact of {contact_time}, indentation of {indentation}{relaxation}"
         )
 
 
@@ -280,7 +290,7 @@ class TimestepResult(Displayed):
         if self.needed is None:
             yield f"no number of steps per contact keeps every phase within {percent}"
         else:
-            steps, dt = self.needed.steps_per_contact, quantity(self.needed.dt, "s")
+            steps, dt = self.needed.steps_per_contact, quantity(rounded(self.needed.dt, 6, up=False), "s")
             yield f"within {percent} at every phase: {steps} steps per contact, dt <= {dt}"
         if self.parameter:
             yield str(self.needed_parameter or missing_parameter(self.parameter, self.tol))
@@ -318,7 +328,7 @@ def timestep(
     phases : number of phases, (i + 1/2)/phases
     tol : relative tolerance for which the smallest number of steps per contact is found
     parameter : a parameter of the law, "K" or "materials.NAME.E", whose value from which on `tol` holds at the
-        only `dt` is found, for a step that cannot be changed
+        only `dt` is found, for a step that cannot be changed; with "drake-sap" and an e also "relaxation_time"
     scheme : its name; by default "drake-tamsi" for the laws of Drake, "kick-drift" for all others
     friction : key of the friction law of an oblique impact; by default the first one of the source, if any
 
@@ -581,6 +591,8 @@ def needed_parameter(
     The law and the collision are those of the point. Where its damping was solved for, e is kept by the damping in
     the contact's own units, which is enough where the law has a single time scale, else by solving again.
     """
+    if name == RELAXATION_TIME:
+        return _needed_relaxation_time(point, plugins, dt, tol, law, collision)
     config, model = point.config, law.model
     e = None if point.solved is None else float(config.scalars["e"])
     unknown, path, value = _seek(config, law, name)
@@ -623,7 +635,7 @@ def needed_parameter(
                 value=value,
                 unit=with_numbers(unknown.unit, {"n": float(law.impact.n[0])}),
                 is_least=slope > 0.0,
-                damping="" if e is None else _named(model, float(changed.scalars[damping_path])),
+                companion="" if e is None else _named(model, float(changed.scalars[damping_path])),
                 dt=dt,
                 contact_time=law.contact_time,
                 peak_indentation=collision["peak_indentation"],
@@ -641,6 +653,40 @@ def needed_parameter(
             return None
         slope = math.log(law.contact_time / before) / logarithm or slope
     return None
+
+
+def _needed_relaxation_time(
+    point: PointWithE,
+    plugins: Plugins,
+    dt: float,
+    tol: float,
+    law: FixedStepLaw,
+    collision: Mapping[str, float],
+) -> NeededParameter | None:
+    """Find the relaxation time of SAP, and the K with which it keeps e, from which it follows."""
+    role = argument("parameter")
+    relaxation_time = _relaxation_time(law)
+    if math.isnan(relaxation_time):
+        command = f"impact timestep --model kelvin-voigt-no-tension --scheme {DRAKE_SAP}"
+        raise UsageError(f"{role}: {RELAXATION_TIME} is C/K of Drake's SAP: {command} finds it")
+    if point.solved is None or relaxation_time == 0.0:
+        raise UsageError(
+            f"{role}: {RELAXATION_TIME} = C/K sets e at a given K, and not the contact time: expected "
+            f"{argument('at', 0.8, key='e')} or another e < 1, which K and {RELAXATION_TIME} together keep"
+        )
+    needed = needed_parameter(point, plugins, "K", dt, tol, law, collision)
+    if needed is None:
+        return None
+    return replace(
+        needed,
+        parameter=RELAXATION_TIME,
+        unit="s",
+        value=needed.relaxation_time,
+        is_least=not needed.is_least,
+        companion=f"K = {quantity(needed.value, needed.unit, 4)}",
+        relaxation_time=math.nan,
+        K=needed.value,
+    )
 
 
 def _relaxation_time(law: FixedStepLaw) -> float:
