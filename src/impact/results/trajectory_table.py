@@ -45,7 +45,7 @@ from ..engine.trajectories import (
 )
 from .attributes import SummaryRecord
 from .schema import attributes_of
-from .slabs import ORIGINAL_DIMS, VARIES_ALONG, aligned_slabs, slabs
+from .slabs import ORIGINAL_DIMS, VARIES_ALONG, slabs
 
 # a law's rule of K is evaluated as a whole, and stored in a file, up to this many values
 MAX_STIFFNESS_VALUES = 10**6
@@ -432,7 +432,7 @@ def expanded_slabs(
             for variable in variables
             if variable.of_friction == of_friction and (variable.per_model or number == 0)
         ]
-        for slab in aligned_slabs(sizes, chunks) if chunks else slabs(sizes):
+        for slab in slabs(sizes, chunks=chunks):
             region = tuple(slab.values())
             index = table.inputs.index(region)
             impacts, arrays = expand(table, number, index, [variable.name for variable in chosen])
