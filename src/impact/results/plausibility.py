@@ -122,5 +122,5 @@ def _depth_summary(dataset: xr.Dataset) -> Summary:
             radius = smaller_radius_at(inputs, inputs.index([slab.get(a.name, slice(1)) for a in inputs.axes]))
             absent = tuple(number for number, axis in enumerate(inputs.axes) if axis.name not in dims)
             values = {"peak_indentation": depth.isel(slab).values}
-            summary.add(values, model, (), radius.squeeze(absent) if inputs.axes else radius, weight)
+            summary.add(values, (model,), (), radius.squeeze(absent) if inputs.axes else radius, weight)
     return summary
