@@ -25,7 +25,7 @@ from ..contact.simulate import CollisionResult
 from ..contact.status import STATUS_OK
 from ..contact.tangential import TangentialResult
 from .build_impacts import build_impacts, build_oblique, fixed_steps_at
-from .inputs import Index, Inputs, dimensions
+from .inputs import Index, Inputs, dimensions, index_of
 
 # cells up to which equal values are found in the whole plan; with more, only within a range of trajectories
 MAX_CELLS = 2**22
@@ -72,6 +72,10 @@ class TrajectoryMap:
     def is_shared(self) -> bool:
         """Whether several cells may take one trajectory."""
         return self.of_cell is not None
+
+    def index_along(self, cells: NDArray[np.intp]) -> dict[int, NDArray[np.intp]]:
+        """Convert cells to indices along each axis on which the values of the law depend."""
+        return dict(zip(self.axes, index_of(cells, self.shape), strict=True))
 
     def rows(self, index: Index) -> NDArray[np.intp]:
         """Look up the trajectories of cells; of length 1 along axes on which they do not depend."""

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Hashable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from functools import cached_property
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -102,15 +102,6 @@ class TrajectoryRows:
         return trajectories
 
 
-class NamedFriction(Protocol):
-    """What outputs depend on of a friction law: a `FrictionLaw`, or what a file stores of it."""
-
-    @property
-    def key(self) -> str: ...
-    @property
-    def kind(self) -> FrictionKind: ...
-
-
 @dataclass(frozen=True)
 class TrajectoryTable:
     """The trajectories of a sweep, with everything else that the outputs depend on.
@@ -119,7 +110,7 @@ class TrajectoryTable:
     maps : of each model, then of the pairs of each model with each friction law
     stiffness : K of each law that has a rule for it but no formula (a law of a file); None otherwise
     summary : of all points, if the file contains one
-    frictions : the friction laws
+    frictions : the kinds of the friction laws by key
     """
 
     inputs: Inputs
@@ -128,7 +119,7 @@ class TrajectoryTable:
     rows: TrajectoryRows
     stiffness: tuple[Stiffness | None, ...]
     summary: SummaryRecord | None = None
-    frictions: tuple[NamedFriction, ...] = ()
+    frictions: Mapping[str, FrictionKind] = field(default_factory=dict)
 
     def numbers(self, of_friction: bool) -> range:
         """The numbers of the maps of the models, or of the pairs."""
@@ -143,7 +134,7 @@ class TrajectoryTable:
     def keys(self, number: int) -> tuple[str, ...]:
         """The key of the model of a map, and that of the friction law of a pair."""
         model, *friction = self.place(number)
-        return (self.laws[model].key, *(self.frictions[law].key for law in friction))
+        return (self.laws[model].key, *([*self.frictions][law] for law in friction))
 
     @cached_property
     def checks(self) -> tuple[frozenset[str], ...]:
@@ -157,7 +148,8 @@ class TrajectoryTable:
 def table_of(plan: Plan, read: Callable[[int, int, int], Record]) -> TrajectoryTable:
     """Build the trajectory table of a plan; for `read` see `TrajectoryRows`."""
     rows, no_rules = TrajectoryRows(plan.maps, read), (None,) * len(plan.models)
-    return TrajectoryTable(plan.inputs, plan.models, plan.maps, rows, no_rules, frictions=plan.frictions)
+    frictions = {friction.key: friction.kind for friction in plan.frictions}
+    return TrajectoryTable(plan.inputs, plan.models, plan.maps, rows, no_rules, frictions=frictions)
 
 
 def table_of_ranges(plan: Plan, load: Callable[[TrajectoryRange], Record]) -> TrajectoryTable:
@@ -181,7 +173,7 @@ def expand(table: TrajectoryTable, number: int, index: Index, names: Sequence[st
     if not friction:
         return impacts, outputs(law, impacts, result, names, checked)
     tangential = table.rows.take(number, table.maps[number].rows(index))
-    of_friction = (build_oblique(table.inputs, impacts, index), tangential, table.frictions[friction[0]].kind)
+    of_friction = (build_oblique(table.inputs, impacts, index), tangential, table.frictions[table.keys(number)[1]])
     return impacts, outputs(law, impacts, result, names, checked, of_friction)
 
 
@@ -211,7 +203,7 @@ def varies_along(table: TrajectoryTable, number: int, names: Sequence[str]) -> d
     collisions, of_friction = blank(CollisionResult, model, Status.MAX_STEPS), None
     if friction:
         tangential = blank(TangentialResult, number, FrictionStatus.MAX_STEPS, FrictionStatus.LIMIT)
-        of_friction = (build_oblique(inputs, impacts, index), tangential, table.frictions[friction[0]].kind)
+        of_friction = (build_oblique(inputs, impacts, index), tangential, table.frictions[table.keys(number)[1]])
     values = outputs(law, impacts, collisions, names, status, of_friction)
     return {name: tuple(sorted(axes_of_arrays([values[name]]))) for name in names}
 
