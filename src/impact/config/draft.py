@@ -157,6 +157,11 @@ class Draft:
         """The selected friction laws, without those that are unknown; none for central impacts."""
         return expand_frictions(self.data["frictions"])[0] if "frictions" in self.data else ()
 
+    @property
+    def laws(self) -> dict[str, Sequence[ForceModel | FrictionLaw]]:
+        """The selected laws by the table of their parameters."""
+        return {"model": self.models, "friction": self.frictions}
+
     @cached_property
     def input_names(self) -> list[str]:
         """The config names of all inputs, whether or not their values are valid."""

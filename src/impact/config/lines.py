@@ -8,7 +8,6 @@ from collections.abc import Iterable, Mapping
 
 from pydantic import ValidationError
 
-from ..contact.frictions import frictions
 from ..contact.model import ForceModel
 from ..errors import did_you_mean
 from ..formatting import safe_text
@@ -25,6 +24,7 @@ from .tables import (
     Solver,
     Sweep,
     law_quantities,
+    laws_of,
 )
 
 MAX_PROBLEM_LINES = 100
@@ -219,14 +219,10 @@ def _unknown_key_hint(location: KeyPath, models: Mapping[str, ForceModel]) -> st
             keys = INPUT_TABLES[table].model_fields
         case ("materials", _):
             keys = MaterialTable.model_fields
-        case ("model",):
-            keys = models
-        case ("model", key):
-            keys = law_quantities(models[str(key)])
-        case ("friction",):
-            keys = frictions()
-        case ("friction", key):
-            keys = law_quantities(frictions()[str(key)])
+        case ("model" | "friction" as table,):
+            keys = laws_of(table, models)
+        case ("model" | "friction" as table, key):
+            keys = law_quantities(laws_of(table, models)[str(key)])
         case (table, *_):
             keys = vars(Solver() if table == "solver" else Output())
     return did_you_mean(name, list(keys), KEY_SYNONYMS)

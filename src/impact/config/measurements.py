@@ -438,7 +438,7 @@ def add_fits(draft: Draft) -> Draft:
     uses_e |= any(law.may_use_e for law in draft.frictions)
     has_e = not {"e", "alpha"}.isdisjoint({*draft.table("sweep"), *as_table(draft.table("data").get("columns"))})
     paths: list[KeyPath] = [("sweep", "e")] if uses_e and not has_e else []
-    for laws, table in ((draft.models, "model"), (draft.frictions, "friction")):
+    for table, laws in draft.laws.items():
         paths += [
             (table, law.key, parameter.name)
             for law in laws

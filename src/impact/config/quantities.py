@@ -473,10 +473,12 @@ class Quantity:
 
     def allows(self, value: float) -> bool:
         """Check whether a number is allowed."""
-        if math.isinf(value) and not self.infinite:
-            return False
-        above = self.least < value if self.above else self.least <= value
-        return above and (value < self.most if self.below else value <= self.most)
+        return bool(self.contains(value)) and (self.infinite or not math.isinf(value))
+
+    def contains(self, values: Any) -> Any:
+        """Check whether a number, or each of an array, is in the interval."""
+        above = values > self.least if self.above else values >= self.least
+        return above & (values < self.most if self.below else values <= self.most)
 
     def refusal(self, value: object, number: float) -> str:
         """Say what is wrong with a number that is not allowed; one of radians may be an angle in degrees."""

@@ -215,12 +215,12 @@ def _radius_problems(draft: Draft) -> Iterable[ConfigProblem]:
 
 def _parameter_problems(draft: Draft) -> Iterable[ConfigProblem]:
     """Check that parameters without a default are set."""
-    for model in draft.models:
-        table = as_table(draft.table("model").get(model.key))
-        for parameter in model.parameters:
-            if parameter.default is None and parameter.name not in table:
-                message = _missing(law_quantities(model)[parameter.name])
-                yield ("model", model.key, parameter.name), message + _exclusion_hint(draft, model)
+    for table, law in ((table, law) for table, laws in draft.laws.items() for law in laws):
+        given = as_table(draft.table(table).get(law.key))
+        hint = _exclusion_hint(draft, law) if isinstance(law, ForceModel) else ""
+        for parameter in law.parameters:
+            if parameter.default is None and not parameter.optional and parameter.name not in given:
+                yield (table, law.key, parameter.name), _missing(law_quantities(law)[parameter.name]) + hint
 
 
 def _fixed_step_problems(draft: Draft) -> Iterable[ConfigProblem]:
@@ -317,9 +317,6 @@ def _friction_problems(draft: Draft) -> Iterable[ConfigProblem]:
         if problem:
             name, _, message = problem.partition(": ")
             yield ("friction", law.key, name), message
-        for parameter in law.parameters:
-            if parameter.default is None and not parameter.optional and parameter.name not in given:
-                yield ("friction", law.key, parameter.name), _missing(law_quantities(law)[parameter.name])
         needed = required_inputs(law, given, exponents)
         if "e" in needed and {"e", "alpha"}.isdisjoint(sweep):
             yield ("sweep", "e"), f"missing, expected e or alpha (used by {law.key}), or other frictions"
