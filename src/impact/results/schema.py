@@ -419,24 +419,22 @@ def foreign_dims(dataset: xr.Dataset, model: str, friction: str = "") -> list[Ha
     return [dim for dim in dataset.dims if is_foreign(columns_along(dataset, dim), model, friction)]
 
 
-def parts_of_models(dataset: xr.Dataset) -> Iterator[xr.Dataset]:
-    """Select each model of a result, at the first position along the parameters of other models."""
-    for model, key in enumerate(dataset["model"].values):
-        first = dict.fromkeys(foreign_dims(dataset, str(key)), slice(0, 1))
-        yield dataset.isel({"model": model, **first})
+def parts_of_laws(dataset: xr.Dataset, dims: Iterable[Hashable]) -> Iterator[tuple[tuple[int, ...], xr.Dataset]]:
+    """Select each model, or each pair, of variables with some dimensions, and its position along those of laws.
 
-
-def parts_of_pairs(dataset: xr.Dataset) -> Iterator[xr.Dataset]:
-    """Select each pair of a result, at the first position along the parameters of other models and frictions."""
-    for model, key in enumerate(dataset["model"].values):
-        for friction, friction_key in enumerate(dataset["friction"].values):
-            first = dict.fromkeys(foreign_dims(dataset, str(key), str(friction_key)), slice(0, 1))
-            yield dataset.isel({"model": model, "friction": friction, **first})
+    Each is at the first position along the parameters of other laws; without the dimension of models it is all.
+    """
+    law_dims = [dim for dim in ("model", "friction") if dim in dims] if "model" in dims else []
+    keys = [dataset[dim].values.tolist() for dim in law_dims]
+    for place in np.ndindex(*map(len, keys)):
+        names = [str(of_dim[position]) for of_dim, position in zip(keys, place, strict=True)]
+        first = dict.fromkeys(foreign_dims(dataset, *names), slice(0, 1)) if names else {}
+        yield place, dataset.isel({**dict(zip(law_dims, place, strict=True)), **first})
 
 
 def count_points(dataset: xr.Dataset) -> int:
     """Count the points of a result: cells for a model, without repetitions along parameters of other laws."""
-    sizes = [part.sizes for part in parts_of_models(dataset)] if "model" in dataset.dims else [dataset.sizes]
+    sizes = [part.sizes for _, part in parts_of_laws(dataset, {"model"} & {*dataset.dims})]
     return sum(math.prod(size for dim, size in of_model.items() if dim != "friction") for of_model in sizes)
 
 

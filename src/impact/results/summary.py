@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..contact.status import FIRST_FAILURE, FrictionStatus, Status
 from .attributes import SummaryRecord
-from .schema import parts_of_models, parts_of_pairs
+from .schema import parts_of_laws
 from .slabs import MAX_SUMMARY_POINTS, distinct_points, is_computed, slabs
 from .trajectory_table import ExpandedSlab, TrajectoryTable, computed_array, expand
 
@@ -170,11 +170,10 @@ def summarize(
     ):
         return _stored_summary(record, dataset, names, max_failed_at)
     summary = Summary(max_failed_at=max_failed_at)
-    laws = [((model,), part, names) for model, part in enumerate(parts_of_models(dataset))]
+    parts = [(names, law) for law in parts_of_laws(dataset, ["model"])]
     if "friction_status" in dataset:
-        pairs = np.ndindex(dataset.sizes["model"], dataset.sizes["friction"])
-        laws += [(p, part, ["friction_status"]) for p, part in zip(pairs, parts_of_pairs(dataset), strict=True)]
-    for place, part, names_of_law in laws:
+        parts += [(["friction_status"], law) for law in parts_of_laws(dataset, ["model", "friction"])]
+    for names_of_law, (place, part) in parts:
         for name in names_of_law:
             variable, weight = distinct_points(part, name)
             if variable.size <= max_points or not is_computed(variable):
@@ -225,9 +224,7 @@ def extremes_of(dataset: xr.Dataset, name: str) -> Extremes | None:
 
 def _distinct_parts(dataset: xr.Dataset, name: str) -> list[tuple[xr.Variable, int]] | None:
     """List the distinct points of a variable of each model, and their weights; None if they are too many."""
-    dims = dataset.variables[name].dims
-    laws = parts_of_pairs if "friction" in dims else parts_of_models
-    parts = [distinct_points(part, name) for part in (laws(dataset) if "model" in dims else (dataset,))]
+    parts = [distinct_points(part, name) for _, part in parts_of_laws(dataset, dataset.variables[name].dims)]
     evaluations = sum(variable.size for variable, _ in parts)
     return None if evaluations > MAX_SUMMARY_POINTS and is_computed(dataset.variables[name]) else parts
 
@@ -241,10 +238,9 @@ def summarize_table(dataset: xr.Dataset, table: TrajectoryTable) -> tuple[Summar
     for name in map(str, dataset.data_vars):
         parts = _distinct_parts(dataset, name)
         extremes[name] = None if parts is None else Extremes()
-        of_friction = "friction" in dataset[name].dims
-        laws = parts_of_pairs if of_friction else parts_of_models
-        distinct = parts or [distinct_points(part, name) for part in laws(dataset)]
-        for model, (variable, weight) in enumerate(distinct, len(table.laws) if of_friction else 0):
+        dims = dataset[name].dims
+        distinct = parts or [distinct_points(part, name) for _, part in parts_of_laws(dataset, {"model", *dims})]
+        for model, (variable, weight) in enumerate(distinct, len(table.laws) if "friction" in dims else 0):
             is_judged = name in ("status", "friction_status", *ERROR_VARIABLES)
             if parts is not None or (is_judged and variable.size <= MAX_SUMMARY_POINTS):
                 sizes = tuple(variable.sizes[axis] for axis in axes)
