@@ -88,11 +88,7 @@ def draw_columns(
 ) -> tuple[dict[str, Array], dict[str, str]]:
     """Draw the values of each input, and list those that its quantity does not allow; both by config name.
 
-    Parameters
-    ----------
-    distributions : by config name
-    models : all models by key
-    u : samples of the unit cube, shape (n, inputs)
+    The samples of the unit cube have the shape (n, inputs).
     """
     columns: dict[str, Array] = {}
     problems: dict[str, str] = {}
