@@ -100,15 +100,12 @@ def _parse(text: str, loads: Callable[[str], object], language: str, name: str) 
     try:
         return loads(text)
     except RecursionError:
-        line = max(range(1, text.count("\n") + 2), key=_bracket_counts(text).__getitem__)
+        # the line with the most opening brackets
+        brackets = [line.count("[") + line.count("{") for line in text.split("\n")]
+        line = brackets.index(max(brackets)) + 1
         raise ConfigError(f"{name}:{line}: nested too deeply, expected at most {MAX_DEPTH} levels") from None
     except ValueError as error:
         raise ConfigError(f"{name}:{_syntax_error_line(text, language, str(error))}") from None
-
-
-def _bracket_counts(text: str) -> list[int]:
-    """Count the opening brackets of each line from 1: the line with the most is taken as nested too deeply."""
-    return [0, *(line.count("[") + line.count("{") for line in text.split("\n"))]
 
 
 def _syntax_error_line(text: str, language: str, message: str) -> str:

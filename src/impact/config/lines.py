@@ -41,14 +41,6 @@ INPUT_TABLES: Mapping[str, type[quantities.Table]] = {"sweep": Sweep, "data": Da
 KEY_SYNONYMS = {
     "restitution": "e",
     "cor": "e",
-    "mass1": "m1",
-    "mass2": "m2",
-    "speed1": "v1",
-    "speed2": "v2",
-    "velocity1": "v1",
-    "velocity2": "v2",
-    "radius1": "R1",
-    "radius2": "R2",
     "stiffness": "K",
     "exponent": "n",
     "youngs_modulus": "E",
@@ -58,11 +50,16 @@ KEY_SYNONYMS = {
     "friction": "mu",
     "friction_coefficient": "mu",
     "impact_angle": "angle",
-    "spin1": "omega1",
-    "spin2": "omega2",
-    "tangential_velocity1": "u1",
-    "tangential_velocity2": "u2",
 }
+WORDS_OF_BALLS = {
+    "mass": "m",
+    "speed": "v",
+    "velocity": "v",
+    "radius": "R",
+    "spin": "omega",
+    "tangential_velocity": "u",
+}
+KEY_SYNONYMS |= {f"{word}{ball}": f"{key}{ball}" for word, key in WORDS_OF_BALLS.items() for ball in "12"}
 
 BARE_KEY = r"[A-Za-z0-9_-]++"
 TOML_TOKEN = re.compile(

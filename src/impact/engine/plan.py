@@ -160,6 +160,12 @@ class Plan:
         return self.inputs.shape
 
     @property
+    def sizes(self) -> dict[str, int]:
+        """Sizes of the dimensions of the result."""
+        laws = {"model": len(self.models), **({"friction": len(self.frictions)} if self.frictions else {})}
+        return laws | {axis.name: axis.size for axis in self.config.axes}
+
+    @property
     def points(self) -> int:
         """Points of all models; the axes of parameters of other models and of friction laws do not count."""
         return sum(self.inputs.points_of(model.key) for model in self.models)

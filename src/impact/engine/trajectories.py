@@ -18,7 +18,7 @@ from ..contact.deduplicate import deduplicate
 from ..contact.dimensionless import dimensionless_values, exponent_names
 from ..contact.friction import Pair, check_friction, friction_values
 from ..contact.frictions.multibody_codes import MUJOCO_ELLIPTIC
-from ..contact.impacts import CHECKS, check_inputs
+from ..contact.impacts import CHECKS, Impacts, check_inputs
 from ..contact.model import ForceModel
 from ..contact.records import Record
 from ..contact.simulate import CollisionResult
@@ -207,14 +207,15 @@ def axes_of_arrays(arrays: Iterable[NDArray[Any]]) -> frozenset[int]:
 
 def axes_of_checks(inputs: Inputs, model: ForceModel) -> Mapping[str, frozenset[int]]:
     """Find the axes on which each check of `check_inputs` depends."""
-    impacts = build_impacts(inputs, model, _probe_index(inputs, model))
+    arrays = checked_arrays(build_impacts(inputs, model, _probe_index(inputs, model)))
+    return {check: axes_of_arrays(arrays[check]) for check in CHECKS}
+
+
+def checked_arrays(impacts: Impacts) -> Mapping[str, list[NDArray[Any]]]:
+    """List the arrays on which each check of `check_inputs` depends."""
     with np.errstate(all="ignore"):
-        checked_arrays = {
-            "e": [impacts.e],
-            "v0": [impacts.v0],
-            "length": [impacts.length, impacts.energy, impacts.time],
-        }
-    return {check: axes_of_arrays(checked_arrays[check]) for check in CHECKS}
+        scales = [impacts.v0, impacts.length, impacts.energy, impacts.time]
+    return {"e": [impacts.e], "v0": [impacts.v0], "length": scales}
 
 
 def _probe_index(inputs: Inputs, law: PlanLaw) -> Index:

@@ -325,6 +325,11 @@ def worst_by_model(summary: Summary, dataset: xr.Dataset) -> dict[str, dict[str,
     }
 
 
+def counts_text(counts: Mapping[Any, int]) -> str:
+    """Write the number of points by status."""
+    return ", ".join(f"{count:,} {name}" for name, count in counts_by_name(counts).items())
+
+
 def counts_by_name(counts: Mapping[Any, int]) -> dict[str, int]:
     """Count by the names of the statuses, in their order."""
     return {status.name.lower(): counts[status] for status in sorted(counts)}

@@ -40,6 +40,7 @@ from ..engine.trajectories import (
     TrajectoryMap,
     TrajectoryRange,
     axes_of_arrays,
+    checked_arrays,
     even_size,
     probe_index,
 )
@@ -185,13 +186,8 @@ def varies_along(table: TrajectoryTable, number: int, names: Sequence[str]) -> d
     index = probe_index(inputs, {"n"})
     impacts = build_impacts(inputs, law, index, table.stiffness[model])
     # assume that every check that may fail does, so that the masks have all axes that they may have
-    with np.errstate(all="ignore"):
-        checked_arrays = {
-            "e": [impacts.e],
-            "v0": [impacts.v0],
-            "length": [impacts.v0, impacts.length, impacts.energy, impacts.time],
-        }
-    shapes = [array.shape for check in table.checks[model] for array in checked_arrays[check]]
+    arrays = checked_arrays(impacts)
+    shapes = [array.shape for check in table.checks[model] for array in arrays[check]]
     checked = np.broadcast_shapes((1,) * dimensions(index), *shapes)
     status = _alternating_statuses(checked, Status.NO_IMPACT, Status.OUT_OF_RANGE)
 
