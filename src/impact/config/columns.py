@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import csv
 import io
-import math
 import re
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
@@ -118,9 +117,11 @@ class Columns:
     ) -> tuple[Sequence[Any], Sequence[tuple[int | None, str]]]:
         """Convert a column, whose header may lack `unit`, and list problems: of a cell, or None for the header."""
         unit = self.units.get(column) or unit
-        expected = unit_expected(quantity, unit, n)
-        if expected:
-            return [], [(None, f"got [{safe_text(unit)}], expected {expected}")]
+        try:
+            if quantity is not None and unit:
+                quantity.factor(unit, n)
+        except UnitError as error:
+            return [], [(None, f"got [{safe_text(unit)}], expected {error}")]
         return read_cells(self.cells[column], quantity, n, unit, is_text=self.is_text)
 
     def values(self, column: str, quantity: Quantity | None, n: float | None, unit: str = "") -> list[Any]:
@@ -182,16 +183,6 @@ def _read_cell(
                 alone = f"a number without a unit: the column is in {safe_text(unit)}"
                 raise mismatch_error(cell, alone if has_own else quantity.expected) from None
     return quantity.read(f"{cell} {unit}" if unit else number, n)
-
-
-def unit_expected(quantity: Quantity | None, unit: str, n: float | None = math.nan) -> str:
-    """Describe the units that a quantity may have; empty if `unit` is one of them."""
-    try:
-        if quantity is not None and unit:
-            quantity.factor(unit, n)
-    except UnitError as error:
-        return str(error)
-    return ""
 
 
 def read_csv(

@@ -6,14 +6,11 @@ Each step from the source to a `Config` takes a draft and returns a new one; see
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
-
-from pydantic_core import PydanticCustomError
 
 from ..contact.friction import FrictionLaw
 from ..contact.model import ForceModel
@@ -142,10 +139,7 @@ class Draft:
         is_measured = self.measurements is not None and "n" in self.measurements.inputs
         if is_measured or isinstance(n, list | dict) or "n" in as_table(self.table("sweep").get("cases")):
             return None
-        try:
-            return SWEEP_QUANTITIES["n"].read(n)
-        except PydanticCustomError:
-            return math.nan
+        return SWEEP_QUANTITIES["n"].read_or_nan(n)
 
     @cached_property
     def models(self) -> Sequence[ForceModel]:

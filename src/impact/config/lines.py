@@ -35,8 +35,13 @@ EXPECTED_BY_KEY = {
     **{name: str(info.description) for name, info in Column.model_fields.items()},
     "n": f"the number of {Design.model_fields['n'].description}, such as 1024",
 }
-# tables of inputs
-INPUT_TABLES: Mapping[str, type[quantities.Table]] = {"sweep": Sweep, "data": Data, "design": Design}
+KEYS_BY_TABLE: Mapping[str, Iterable[str]] = {
+    "sweep": Sweep.model_fields,
+    "data": Data.model_fields,
+    "design": Design.model_fields,
+    "solver": vars(Solver()),
+    "output": vars(Output()),
+}
 # other words that users may write for a key
 KEY_SYNONYMS = {
     "restitution": "e",
@@ -212,8 +217,6 @@ def _unknown_key_hint(location: KeyPath, models: Mapping[str, ForceModel]) -> st
             keys = Column.model_fields
         case ():
             keys = Document.model_fields
-        case ("sweep" | "data" | "design" as table,):
-            keys = INPUT_TABLES[table].model_fields
         case ("materials", _):
             keys = MaterialTable.model_fields
         case ("model" | "friction" as table,):
@@ -221,5 +224,5 @@ def _unknown_key_hint(location: KeyPath, models: Mapping[str, ForceModel]) -> st
         case ("model" | "friction" as table, key):
             keys = law_quantities(laws_of(table, models)[str(key)])
         case (table, *_):
-            keys = vars(Solver() if table == "solver" else Output())
+            keys = KEYS_BY_TABLE[str(table)]
     return did_you_mean(name, list(keys), KEY_SYNONYMS)

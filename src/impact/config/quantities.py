@@ -536,6 +536,13 @@ class Quantity:
         # -0.0 becomes 0.0: they are one value with one label
         return number + 0.0
 
+    def read_or_nan(self, value: object) -> float:
+        """Call `read`; NaN for an invalid value, which the validation of its table reports."""
+        try:
+            return self.read(value)
+        except PydanticCustomError:
+            return math.nan
+
     def _with_unit(self, text: str, n: float | None) -> float:
         if len(text) > MAX_UNIT_LENGTH:
             raise mismatch_error(text, f"at most {MAX_UNIT_LENGTH} characters")

@@ -6,8 +6,6 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
-from pydantic_core import PydanticCustomError
-
 from ..contact.dimensionless import required_quantities
 from ..contact.fixed_step import EXACT, SCHEMES, friction_problem, has_scheme, law_problem
 from ..contact.formula_calls import argument_names
@@ -83,13 +81,7 @@ def _numbers(draft: Draft, name: str) -> Sequence[float]:
     if draft.measurements is not None and name in draft.measurements.inputs:
         return draft.measurements.inputs[name]
     value = draft.table("sweep").get(name, [])
-    numbers = []
-    for element in value if isinstance(value, list) else [value]:
-        try:
-            numbers.append(SWEEP_QUANTITIES[name].read(element))
-        except PydanticCustomError:
-            numbers.append(math.nan)
-    return numbers
+    return [SWEEP_QUANTITIES[name].read_or_nan(each) for each in (value if isinstance(value, list) else [value])]
 
 
 def check_rules(draft: Draft) -> Draft:
