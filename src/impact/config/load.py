@@ -102,15 +102,13 @@ def parse_config(
     overrides: Overrides = (),
     plugins: Sequence[ForceModel] = (),
     name: str = "<text>",
-    max_points: int = MAX_POINTS,
     purpose: Purpose = "sweep",
 ) -> Config:
     """Read the config of a TOML text, or of a JSON text, which starts with a brace; see `read_config`.
 
     No file is read, because the text may come from a result of unknown origin.
     """
-    draft = open_text(text, name, plugins).with_settings(settings_of(overrides))
-    return build(draft, max_points, purpose)
+    return build(open_text(text, name, plugins).with_settings(settings_of(overrides)), purpose=purpose)
 
 
 def build(draft: Draft, max_points: int = MAX_POINTS, purpose: Purpose = "sweep") -> Config:

@@ -148,26 +148,18 @@ def add_slab(summary: Summary, table: TrajectoryTable, slab: ExpandedSlab) -> No
     summary.add(counted, slab.place, [part.start for part in slab.region], radius)
 
 
-def summarize(
-    dataset: xr.Dataset, max_failed_at: int = MAX_FAILED_AT, max_points: float = MAX_SUMMARY_POINTS
-) -> Summary:
+def summarize(dataset: xr.Dataset, max_failed_at: int = MAX_FAILED_AT) -> Summary:
     """Summarize a result of any size.
 
     Each variable is evaluated over the axes along which it varies, one model after another, and each of its points
-    counts as often as it occurs. A computed variable that varies over more than `max_points` points of a model is
+    counts as often as it occurs. A computed variable that varies over more than MAX_SUMMARY_POINTS of a model is
     not evaluated: the error is then missing from `worst`, or the points are `not_counted`. The first distinct
     failed points in C order are recorded, at the first position along each axis on which the status is constant.
     """
     names = [name for name in ("status", *ERROR_VARIABLES) if name in dataset]
     record = _common_record(dataset, names)
-    if (
-        record is not None
-        and max_points == MAX_SUMMARY_POINTS
-        and (
-            # it lists all failures, or as many as required
-            len(record.failed_at) < MAX_FAILED_AT or max_failed_at <= MAX_FAILED_AT
-        )
-    ):
+    # it lists all failures, or as many as required
+    if record is not None and (len(record.failed_at) < MAX_FAILED_AT or max_failed_at <= MAX_FAILED_AT):
         return _stored_summary(record, dataset, names, max_failed_at)
     summary = Summary(max_failed_at=max_failed_at)
     parts = [(names, law) for law in parts_of_laws(dataset, ["model"])]
@@ -176,7 +168,7 @@ def summarize(
     for names_of_law, (place, part) in parts:
         for name in names_of_law:
             variable, weight = distinct_points(part, name)
-            if variable.size <= max_points or not is_computed(variable):
+            if variable.size <= MAX_SUMMARY_POINTS or not is_computed(variable):
                 for slab in slabs(variable.sizes):
                     start = [slab[dim].start for dim in variable.dims]
                     summary.add({name: variable.isel(slab).values}, place, start, weight=weight)
