@@ -43,15 +43,11 @@ def unit_samples(design: Design, dimensions: int) -> Array:
     from scipy.stats import qmc
 
     random = np.random.default_rng(design.seed)
-    match design.method:
-        case "sobol":
-            samples = qmc.Sobol(dimensions, rng=random).random(design.n)
-        case "lhs":
-            samples = qmc.LatinHypercube(dimensions, rng=random).random(design.n)
-        case "halton":
-            samples = qmc.Halton(dimensions, rng=random).random(design.n)
-        case _:
-            samples = random.random((design.n, dimensions))
+    engines = {"sobol": qmc.Sobol, "lhs": qmc.LatinHypercube, "halton": qmc.Halton}
+    if design.method in engines:
+        samples: Array = engines[design.method](dimensions, rng=random).random(design.n)
+    else:
+        samples = random.random((design.n, dimensions))
     return np.clip(samples, LEAST_UNIT, 1.0 - LEAST_UNIT)
 
 

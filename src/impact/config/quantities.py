@@ -265,7 +265,7 @@ class _OneForm(Table):
 
 
 class Range(_OneForm):
-    """A range, which is counted before it is written out: exactly one of its fields is given."""
+    """A range of numpy, which is counted before it is written out: exactly one of its fields is given."""
 
     FORMS = RANGE_FORMS
     EXPECTED = f"one of {', '.join(f'{name} = {form}' for name, form in RANGE_FORMS.items())}"
@@ -303,15 +303,9 @@ class Range(_OneForm):
 
     def values(self, quantity: Quantity) -> tuple[float, ...]:
         """List the values; those between the ends are rounded to 15 significant digits, so that 0.3 is 0.3."""
-        first, last, step_or_count = self.numbers
+        first, last, _ = self.numbers
         with np.errstate(all="ignore"):
-            match self.kind:
-                case "linspace":
-                    values = np.linspace(first, last, int(step_or_count))
-                case "geomspace":
-                    values = np.geomspace(first, last, int(step_or_count))
-                case _:
-                    values = np.arange(first, last, step_or_count)
+            values = getattr(np, self.kind)(*self.numbers)
         if not np.isfinite(values).all():
             raise self._error(f"got {first:g} to {last:g}, expected a range that does not overflow")
         # the ends are kept as they were written
