@@ -242,14 +242,9 @@ def _oblique_problems(draft: Draft) -> Iterable[ConfigProblem]:
     sweep = draft.table("sweep")
     if "frictions" not in draft.data:
         expected = 'expected frictions as well, such as frictions = ["coulomb-1785"]'
-        yield from (
-            (("sweep", name), f"set without a friction law, {expected}")
-            for name in OBLIQUE_INPUTS
-            if name in sweep
-        )
-        yield from (
-            (("friction", key), f"set without a friction law, {expected}") for key in draft.table("friction")
-        )
+        inputs = [("sweep", name) for name in OBLIQUE_INPUTS if name in sweep]
+        parameters = [("friction", key) for key in draft.table("friction")]
+        yield from ((path, f"set without a friction law, {expected}") for path in (*inputs, *parameters))
         return
     if "mu" not in sweep:
         yield ("sweep", "mu"), _missing(SWEEP_QUANTITIES["mu"])
