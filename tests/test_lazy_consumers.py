@@ -17,6 +17,7 @@ from impact.plots.draw import get_plot_data
 from impact.plots.kinds import KINDS, Choice, find_kind
 from impact.plots.slices import MAX_DRAWN
 from impact.reporting.figures import iterate_choices
+from impact.results import summary
 from impact.results.slabs import SLAB_POINTS, distinct_points, slabs, varying_dims
 from impact.results.summary import extremes_of, summarize
 
@@ -159,7 +160,7 @@ def test_the_summary_of_all_points_is_that_of_the_different_points(
 
 
 def test_variables_with_too_many_different_points_are_not_evaluated(
-    small: xr.Dataset, capsys: pytest.CaptureFixture[str]
+    small: xr.Dataset, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     many, axes = ["m1", "m2"], ["model,", "e,", "v2,", "m1,", "m2,", "K"]
     # the figures of the report are over e and v2
@@ -181,7 +182,8 @@ def test_variables_with_too_many_different_points_are_not_evaluated(
     # v2 = 2 m/s is no impact; the figures are at a point of a coarse grid
     assert {choice.sel["v2"] for choice in choices if "v2" in choice.sel} == {0.0}
     assert reads.total["status"] < 2**23
-    assert summarize(stretched(small, {"m1": BIG["m1"]}, added={"status": ["m1"]})[0], max_points=10).not_counted
+    monkeypatch.setattr(summary, "MAX_SUMMARY_POINTS", 10)
+    assert summarize(stretched(small, {"m1": BIG["m1"]}, added={"status": ["m1"]})[0]).not_counted
 
 
 def test_info_reads_only_the_different_points(

@@ -195,7 +195,7 @@ def _slabs(name: str, aligned: Alignment, region: Region) -> Iterator[dict[str, 
     variable = aligned.baseline.dataset.variables[name]
     chunks = dict(zip(variable.dims, variable.encoding.get("chunksizes") or (), strict=False))
     if slabs.is_lazy(variable) and chunks and math.prod(chunks.values()) <= slabs.SLAB_POINTS:
-        parts = slabs.aligned_slabs(sizes, [chunks.get(dim, 1) for dim in sizes])
+        parts = slabs.slabs(sizes, chunks=[chunks.get(dim, 1) for dim in sizes])
     else:
         parts = slabs.slabs(sizes)
     for slab in parts:

@@ -6,9 +6,9 @@ The values of a file replace its name in a config, and are stored with it as an 
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import io
-import math
 import re
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
@@ -55,8 +55,6 @@ FILE_KEYS = {"file", "separator", "decimal"}
 # what cells without a value contain
 MISSING = ("", "na", "n/a", "nan", "none", "null", "<na>")
 
-# the quantity of a column by its name, None for names of materials; KeyError for an unknown name
-QuantityOf = Callable[[str], Quantity | None]
 # values in SI units or names of materials, and problems: the index of a cell and a message
 Cells = tuple[list[float | str], list[tuple[int, str]]]
 
@@ -119,9 +117,11 @@ class Columns:
     ) -> tuple[Sequence[Any], Sequence[tuple[int | None, str]]]:
         """Convert a column, whose header may lack `unit`, and list problems: of a cell, or None for the header."""
         unit = self.units.get(column) or unit
-        expected = unit_expected(quantity, unit, n)
-        if expected:
-            return [], [(None, f"got [{safe_text(unit)}], expected {expected}")]
+        try:
+            if quantity is not None and unit:
+                quantity.factor(unit, n)
+        except UnitError as error:
+            return [], [(None, f"got [{safe_text(unit)}], expected {error}")]
         return read_cells(self.cells[column], quantity, n, unit, is_text=self.is_text)
 
     def values(self, column: str, quantity: Quantity | None, n: float | None, unit: str = "") -> list[Any]:
@@ -185,32 +185,18 @@ def _read_cell(
     return quantity.read(f"{cell} {unit}" if unit else number, n)
 
 
-def unit_expected(quantity: Quantity | None, unit: str, n: float | None = math.nan) -> str:
-    """Describe the units that a quantity may have; empty if `unit` is one of them."""
-    try:
-        if quantity is not None and unit:
-            quantity.factor(unit, n)
-    except UnitError as error:
-        return str(error)
-    return ""
-
-
 def read_csv(
-    path: Path, quantity_of: QuantityOf, *, form: CsvForm = CsvForm(), wanted: Collection[str] | None = None
+    path: Path,
+    is_known: Callable[[str], bool],
+    *,
+    form: CsvForm = CsvForm(),
+    wanted: Collection[str] | None = None,
 ) -> Columns:
     """Read the columns of a CSV file, whose first line has their names and their units.
 
-    Parameters
-    ----------
-    path : the file, in UTF-8; blank lines, and lines that begin with #, have no meaning
-    quantity_of : some names are known to it, unless `wanted` is given
-    form : the separator and the decimal sign; those that it leaves open are recognised
-    wanted : further names that are looked for
-
-    Raises
-    ------
-    ConfigError : the file cannot be read, is no CSV, or may be read in two ways; with nothing of the content of a
-        file in which no name is known
+    Blank lines, and lines that begin with #, have no meaning. What the form leaves open is recognised. Unless
+    further names are `wanted`, some name has to be known. A ConfigError shows nothing of the content of a file in
+    which no name is.
     """
     text = io.StringIO(read_text(path, "CSV", MAX_CSV_BYTES), newline=None)
     numbered = [(n, line) for n, line in enumerate(text, 1) if line.strip() and not line.lstrip().startswith("#")]
@@ -225,7 +211,7 @@ def read_csv(
 
     def is_looked_for(header: str) -> bool:
         name, _ = split_header(header)
-        return name in looked_for or header in looked_for or _is_known(name, quantity_of)
+        return name in looked_for or header in looked_for or is_known(name)
 
     mark = form.separator or _find_separator(path, numbered, is_looked_for)
     try:
@@ -235,14 +221,14 @@ def read_csv(
     (first, headers), *_ = rows.items()
     del rows[first]
     names = [split_header(text) for text in headers]
-    is_known = any(_is_known(name, quantity_of) for name, _ in names)
-    if not is_known and wanted is None:
+    has_known = any(is_known(name) for name, _ in names)
+    if not has_known and wanted is None:
         expected = "names of inputs or outputs, such as v1 [m/s] or e_out"
         raise ConfigError(f"{path}:{first}: got no known column, expected {expected}")
     problems = _length_problems(path, rows, len(headers), mark)
     for name, count in Counter(name for name, _ in names if name).items():
         if count > 1:
-            got = f"{as_text(name) if is_known else 'a name'} {'twice' if count == 2 else f'{count} times'}"
+            got = f"{as_text(name) if has_known else 'a name'} {'twice' if count == 2 else f'{count} times'}"
             problems.append(f"{path}:{first}: got {got}, expected each column once")
     if problems:
         raise ConfigError(*problems[:MAX_PROBLEMS])
@@ -254,7 +240,7 @@ def read_csv(
         if name or any(column):
             label = name or f"column {position}"
             units[label], cells[label] = unit, list(column)
-    columns = Columns(str(path), first, list(rows), units, cells, is_known)
+    columns = Columns(str(path), first, list(rows), units, cells, has_known)
     return _with_decimal_points(columns, form.decimal, [name for name in units if is_looked_for(name)])
 
 
@@ -347,14 +333,6 @@ def split_header(text: str) -> tuple[str, str]:
     if unit.lower() in ("%", "percent", "per cent", "pct"):
         unit = "%"
     return match[1], "" if unit in ("-", "1") else unit
-
-
-def _is_known(column: str, quantity_of: QuantityOf) -> bool:
-    try:
-        quantity_of(column)
-    except KeyError:
-        return False
-    return True
 
 
 def near_miss(header: str, known: Iterable[str]) -> str:
@@ -462,14 +440,13 @@ def read_csv_of(
     if draft.folder is None:
         raise ConfigError(f"{file}: not read; a stored config contains values, not file names")
 
-    def quantity_of(name: str) -> Quantity | None:
-        if name in OUTPUTS:
-            return Quantity(OUTPUTS[name].unit, "")
-        if name in LABORATORY:
-            return LABORATORY[name][0]
-        return InputName.parse(name).quantity(draft.known_models)
+    def is_known(name: str) -> bool:
+        with contextlib.suppress(KeyError):
+            InputName.parse(name).quantity(draft.known_models)
+            return True
+        return name in OUTPUTS or name in LABORATORY
 
-    return read_csv(draft.folder / file, quantity_of, form=form, wanted=wanted)
+    return read_csv(draft.folder / file, is_known, form=form, wanted=wanted)
 
 
 def csv_form(table: Mapping[Any, Any]) -> CsvForm:
@@ -496,7 +473,9 @@ def read_files(draft: Draft) -> tuple[dict[KeyPath, object], list[ConfigError], 
     for name, file, column, form in _file_columns(draft.data):
         try:
             columns = open_csv(file, form, () if column is None else (column,))
-            found, unit = _find_column(columns, str(name) if column is None else column, is_only=column is None)
+            # the single column of a file that names none may have any name
+            is_single = column is None and len(columns.units) == 1
+            found, unit = columns.find(next(iter(columns.units)) if is_single else column or str(name))
             list_of_values = columns.values(found, name.quantity(draft.known_models), draft.exponent, unit)
             values[name.path] = list_of_values if column is not None else {"empirical": list_of_values}
         except ConfigError as error:
@@ -504,13 +483,6 @@ def read_files(draft: Draft) -> tuple[dict[KeyPath, object], list[ConfigError], 
         except KeyError:
             continue  # an unknown key is reported with the others
     return values, errors, list(notes)
-
-
-def _find_column(columns: Columns, name: str, *, is_only: bool) -> tuple[str, str]:
-    """Find a column by its name; with `is_only`, the single column of a file may have any name."""
-    if is_only and len(columns.units) == 1:
-        return next(iter(columns.units.items()))
-    return columns.find(name)
 
 
 def _read_cases(columns: Columns, draft: Draft) -> tuple[dict[str, list[float | str]], tuple[str, ...]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -43,15 +43,11 @@ def unit_samples(design: Design, dimensions: int) -> Array:
     from scipy.stats import qmc
 
     random = np.random.default_rng(design.seed)
-    match design.method:
-        case "sobol":
-            samples = qmc.Sobol(dimensions, rng=random).random(design.n)
-        case "lhs":
-            samples = qmc.LatinHypercube(dimensions, rng=random).random(design.n)
-        case "halton":
-            samples = qmc.Halton(dimensions, rng=random).random(design.n)
-        case _:
-            samples = random.random((design.n, dimensions))
+    engines = {"sobol": qmc.Sobol, "lhs": qmc.LatinHypercube, "halton": qmc.Halton}
+    if design.method in engines:
+        samples: Array = engines[design.method](dimensions, rng=random).random(design.n)
+    else:
+        samples = random.random((design.n, dimensions))
     return np.clip(samples, LEAST_UNIT, 1.0 - LEAST_UNIT)
 
 
@@ -63,33 +59,24 @@ def draw(distribution: Distribution, u: Array) -> Array:
     >>> draw(Distribution(empirical=(3.0, 1.0)), np.array([0.2, 0.7])).tolist()
     [1.0, 3.0]
     """
-    numbers = [float(number) for number in distribution.parameters]
-    with np.errstate(all="ignore"):
-        drawn = _draw(distribution.kind, numbers, u)
-    # -0.0 becomes 0.0
-    return drawn + 0.0
-
-
-def _draw(kind: str, numbers: Sequence[float], u: Array) -> Array:
     from scipy import stats
 
-    match kind:
-        case "uniform":
-            least, most = numbers
-            drawn = stats.uniform(least, most - least).ppf(u)
-        case "normal":
-            mean, deviation = numbers
-            drawn = stats.norm(mean, deviation).ppf(u)
-        case "lognormal":
-            median, ratio = numbers
-            drawn = stats.lognorm(math.log(ratio), scale=median).ppf(u)
-        case "triangular":
-            least, mode, most = numbers
-            width = most - least
-            drawn = stats.triang((mode - least) / width, least, width).ppf(u)
-        case _:
-            drawn = np.quantile(numbers, u, method="inverted_cdf")
-    return np.asarray(drawn)
+    numbers = [float(number) for number in distribution.parameters]
+    with np.errstate(all="ignore"):
+        match distribution.kind, numbers:
+            case "uniform", [least, most]:
+                drawn = stats.uniform(least, most - least).ppf(u)
+            case "normal", [mean, deviation]:
+                drawn = stats.norm(mean, deviation).ppf(u)
+            case "lognormal", [median, ratio]:
+                drawn = stats.lognorm(math.log(ratio), scale=median).ppf(u)
+            case "triangular", [least, mode, most]:
+                width = most - least
+                drawn = stats.triang((mode - least) / width, least, width).ppf(u)
+            case _:
+                drawn = np.quantile(numbers, u, method="inverted_cdf")
+    # -0.0 becomes 0.0
+    return np.asarray(drawn) + 0.0
 
 
 def draw_columns(
@@ -97,11 +84,7 @@ def draw_columns(
 ) -> tuple[dict[str, Array], dict[str, str]]:
     """Draw the values of each input, and list those that its quantity does not allow; both by config name.
 
-    Parameters
-    ----------
-    distributions : by config name
-    models : all models by key
-    u : samples of the unit cube, shape (n, inputs)
+    The samples of the unit cube have the shape (n, inputs).
     """
     columns: dict[str, Array] = {}
     problems: dict[str, str] = {}
@@ -109,9 +92,7 @@ def draw_columns(
         columns[name] = drawn = draw(distribution, probabilities)
         quantity = InputName.parse(name).quantity(models)
         assert quantity is not None
-        above = drawn > quantity.least if quantity.above else drawn >= quantity.least
-        below = drawn < quantity.most if quantity.below else drawn <= quantity.most
-        refused = drawn[~(above & below & np.isfinite(drawn))]
+        refused = drawn[~(quantity.contains(drawn) & np.isfinite(drawn))]
         if refused.size:
             got = f"{refused.size:,} of {drawn.size:,} samples such as {as_text(float(refused[0]))}"
             problems[name] = f"got {got}, expected a distribution whose values are each {quantity.expected}"

@@ -6,14 +6,11 @@ Each step from the source to a `Config` takes a draft and returns a new one; see
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
-
-from pydantic_core import PydanticCustomError
 
 from ..contact.friction import FrictionLaw
 from ..contact.model import ForceModel
@@ -143,10 +140,7 @@ class Draft:
         is_measured = self.measurements is not None and "n" in self.measurements.inputs
         if is_measured or isinstance(n, list | dict) or "n" in as_table(self.table("sweep").get("cases")):
             return None
-        try:
-            return SWEEP_QUANTITIES["n"].read(n)
-        except PydanticCustomError:
-            return math.nan
+        return SWEEP_QUANTITIES["n"].read_or_nan(n)
 
     @cached_property
     def models(self) -> Sequence[ForceModel]:
@@ -157,6 +151,11 @@ class Draft:
     def frictions(self) -> Sequence[FrictionLaw]:
         """The selected friction laws, without those that are unknown; none for central impacts."""
         return expand_frictions(self.data["frictions"])[0] if "frictions" in self.data else ()
+
+    @property
+    def laws(self) -> dict[str, Sequence[ForceModel | FrictionLaw]]:
+        """The selected laws by the table of their parameters."""
+        return {"model": self.models, "friction": self.frictions}
 
     @cached_property
     def input_names(self) -> list[str]:

@@ -14,7 +14,7 @@ from typing import Any
 
 from pydantic_core import PydanticCustomError
 
-from ..errors import ConfigError, MissingFileError, UsageError
+from ..errors import ConfigError, ImpactError, MissingFileError, UsageError
 from ..formatting import safe_text
 from .lines import BARE_KEY
 from .quantities import ConfigProblem, KeyPath, Quantity, as_text
@@ -45,26 +45,28 @@ def file_hint(path: Path, content: bytes) -> str:
     return ""
 
 
+def read_bytes(path: Path, kind: str, most: int, kind_of_error: type[ImpactError]) -> bytes:
+    """Read the first bytes of a regular file, or raise an error of some kind."""
+    try:
+        if path.is_file() or not path.exists():
+            # of length 0 is also a file of the system such as /proc/kmsg, of which reading might never end
+            with path.open("rb") as file:
+                return file.read(most) if path.stat().st_size else b""
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raised = MissingFileError if isinstance(error, FileNotFoundError) else kind_of_error
+        raise raised(f"{path}: cannot be read: {reason}") from None
+    raise kind_of_error(f"{path}: not a regular file, expected a {kind} file")
+
+
 def read_text(path: Path, kind: str = "TOML", most: int = MAX_CONFIG_BYTES) -> str:
     """Read a regular file of text that is not empty or too large, or raise a ConfigError.
 
     The text is in UTF-8, that of a table also in Windows-1252.
     """
-    name = str(path)
-    try:
-        if path.exists() and not path.is_file():
-            raise ConfigError(f"{name}: not a regular file, expected a {kind} file")
-        # also a file of the system such as /proc/kmsg, of which reading might never end
-        if path.stat().st_size == 0:
-            raise ConfigError(f"{name}: empty, expected a {kind} file")
-        with path.open("rb") as file:
-            content = file.read(most + 1)
-    except ConfigError:
-        raise
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        kind_of_error = MissingFileError if isinstance(error, FileNotFoundError) else ConfigError
-        raise kind_of_error(f"{name}: cannot be read: {reason}") from None
+    name, content = str(path), read_bytes(path, kind, most + 1, ConfigError)
+    if not content:
+        raise ConfigError(f"{name}: empty, expected a {kind} file")
     if content.startswith(RESULT_MAGIC):
         raise ConfigError(f"{name}: {file_hint(path, content)}")
     if len(content) > most:
@@ -98,15 +100,12 @@ def _parse(text: str, loads: Callable[[str], object], language: str, name: str) 
     try:
         return loads(text)
     except RecursionError:
-        line = max(range(1, text.count("\n") + 2), key=_bracket_counts(text).__getitem__)
+        # the line with the most opening brackets
+        brackets = [line.count("[") + line.count("{") for line in text.split("\n")]
+        line = brackets.index(max(brackets)) + 1
         raise ConfigError(f"{name}:{line}: nested too deeply, expected at most {MAX_DEPTH} levels") from None
     except ValueError as error:
         raise ConfigError(f"{name}:{_syntax_error_line(text, language, str(error))}") from None
-
-
-def _bracket_counts(text: str) -> list[int]:
-    """Count the opening brackets of each line from 1: the line with the most is taken as nested too deeply."""
-    return [0, *(line.count("[") + line.count("{") for line in text.split("\n"))]
 
 
 def _syntax_error_line(text: str, language: str, message: str) -> str:

@@ -11,7 +11,7 @@ from ..contact.model import ForceModel
 from ..errors import did_you_mean
 from .files import as_table
 from .quantities import KeyPath, Quantity
-from .tables import MATERIAL_KEYS, MATERIAL_QUANTITIES, SWEEP_QUANTITIES, law_quantities
+from .tables import MATERIAL_KEYS, MATERIAL_QUANTITIES, SWEEP_QUANTITIES, law_quantities, laws_of
 
 # keys of the inputs in [sweep]
 SWEEP_INPUTS = (*SWEEP_QUANTITIES, *MATERIAL_KEYS)
@@ -83,10 +83,8 @@ class InputName:
 
     def quantity(self, models: Mapping[str, ForceModel]) -> Quantity | None:
         """Find its quantity, or None for the name of a material; KeyError for an unknown input."""
-        if self.table == "model":
-            return law_quantities(models[self.owner])[self.key]
-        if self.table == "friction":
-            return law_quantities(frictions()[self.owner])[self.key]
+        if self.table in ("model", "friction"):
+            return law_quantities(laws_of(self.table, models)[self.owner])[self.key]
         if self.table == "materials":
             return MATERIAL_QUANTITIES[self.key]
         return None if self.key in MATERIAL_KEYS else SWEEP_QUANTITIES[self.key]
@@ -106,15 +104,12 @@ class InputName:
         name, names = str(self), [*SWEEP_INPUTS]
         if self.table == "materials":
             names = [str(InputName("materials", self.owner, key)) for key in MATERIAL_QUANTITIES]
-        elif self.table == "friction":
-            laws = frictions()
-            parameters = law_quantities(laws[self.owner]) if self.owner in laws else {}
-            names = [str(InputName("friction", self.owner, key)) for key in parameters]
-            name, names = (name, names) if names else (self.owner, list(laws))
-        elif self.owner in models:
-            names = [f"{self.owner}.{parameter}" for parameter in law_quantities(models[self.owner])]
         elif self.owner:
-            name, names = self.owner, list(models)
+            laws = laws_of(self.table, models)
+            if self.owner in laws:
+                names = [str(InputName(self.table, self.owner, key)) for key in law_quantities(laws[self.owner])]
+            else:
+                name, names = self.owner, list(laws)
         return f"no such input; {did_you_mean(name, names)}"
 
 

@@ -8,7 +8,6 @@ from collections.abc import Iterable, Mapping
 
 from pydantic import ValidationError
 
-from ..contact.frictions import frictions
 from ..contact.model import ForceModel
 from ..errors import did_you_mean
 from ..formatting import safe_text
@@ -25,6 +24,7 @@ from .tables import (
     Solver,
     Sweep,
     law_quantities,
+    laws_of,
 )
 
 MAX_PROBLEM_LINES = 100
@@ -35,20 +35,17 @@ EXPECTED_BY_KEY = {
     **{name: str(info.description) for name, info in Column.model_fields.items()},
     "n": f"the number of {Design.model_fields['n'].description}, such as 1024",
 }
-# tables of inputs
-INPUT_TABLES: Mapping[str, type[quantities.Table]] = {"sweep": Sweep, "data": Data, "design": Design}
+KEYS_BY_TABLE: Mapping[str, Iterable[str]] = {
+    "sweep": Sweep.model_fields,
+    "data": Data.model_fields,
+    "design": Design.model_fields,
+    "solver": vars(Solver()),
+    "output": vars(Output()),
+}
 # other words that users may write for a key
 KEY_SYNONYMS = {
     "restitution": "e",
     "cor": "e",
-    "mass1": "m1",
-    "mass2": "m2",
-    "speed1": "v1",
-    "speed2": "v2",
-    "velocity1": "v1",
-    "velocity2": "v2",
-    "radius1": "R1",
-    "radius2": "R2",
     "stiffness": "K",
     "exponent": "n",
     "youngs_modulus": "E",
@@ -58,11 +55,16 @@ KEY_SYNONYMS = {
     "friction": "mu",
     "friction_coefficient": "mu",
     "impact_angle": "angle",
-    "spin1": "omega1",
-    "spin2": "omega2",
-    "tangential_velocity1": "u1",
-    "tangential_velocity2": "u2",
 }
+WORDS_OF_BALLS = {
+    "mass": "m",
+    "speed": "v",
+    "velocity": "v",
+    "radius": "R",
+    "spin": "omega",
+    "tangential_velocity": "u",
+}
+KEY_SYNONYMS |= {f"{word}{ball}": f"{key}{ball}" for word, key in WORDS_OF_BALLS.items() for ball in "12"}
 
 BARE_KEY = r"[A-Za-z0-9_-]++"
 TOML_TOKEN = re.compile(
@@ -215,18 +217,12 @@ def _unknown_key_hint(location: KeyPath, models: Mapping[str, ForceModel]) -> st
             keys = Column.model_fields
         case ():
             keys = Document.model_fields
-        case ("sweep" | "data" | "design" as table,):
-            keys = INPUT_TABLES[table].model_fields
         case ("materials", _):
             keys = MaterialTable.model_fields
-        case ("model",):
-            keys = models
-        case ("model", key):
-            keys = law_quantities(models[str(key)])
-        case ("friction",):
-            keys = frictions()
-        case ("friction", key):
-            keys = law_quantities(frictions()[str(key)])
+        case ("model" | "friction" as table,):
+            keys = laws_of(table, models)
+        case ("model" | "friction" as table, key):
+            keys = law_quantities(laws_of(table, models)[str(key)])
         case (table, *_):
-            keys = vars(Solver() if table == "solver" else Output())
+            keys = KEYS_BY_TABLE[str(table)]
     return did_you_mean(name, list(keys), KEY_SYNONYMS)

@@ -12,7 +12,6 @@ from pydantic import ValidationError
 
 from ..contact.fixed_step import EXACT, SCHEMES
 from ..contact.friction import FrictionLaw
-from ..contact.frictions import frictions
 from ..contact.materials import Material
 from ..contact.model import ForceModel
 from ..contact.numba.dispatch import is_installed
@@ -104,15 +103,13 @@ def parse_config(
     overrides: Overrides = (),
     plugins: Sequence[ForceModel] = (),
     name: str = "<text>",
-    max_points: int = MAX_POINTS,
     purpose: Purpose = "sweep",
 ) -> Config:
     """Read the config of a TOML text, or of a JSON text, which starts with a brace; see `read_config`.
 
     No file is read, because the text may come from a result of unknown origin.
     """
-    draft = open_text(text, name, plugins).with_settings(settings_of(overrides))
-    return build(draft, max_points, purpose)
+    return build(open_text(text, name, plugins).with_settings(settings_of(overrides)), purpose=purpose)
 
 
 def build(draft: Draft, max_points: int = MAX_POINTS, purpose: Purpose = "sweep") -> Config:
@@ -205,9 +202,7 @@ def inline_files(draft: Draft) -> Draft:
 
 def _validate(draft: Draft) -> tuple[tables.Document | None, list[ConfigProblem]]:
     """Build the document of the valid part, or None, and list the problems of single values."""
-    with_tables = [key for key in draft.table("model") if key in draft.known_models]
-    frictions_with_tables = [key for key in draft.table("friction") if key in frictions()]
-    document = tables.document_type(draft.known_models, with_tables, frictions_with_tables)
+    document = tables.document_type(draft.known_models, {name: draft.table(name) for name in draft.laws})
     materials = tuple({**draft.table("materials"), **library()})
     context = quantities.ValidationContext(draft.exponent, materials, draft.known_models)
     try:
@@ -231,7 +226,7 @@ def _default_scalars(draft: Draft, solver: tables.Solver) -> dict[str, float]:
             *(draft.measurements.inputs if draft.measurements else ()),
         }
         defaults |= {**tables.OBLIQUE_DEFAULTS, **({"u2": 0.0} if is_given else {"u1": 0.0, "u2": 0.0})}
-    for laws, table in ((draft.models, "model"), (draft.frictions, "friction")):
+    for table, laws in draft.laws.items():
         defaults |= {
             str(InputName(table, law.key, parameter.name)): parameter.default
             for law in laws
@@ -266,7 +261,7 @@ def _valid_values(document: tables.Document, draft: Draft) -> dict[str, quantiti
         for name, value in _values_by_key(table).items() if material in used_materials else ():
             if not isinstance(value, float):
                 values[f"materials.{material}.{name}"] = value
-    for table_name, laws in (("model", draft.models), ("friction", draft.frictions)):
+    for table_name, laws in draft.laws.items():
         parameter_tables = _values_by_key(getattr(document, table_name))
         selected = {law.key for law in laws}
         for key in draft.table(table_name):

@@ -127,7 +127,8 @@ def _read_columns(columns: Columns, draft: Draft) -> tuple[_Points, list[_Proble
     if not problems:
         problems = list(_approach_problems(dict(zip(kinds, read, strict=True)), rows, draft))
     if not problems and points.of_kind("laboratory"):
-        points, problems = _with_derived(points, rows, _gravity(draft.table("data")))
+        g = GRAVITY.read_or_nan(draft.table("data").get("g", STANDARD_GRAVITY))
+        points, problems = _with_derived(points, rows, STANDARD_GRAVITY if math.isnan(g) else g)
     return points, problems
 
 
@@ -183,11 +184,7 @@ def _laboratory_problems(of_lab: Sequence[str], kinds: Mapping[str, _Column], dr
         yield deviations["e_out"], None, f"set together with {other}, expected one of the two"
     for key, expected in (("m2", math.inf), ("v2", 0.0)):
         value = draft.table("sweep").get(key, SWEEP_DEFAULTS.get(key))
-        try:
-            is_at_rest = SWEEP_QUANTITIES[key].read(value) == expected
-        except PydanticCustomError:
-            is_at_rest = False
-        if not is_at_rest or key in kinds:
+        if SWEEP_QUANTITIES[key].read_or_nan(value) != expected or key in kinds:
             got = f"got {key} = {'a column' if key in kinds else as_text(value)}, expected {key} = {expected:g}"
             yield of_lab[0], None, f"{got} in [sweep]: heights and times are those of a ball on a body at rest"
 
@@ -198,24 +195,12 @@ def _approach_problems(columns: Mapping[str, _Column], rows: Sequence[int], draf
     if "v1" not in inputs:
         return
     header, v1 = inputs["v1"]
-    try:
-        at_rest = SWEEP_QUANTITIES["v2"].read(draft.table("sweep").get("v2", SWEEP_DEFAULTS["v2"]))
-    except PydanticCustomError:
-        # the validation of [sweep] reports it
-        return
+    at_rest = SWEEP_QUANTITIES["v2"].read_or_nan(draft.table("sweep").get("v2", SWEEP_DEFAULTS["v2"]))
     v2 = inputs["v2"][1] if "v2" in inputs else (at_rest,) * len(rows)
     apart = [index for index in range(len(rows)) if v1[index] <= v2[index]]
     if apart:
         got = f"got {quantity(v1[apart[0]], 'm/s')} with v2 = {quantity(v2[apart[0]], 'm/s')}"
         yield header, rows[apart[0]], f"{got}, expected v1 > v2{also(len(apart) - 1)}"
-
-
-def _gravity(table: Mapping[str, Any]) -> float:
-    """Read the key g; the validation of [data] reports an invalid one."""
-    try:
-        return GRAVITY.read(table.get("g", STANDARD_GRAVITY))
-    except PydanticCustomError:
-        return STANDARD_GRAVITY
 
 
 def derive_impacts(
@@ -439,7 +424,7 @@ def add_fits(draft: Draft) -> Draft:
     uses_e |= any(law.may_use_e for law in draft.frictions)
     has_e = not {"e", "alpha"}.isdisjoint({*draft.table("sweep"), *as_table(draft.table("data").get("columns"))})
     paths: list[KeyPath] = [("sweep", "e")] if uses_e and not has_e else []
-    for laws, table in ((draft.models, "model"), (draft.frictions, "friction")):
+    for table, laws in draft.laws.items():
         paths += [
             (table, law.key, parameter.name)
             for law in laws

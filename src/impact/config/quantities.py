@@ -265,7 +265,7 @@ class _OneForm(Table):
 
 
 class Range(_OneForm):
-    """A range, which is counted before it is written out: exactly one of its fields is given."""
+    """A range of numpy, which is counted before it is written out: exactly one of its fields is given."""
 
     FORMS = RANGE_FORMS
     EXPECTED = f"one of {', '.join(f'{name} = {form}' for name, form in RANGE_FORMS.items())}"
@@ -303,15 +303,9 @@ class Range(_OneForm):
 
     def values(self, quantity: Quantity) -> tuple[float, ...]:
         """List the values; those between the ends are rounded to 15 significant digits, so that 0.3 is 0.3."""
-        first, last, step_or_count = self.numbers
+        first, last, _ = self.numbers
         with np.errstate(all="ignore"):
-            match self.kind:
-                case "linspace":
-                    values = np.linspace(first, last, int(step_or_count))
-                case "geomspace":
-                    values = np.geomspace(first, last, int(step_or_count))
-                case _:
-                    values = np.arange(first, last, step_or_count)
+            values = getattr(np, self.kind)(*self.numbers)
         if not np.isfinite(values).all():
             raise self._error(f"got {first:g} to {last:g}, expected a range that does not overflow")
         # the ends are kept as they were written
@@ -473,10 +467,12 @@ class Quantity:
 
     def allows(self, value: float) -> bool:
         """Check whether a number is allowed."""
-        if math.isinf(value) and not self.infinite:
-            return False
-        above = self.least < value if self.above else self.least <= value
-        return above and (value < self.most if self.below else value <= self.most)
+        return bool(self.contains(value)) and (self.infinite or not math.isinf(value))
+
+    def contains(self, values: Any) -> Any:
+        """Check whether a number, or each of an array, is in the interval."""
+        above = values > self.least if self.above else values >= self.least
+        return above & (values < self.most if self.below else values <= self.most)
 
     def refusal(self, value: object, number: float) -> str:
         """Say what is wrong with a number that is not allowed; one of radians may be an angle in degrees."""
@@ -533,6 +529,13 @@ class Quantity:
             raise value_error(self.refusal(value, number))
         # -0.0 becomes 0.0: they are one value with one label
         return number + 0.0
+
+    def read_or_nan(self, value: object) -> float:
+        """Call `read`; NaN for an invalid value, which the validation of its table reports."""
+        try:
+            return self.read(value)
+        except PydanticCustomError:
+            return math.nan
 
     def _with_unit(self, text: str, n: float | None) -> float:
         if len(text) > MAX_UNIT_LENGTH:

@@ -6,8 +6,6 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
-from pydantic_core import PydanticCustomError
-
 from ..contact.dimensionless import required_quantities
 from ..contact.fixed_step import EXACT, SCHEMES, friction_problem, has_scheme, law_problem
 from ..contact.formula_calls import argument_names
@@ -83,13 +81,7 @@ def _numbers(draft: Draft, name: str) -> Sequence[float]:
     if draft.measurements is not None and name in draft.measurements.inputs:
         return draft.measurements.inputs[name]
     value = draft.table("sweep").get(name, [])
-    numbers = []
-    for element in value if isinstance(value, list) else [value]:
-        try:
-            numbers.append(SWEEP_QUANTITIES[name].read(element))
-        except PydanticCustomError:
-            numbers.append(math.nan)
-    return numbers
+    return [SWEEP_QUANTITIES[name].read_or_nan(each) for each in (value if isinstance(value, list) else [value])]
 
 
 def check_rules(draft: Draft) -> Draft:
@@ -215,12 +207,12 @@ def _radius_problems(draft: Draft) -> Iterable[ConfigProblem]:
 
 def _parameter_problems(draft: Draft) -> Iterable[ConfigProblem]:
     """Check that parameters without a default are set."""
-    for model in draft.models:
-        table = as_table(draft.table("model").get(model.key))
-        for parameter in model.parameters:
-            if parameter.default is None and parameter.name not in table:
-                message = _missing(law_quantities(model)[parameter.name])
-                yield ("model", model.key, parameter.name), message + _exclusion_hint(draft, model)
+    for table, law in ((table, law) for table, laws in draft.laws.items() for law in laws):
+        given = as_table(draft.table(table).get(law.key))
+        hint = _exclusion_hint(draft, law) if isinstance(law, ForceModel) else ""
+        for parameter in law.parameters:
+            if parameter.default is None and not parameter.optional and parameter.name not in given:
+                yield (table, law.key, parameter.name), _missing(law_quantities(law)[parameter.name]) + hint
 
 
 def _fixed_step_problems(draft: Draft) -> Iterable[ConfigProblem]:
@@ -250,14 +242,9 @@ def _oblique_problems(draft: Draft) -> Iterable[ConfigProblem]:
     sweep = draft.table("sweep")
     if "frictions" not in draft.data:
         expected = 'expected frictions as well, such as frictions = ["coulomb-1785"]'
-        yield from (
-            (("sweep", name), f"set without a friction law, {expected}")
-            for name in OBLIQUE_INPUTS
-            if name in sweep
-        )
-        yield from (
-            (("friction", key), f"set without a friction law, {expected}") for key in draft.table("friction")
-        )
+        inputs = [("sweep", name) for name in OBLIQUE_INPUTS if name in sweep]
+        parameters = [("friction", key) for key in draft.table("friction")]
+        yield from ((path, f"set without a friction law, {expected}") for path in (*inputs, *parameters))
         return
     if "mu" not in sweep:
         yield ("sweep", "mu"), _missing(SWEEP_QUANTITIES["mu"])
@@ -317,9 +304,6 @@ def _friction_problems(draft: Draft) -> Iterable[ConfigProblem]:
         if problem:
             name, _, message = problem.partition(": ")
             yield ("friction", law.key, name), message
-        for parameter in law.parameters:
-            if parameter.default is None and not parameter.optional and parameter.name not in given:
-                yield ("friction", law.key, parameter.name), _missing(law_quantities(law)[parameter.name])
         needed = required_inputs(law, given, exponents)
         if "e" in needed and {"e", "alpha"}.isdisjoint(sweep):
             yield ("sweep", "e"), f"missing, expected e or alpha (used by {law.key}), or other frictions"

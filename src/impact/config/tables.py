@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import field
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -440,15 +440,13 @@ def _words(quantity: Quantity) -> Any:
     return PlainValidator(read, json_schema_input_type=schema)
 
 
-def _select_models(value: object, info: ValidationInfo) -> tuple[ForceModel, ...]:
-    selection, problems = expand_models(value, cast(ValidationContext, info.context).models)
-    if problems:
-        raise located_errors(problems)
-    return tuple(selection)
-
-
-def _select_frictions(value: object) -> tuple[FrictionLaw, ...]:
-    selection, problems = expand_frictions(value)
+def _select_laws(value: object, info: ValidationInfo) -> tuple[ForceModel | FrictionLaw, ...]:
+    """Find the laws that the key `models` or `frictions` names."""
+    selection: Sequence[ForceModel | FrictionLaw]
+    if info.field_name == "models":
+        selection, problems = expand_models(value, cast(ValidationContext, info.context).models)
+    else:
+        selection, problems = expand_frictions(value)
     if problems:
         raise located_errors(problems)
     return tuple(selection)
@@ -463,8 +461,8 @@ class Document(Table):
     title: Annotated[str, Field(strict=True), expected("text")] = Field(
         DEFAULT_TITLE, description="title of the sweep"
     )
-    models: Annotated[tuple[ForceModel, ...], PlainValidator(_select_models)] = ()
-    frictions: Annotated[tuple[FrictionLaw, ...], PlainValidator(_select_frictions)] = ()
+    models: Annotated[tuple[ForceModel, ...], PlainValidator(_select_laws)] = ()
+    frictions: Annotated[tuple[FrictionLaw, ...], PlainValidator(_select_laws)] = ()
     sweep: Sweep
     materials: Annotated[dict[str, MaterialTable], expected("a table")] = Field(
         default_factory=dict, description="materials by name"
@@ -479,36 +477,37 @@ class Document(Table):
     friction: Any = None
 
 
+def laws_of(table: str, models: Mapping[str, ForceModel]) -> Mapping[str, ForceModel | FrictionLaw]:
+    """The laws whose parameters the table [model] or [friction] of a config may have, by key."""
+    return frictions() if table == "friction" else models
+
+
 def document_type(
-    models_by_key: Mapping[str, ForceModel], with_tables: Sequence[str], frictions_with_tables: Sequence[str]
+    models: Mapping[str, ForceModel], with_tables: Mapping[str, Iterable[str]] | None = None
 ) -> type[Document]:
-    """Build the type of a whole config, in which some models and friction laws have a table of parameters."""
+    """Build the type of a whole config, in which some laws, by default all, have a table of parameters."""
     for table in (Sweep, MaterialTable, Data, Design):
         # built once; the type of each config then contains it
         table.model_rebuild()
-
-    def tables_of(name: str, laws: Mapping[str, Any], keys: Sequence[str], meaning: str) -> type[Table]:
-        fields: dict[str, Any] = {
+    fields: dict[str, Any] = {}
+    descriptions = {
+        "model": 'models by name, "all", "family:NAME" or a pattern; after "!" those left out',
+        "friction": "friction laws, as models: each model is paired with each of them",
+    }
+    for name, description in descriptions.items():
+        laws = laws_of(name, models)
+        keys = laws if with_tables is None else [key for key in with_tables[name] if key in laws]
+        columns: dict[str, Any] = {
             f"field_{index}": (Annotated[parameter_table(laws[key]), Field(alias=key)], None)
             for index, key in enumerate(keys)
         }
-        return create_model(name, __base__=Table, __doc__=meaning, **fields)
-
-    parameters = tables_of("model", models_by_key, with_tables, "Parameters of models, by key.")
-    of_frictions = "Parameters of friction laws, by key."
-    friction_parameters = tables_of("friction", frictions(), frictions_with_tables, of_frictions)
-    friction_selection = PlainValidator(_select_frictions, json_schema_input_type=_law_names(frictions(), "all"))
-    friction_description = Field(description="friction laws, as models: each model is paired with each of them")
-    selection = PlainValidator(_select_models, json_schema_input_type=_model_names(models_by_key))
-    description = Field(description='models by name, "all", "family:NAME" or a pattern; after "!" those left out')
-    return create_model(
-        "config",
-        __base__=Document,
-        models=(Annotated[Any, selection, description], ...),
-        model=(parameters, Field(default_factory=parameters)),
-        frictions=(Annotated[Any, friction_selection, friction_description], ()),
-        friction=(friction_parameters, Field(default_factory=friction_parameters)),
-    )
+        meaning = f"Parameters of {'friction laws' if name == 'friction' else 'models'}, by key."
+        parameters = create_model(name, __base__=Table, __doc__=meaning, **columns)
+        selection = PlainValidator(_select_laws, json_schema_input_type=_law_names(laws))
+        default = ... if name == "model" else ()
+        fields[f"{name}s"] = Annotated[Any, selection, Field(description=description)], default
+        fields[name] = parameters, Field(default_factory=parameters)
+    return create_model("config", __base__=Document, **fields)
 
 
 def schema(output: str | Path | None = None, *, overwrite: bool = False) -> dict[str, Any]:
@@ -542,7 +541,7 @@ def schema(output: str | Path | None = None, *, overwrite: bool = False) -> dict
     required = [{"anyOf": [{"required": [key]} for key in keys]} for keys in alternatives]
     content = {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
-        **document_type(models, list(models), list(frictions())).model_json_schema(),
+        **document_type(models).model_json_schema(),
         "if": {"not": {"required": ["data"]}},
         "then": {"properties": {"sweep": {"allOf": required}}},
     }
@@ -552,15 +551,10 @@ def schema(output: str | Path | None = None, *, overwrite: bool = False) -> dict
     return content
 
 
-def _model_names(models: Mapping[str, ForceModel]) -> Any:
-    """Create the type of the key `models` for its JSON Schema, with all names."""
-    families = {f"family:{model.family}" for model in models.values() if not model.same_as}
-    return _law_names(models, "all", *sorted(families))
-
-
-def _law_names(laws: Mapping[str, Any], *more: str) -> Any:
-    """Create the type of names of laws: their keys, further words, patterns, and after "!" those left out."""
-    words = (*laws, *more)
+def _law_names(laws: Mapping[str, ForceModel | FrictionLaw]) -> Any:
+    """Create the type of names of laws: keys, "all", families, patterns, and after "!" those left out."""
+    families = {f"family:{law.family}" for law in laws.values() if isinstance(law, ForceModel) and not law.same_as}
+    words = (*laws, "all", *sorted(families))
     # a pattern contains *, ? or [; no key begins with "!", and "family:" takes no pattern
     pattern = r"(?!!|family:).*[*?\[]"
     name: Any = Literal[words] | Annotated[str, Field(pattern=f"^{pattern}")]

@@ -23,6 +23,11 @@ def dimensions(index: Index) -> int:
     return index[0].ndim if index else 1
 
 
+def index_of(cells: NDArray[np.integer], shape: Sequence[int]) -> Index:
+    """Convert numbers of cells, in C order, to indices along each axis; an empty index for a plan without axes."""
+    return np.unravel_index(cells, shape) if shape else ()
+
+
 @dataclass(frozen=True)
 class Inputs:
     """The inputs of a sweep: scalars by config name, and the axes of its grid in config order."""

@@ -115,8 +115,7 @@ class Plan:
         trajectory_map = self.maps[trajectory_range.model]
         rows = trajectory_range.rows
         cells = rows if trajectory_map.first is None else trajectory_map.first[rows]
-        cell_index = np.unravel_index(cells, trajectory_map.shape) if trajectory_map.shape else ()
-        index_along = dict(zip(trajectory_map.axes, cell_index, strict=True))
+        index_along = trajectory_map.index_along(cells)
         # the other axes are at their first value
         index = tuple(index_along.get(axis, np.zeros(1, np.intp)) for axis in range(len(self.shape)))
         columns = columns_at(self.inputs, self.laws[trajectory_range.model], trajectory_map.axes, index)
@@ -159,6 +158,12 @@ class Plan:
     def shape(self) -> tuple[int, ...]:
         """Sizes of the axes, in config order."""
         return self.inputs.shape
+
+    @property
+    def sizes(self) -> dict[str, int]:
+        """Sizes of the dimensions of the result."""
+        laws = {"model": len(self.models), **({"friction": len(self.frictions)} if self.frictions else {})}
+        return laws | {axis.name: axis.size for axis in self.config.axes}
 
     @property
     def points(self) -> int:

@@ -23,11 +23,12 @@ from pathlib import Path
 from types import ModuleType
 from typing import NamedTuple
 
+from ..config.files import read_bytes
 from ..config.quantities import as_text
 from ..contact.catalogue import look_up
 from ..contact.model import ForceModel
 from ..contact.models import catalogue
-from ..errors import NOT_OF_A_PLUGIN, ImpactError, MissingFileError, ModelError, UsageError, warn
+from ..errors import NOT_OF_A_PLUGIN, ImpactError, ModelError, UsageError, warn
 from ..formatting import safe_text
 
 ENTRY_POINT_GROUP = "impact.models"
@@ -218,17 +219,7 @@ def _read_source(path: Path) -> PythonFile:
     """Read a Python file."""
     if path.suffix != ".py":
         raise UsageError(f"{path}: its name does not end in .py, expected a Python file")
-    try:
-        # reading something other than a regular file might never end
-        if path.exists() and not path.is_file():
-            raise UsageError(f"{path}: not a regular file, expected a Python file")
-        return PythonFile(str(path), path.read_bytes())
-    except UsageError:
-        raise
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        kind_of_error = MissingFileError if isinstance(error, FileNotFoundError) else UsageError
-        raise kind_of_error(f"{path}: cannot be read: {reason}") from None
+    return PythonFile(str(path), read_bytes(path, "Python", -1, UsageError))
 
 
 def _execute_module(source: PythonFile, sha256: str) -> ModuleType:

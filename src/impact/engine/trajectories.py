@@ -18,14 +18,14 @@ from ..contact.deduplicate import deduplicate
 from ..contact.dimensionless import dimensionless_values, exponent_names
 from ..contact.friction import Pair, check_friction, friction_values
 from ..contact.frictions.multibody_codes import MUJOCO_ELLIPTIC
-from ..contact.impacts import CHECKS, check_inputs
+from ..contact.impacts import CHECKS, Impacts, check_inputs
 from ..contact.model import ForceModel
 from ..contact.records import Record
 from ..contact.simulate import CollisionResult
 from ..contact.status import STATUS_OK
 from ..contact.tangential import TangentialResult
 from .build_impacts import build_impacts, build_oblique, fixed_steps_at
-from .inputs import Index, Inputs, dimensions
+from .inputs import Index, Inputs, dimensions, index_of
 
 # cells up to which equal values are found in the whole plan; with more, only within a range of trajectories
 MAX_CELLS = 2**22
@@ -72,6 +72,10 @@ class TrajectoryMap:
     def is_shared(self) -> bool:
         """Whether several cells may take one trajectory."""
         return self.of_cell is not None
+
+    def index_along(self, cells: NDArray[np.intp]) -> dict[int, NDArray[np.intp]]:
+        """Convert cells to indices along each axis on which the values of the law depend."""
+        return dict(zip(self.axes, index_of(cells, self.shape), strict=True))
 
     def rows(self, index: Index) -> NDArray[np.intp]:
         """Look up the trajectories of cells; of length 1 along axes on which they do not depend."""
@@ -203,14 +207,15 @@ def axes_of_arrays(arrays: Iterable[NDArray[Any]]) -> frozenset[int]:
 
 def axes_of_checks(inputs: Inputs, model: ForceModel) -> Mapping[str, frozenset[int]]:
     """Find the axes on which each check of `check_inputs` depends."""
-    impacts = build_impacts(inputs, model, _probe_index(inputs, model))
+    arrays = checked_arrays(build_impacts(inputs, model, _probe_index(inputs, model)))
+    return {check: axes_of_arrays(arrays[check]) for check in CHECKS}
+
+
+def checked_arrays(impacts: Impacts) -> Mapping[str, list[NDArray[Any]]]:
+    """List the arrays on which each check of `check_inputs` depends."""
     with np.errstate(all="ignore"):
-        checked_arrays = {
-            "e": [impacts.e],
-            "v0": [impacts.v0],
-            "length": [impacts.length, impacts.energy, impacts.time],
-        }
-    return {check: axes_of_arrays(checked_arrays[check]) for check in CHECKS}
+        scales = [impacts.v0, impacts.length, impacts.energy, impacts.time]
+    return {"e": [impacts.e], "v0": [impacts.v0], "length": scales}
 
 
 def _probe_index(inputs: Inputs, law: PlanLaw) -> Index:

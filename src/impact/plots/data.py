@@ -110,7 +110,7 @@ def read_points(points: str | Path | Mapping[str, Sequence[object]] | pd.DataFra
     """
     quantities = _column_quantities()
     if isinstance(points, str | Path):
-        columns = read_csv(Path(points), quantities.__getitem__)
+        columns = read_csv(Path(points), quantities.__contains__)
     else:
         columns = columns_of_table(points, "points")
     used = [name for name in columns.cells if name in quantities]

@@ -55,14 +55,7 @@ class EngineChecks(NamedTuple):
 
 
 def board_dataset(suite: str, labels: Sequence[tuple[str, str]], engines: Sequence[EngineChecks]) -> xr.Dataset:
-    """Make the dataset of a board.
-
-    Parameters
-    ----------
-    suite : name of the set of collisions
-    labels : the collision and the name of each check
-    engines : in the order of the board
-    """
+    """Make the dataset of a board of a set of collisions; the labels are the collision and name of each check."""
     coordinates = {
         "engine": ("engine", [engine.engine for engine in engines], "engine"),
         "engine_version": ("engine", [engine.version for engine in engines], "version of the engine"),

@@ -172,14 +172,9 @@ def describe_data(dataset: xr.Dataset) -> str:
 def calibration_template(
     config: Config, laws: Sequence[PlanLaw], plugins: Plugins, varied: tuple[str, Array]
 ) -> xr.Dataset:
-    """Build the dataset of a calibration with placeholders for its results.
+    """Build the dataset of a calibration of some laws with placeholders for its results.
 
-    Parameters
-    ----------
-    config : with the measurements
-    laws : the models, or their pairs with friction laws, in the order of the dataset
-    plugins : the models that are not built in
-    varied : the input of the curves and its values; "" for none
+    `varied` is the input of the curves and its values; "" for none.
     """
     data = config.data
     assert data is not None

@@ -190,9 +190,7 @@ def _check_whole(before: xr.Dataset, old: Plan, name: str) -> None:
     version = safe_text(str(before.attrs.get("impact_version")), 40)
     if version != __version__:
         raise ResultError(f"{name}: was written by impact {version}, this is {__version__}; run its sweep again")
-    sizes = {"model": len(old.models), **({"friction": len(old.frictions)} if old.frictions else {})}
-    sizes |= {axis.name: axis.size for axis in old.config.axes}
-    if before.attrs.get("fingerprint") != old.fingerprint or dict(before.sizes) != sizes:
+    if before.attrs.get("fingerprint") != old.fingerprint or dict(before.sizes) != old.sizes:
         raise UsageError(f"{name}: got a part of a result, expected the whole result")
 
 
@@ -374,9 +372,8 @@ class _OldPositions:
         )
 
     def _is_old(self, trajectory_map: TrajectoryMap, cells: IndexArray) -> NDArray[np.bool_]:
-        along = np.unravel_index(cells, trajectory_map.shape) if trajectory_map.shape else ()
         is_old = np.ones(cells.shape, bool)
-        for axis, coordinate in zip(trajectory_map.axes, along, strict=True):
+        for axis, coordinate in trajectory_map.index_along(cells).items():
             is_old &= self.axes[axis].positions[coordinate] >= 0
         return is_old
 
@@ -395,10 +392,8 @@ class _OldPositions:
         self, trajectory_map: TrajectoryMap, old_map: TrajectoryMap, cells: IndexArray
     ) -> IndexArray:
         """Find the old row of each cell's trajectory, or -1."""
-        coordinates = np.unravel_index(cells, trajectory_map.shape) if trajectory_map.shape else ()
-        along = dict(zip(trajectory_map.axes, coordinates, strict=True))
         index = [np.zeros(cells.shape, np.intp) for _ in self.old.config.axes]
-        for axis, coordinate in along.items():
+        for axis, coordinate in trajectory_map.index_along(cells).items():
             old_axis = self.axes[axis].axis
             if old_axis is not None:
                 index[old_axis] = np.maximum(self.axes[axis].positions[coordinate], 0)
@@ -413,12 +408,9 @@ class _OldPositions:
         names = [axis.name for axis in self.old.config.axes]
 
         def fill(slab: ExpandedSlab) -> None:
-            old_number = self.law(slab.number)
-            if old_number is None:
+            if self.law(slab.number) is None:
                 return
-            models, frictions = len(self.old.models), len(self.old.frictions)
-            place = (old_number,) if old_number < models else divmod(old_number - models, frictions)
-            of_law = dict(zip(("model", "friction"), place, strict=False))
+            of_law = dict(zip(("model", "friction"), keys_of(self.new.laws[slab.number]), strict=False))
             old_positions = [axis.positions[part] for axis, part in zip(self.axes, slab.region, strict=True)]
             inside = np.ix_(*(np.flatnonzero(positions >= 0) for positions in old_positions))
             if any(positions.size == 0 for positions in inside):
@@ -433,7 +425,7 @@ class _OldPositions:
             for name, array in slab.values.items():
                 if "model" not in before[name].dims:
                     continue
-                old_values = before[name].isel({**of_law, **chosen}).transpose(*order).values
+                old_values = before[name].sel(of_law).isel(chosen).transpose(*order).values
                 shape = tuple(positions.size for positions in inside)
                 if not array.flags.writeable:
                     # a view of computed values that was not copied

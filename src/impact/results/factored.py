@@ -12,7 +12,7 @@ import math
 import operator
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -31,7 +31,7 @@ from ..contact.status import FRICTION_STATUSES, STATUSES, Status
 from ..contact.tangential import FrictionKind, TangentialResult
 from ..contact.variables import OUTPUTS, Variable
 from ..engine.build_impacts import Stiffness, has_stiffness_rule, mass_at, radius_at, values_at, velocity_at
-from ..engine.inputs import Index, Inputs
+from ..engine.inputs import Index, Inputs, index_of
 from ..engine.trajectories import TrajectoryMap
 from ..errors import ResultError, UsageError
 from ..formatting import number, safe_text
@@ -70,13 +70,6 @@ class StoredLaw:
     quantities: frozenset[str]
     is_permanent: bool
     stiffness: Formula | None = None
-
-
-class StoredFriction(NamedTuple):
-    """A friction law as stored in a file."""
-
-    key: str
-    kind: FrictionKind
 
 
 def stored_stiffness(
@@ -150,8 +143,7 @@ def factored_template(
             )
     attributes = {**result_template.attrs, "axes": json.dumps(names), "laws": json.dumps(laws)}
     if pairs:
-        frictions = {friction.key: friction.kind for friction in table.frictions}
-        attributes |= {"frictions": json.dumps(frictions), "pairs": json.dumps(pairs)}
+        attributes |= {"frictions": json.dumps(table.frictions), "pairs": json.dumps(pairs)}
     template = xr.Dataset(stored, result_template.coords, attributes)
     # readers of netCDF take coordinates that no variable names for variables
     others = [str(name) for name in result_template.coords if name not in result_template.dims]
@@ -223,19 +215,11 @@ def witness_values(
     values_by_name = {variable.name: np.empty(indices.size, variable.dtype) for variable in variables}
     for model in np.unique(models).tolist():
         rows = np.flatnonzero(models == model)
-        _, values = expand(table, numbers[model], _unravel_cells(table.inputs, cells[rows]), list(values_by_name))
+        index = index_of(cells[rows], table.inputs.shape)
+        _, values = expand(table, numbers[model], index, list(values_by_name))
         for name, array in values_by_name.items():
             array[rows] = np.broadcast_to(values[name], rows.shape)
     return values_by_name
-
-
-def _unravel_cells(inputs: Inputs, cells: NDArray[np.int64]) -> Index:
-    """Convert indices of cells in C order to indices along each axis."""
-    index = []
-    for size in reversed(inputs.shape):
-        cells, position = np.divmod(cells, size)
-        index.append(position)
-    return tuple(reversed(index))
 
 
 def stored_table(dataset: xr.Dataset, sizes: Mapping[str, int], read: ReadVariable) -> TrajectoryTable:
@@ -251,10 +235,9 @@ def stored_table(dataset: xr.Dataset, sizes: Mapping[str, int], read: ReadVariab
         return (read(name, part) for part in _consecutive(lengths))
 
     pairs: list[PairRecord] = read_attribute(dataset.attrs, "pairs")
-    frictions = tuple(StoredFriction(*item) for item in read_attribute(dataset.attrs, "frictions").items())
-    if len(pairs) != len(laws) * len(frictions) or [friction.key for friction in frictions] != [
-        str(key) for key in dataset.get("friction", xr.DataArray([], dims="friction")).values
-    ]:
+    frictions: dict[str, FrictionKind] = read_attribute(dataset.attrs, "frictions")
+    keys = [str(key) for key in dataset["friction"].values] if "friction" in dataset else []
+    if len(pairs) != len(laws) * len(frictions) or list(frictions) != keys:
         raise ResultError("is not a readable result (pairs: not those of its models and friction laws)")
     try:
         maps = _stored_maps(inputs, [*laws.values(), *pairs], len(laws), parts)
@@ -423,7 +406,7 @@ def _check_witnesses_at(
     """Refuse stored values at some points, of models or of pairs, that expand to other numbers."""
     expanded = witness_values(table, variables, indices)
     cells = indices % table.inputs.cells
-    index = _unravel_cells(table.inputs, cells)
+    index = index_of(cells, table.inputs.shape)
     inputs = {name: values_at(table.inputs, name, index) for name in table.inputs.names() if name in SLIP_INPUTS}
     inputs |= {f"v{ball}": velocity_at(table.inputs, ball, index) for ball in "12"}
     inputs |= {f"m{ball}": mass_at(table.inputs, ball, index) for ball in "12"}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import xarray as xr
 
@@ -40,41 +40,20 @@ class Contents(NamedTuple):
     summary: Summary
 
 
-class Layout(Protocol):
-    """How a file holds a result."""
+class FullLayout:
+    """A file of all values of all points."""
 
     def check(self, plan: Plan) -> None:
         """Raise a UsageError for a plan whose result cannot be stored, before integration."""
 
     def template(self, result: xr.Dataset, plan: Plan, table: TrajectoryTable) -> xr.Dataset:
         """Build the dataset of the file, with placeholder values, from that of the result."""
-
-    def contents(
-        self, result: xr.Dataset, plan: Plan, table: TrajectoryTable, on_slab: OnSlab, fill: FillSlab | None
-    ) -> Contents:
-        """Compute what the file holds, from the trajectory table and the values that `fill` replaces."""
-
-    def read(self, variables: Mapping[str, xr.Variable], attributes: Mapping[str, object]) -> xr.Dataset:
-        """Make a dataset of the variables and attributes of a file; its values are read or computed when indexed.
-
-        Raises
-        ------
-        ResultError : they do not fit together
-        """
-
-
-class FullLayout:
-    """All values of all points."""
-
-    def check(self, plan: Plan) -> None:
-        pass
-
-    def template(self, result: xr.Dataset, plan: Plan, table: TrajectoryTable) -> xr.Dataset:
         return result
 
     def contents(
         self, result: xr.Dataset, plan: Plan, table: TrajectoryTable, on_slab: OnSlab, fill: FillSlab | None
     ) -> Contents:
+        """Compute what the file holds, from the trajectory table and the values that `fill` replaces."""
         summary, chunks = Summary(), plan.config.output.chunks
         lengths = [chunks.get(axis.name, axis.size) for axis in plan.config.axes] if chunks else []
 
@@ -90,13 +69,17 @@ class FullLayout:
         return Contents(result, result, values(), summary)
 
     def read(self, variables: Mapping[str, xr.Variable], attributes: Mapping[str, object]) -> xr.Dataset:
+        """Make a dataset of the variables and attributes of a file; a ResultError if they do not fit together.
+
+        Its values are read or computed when they are indexed.
+        """
         coordinates = _load_coordinates(variables)
         values = {name: variable for name, variable in variables.items() if name not in coordinates}
         return xr.Dataset(values, coordinates, attributes)
 
 
 class FactoredLayout:
-    """A trajectory table, and some points in full by which it is checked."""
+    """A file of a trajectory table, and of some points in full by which it is checked; see `FullLayout`."""
 
     def check(self, plan: Plan) -> None:
         for law in plan.models:
@@ -150,4 +133,4 @@ def _load_coordinates(variables: Mapping[str, xr.Variable]) -> dict[str, xr.Vari
     }
 
 
-LAYOUTS: Mapping[str, Layout] = {"full": FullLayout(), "factored": FactoredLayout()}
+LAYOUTS: Mapping[str, FullLayout | FactoredLayout] = {"full": FullLayout(), "factored": FactoredLayout()}

@@ -207,11 +207,11 @@ def read_variables(
     datasets = {name: h5py.Dataset(dataset) for name, dataset in opened.items()}
     dims = _check_sizes(file, datasets, stored_chunks)
     accepted = {name: dataset for name, dataset in datasets.items() if is_name(name)}
-    # a dimension without coordinates is a dataset in the file as well
+    # a dimension without coordinates is a dataset in the file as well, without values
     unknown = [
         name
-        for name in datasets
-        if name not in accepted and not _is_dimension_without_values(datasets[name], name, dims)
+        for name, dataset in datasets.items()
+        if name not in accepted and (dims[name] != (name,) or dataset.id.get_storage_size())
     ]
     holders = {"": file, **accepted}
     if sum(h5a.get_num_attrs(holder.id) for holder in holders.values()) > MAX_ATTRIBUTES:
@@ -314,14 +314,15 @@ def _is_number_type(kind: h5t.TypeID) -> bool:
     return plain and h5t.py_create(kind.dtype).equal(kind)
 
 
-def _is_byte_type(kind: h5t.TypeID) -> bool:
-    return isinstance(kind, h5t.TypeStringID) and not kind.is_variable_str() and kind.get_size() == 1
+def _is_string_type(kind: h5t.TypeID) -> bool:
+    """Check for a string of a fixed length."""
+    return isinstance(kind, h5t.TypeStringID) and not kind.is_variable_str()
 
 
 def _declared_bytes(name: str, dataset: h5d.DatasetID) -> int:
     """Count the bytes of a dataset, which must be stored in the file itself, contiguous or in chunks."""
     kind, shape = dataset.get_type(), dataset.shape
-    if not (_is_number_type(kind) or (_is_byte_type(kind) and shape)):
+    if not (_is_number_type(kind) or (_is_string_type(kind) and kind.get_size() == 1 and shape)):
         raise _unreadable("expected numbers or labels", name)
     plist = dataset.get_create_plist()
     declared = math.prod(shape) * kind.get_size() if shape is not None else 0
@@ -363,18 +364,13 @@ def _dims_by_dataset(datasets: Mapping[str, h5py.Dataset]) -> dict[str, tuple[st
     return dims
 
 
-def _is_dimension_without_values(dataset: h5py.Dataset, name: str, dims: Mapping[str, tuple[str, ...]]) -> bool:
-    """Check for a dimension without coordinates."""
-    return dims[name] == (name,) and not dataset.id.get_storage_size()
-
-
 def _attribute_text_bytes(name: str, holder: h5py.File | h5py.Dataset) -> int:
     """Count the bytes of text of the attributes that are read, and check their types and sizes."""
     total = 0
     for key in (key for key in holder.attrs if key not in SKIPPED_ATTRIBUTES):
         attribute = holder.attrs.get_id(key)
         kind, shape = attribute.get_type(), attribute.shape
-        if isinstance(kind, h5t.TypeStringID) and not kind.is_variable_str() and shape == ():
+        if _is_string_type(kind) and shape == ():
             total += kind.get_size()
         elif not _is_number_type(kind) or shape is None or math.prod(shape) > MAX_ATTRIBUTE_VALUES:
             raise _unreadable("an attribute of unexpected type or size", f"{name}@{key}")

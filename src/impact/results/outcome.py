@@ -14,7 +14,7 @@ from ..display import Block, Displayed, Table, Wrapped
 from ..formatting import label, number
 from .plausibility import result_notes
 from .replay_command import command_start, inputs_of_model, replay_command
-from .summary import Summary, counts_by_name, worst_by_model
+from .summary import Summary, counts_by_name, counts_text, worst_by_model
 
 # headings of the largest errors, in the order of a table
 ERROR_HEADINGS = {
@@ -85,14 +85,10 @@ class SweepOutcome(Displayed):
         summary = self.summary
         if summary.worst:
             yield error_table(worst_by_model(summary, self.dataset))
-        counts = ", ".join(f"{count:,} {name}" for name, count in counts_by_name(summary.counts).items())
         distinct = "" if self.trajectories is None else f" from {self.trajectories:,} trajectories"
-        yield Wrapped(f"{self.output}: {summary.points:,} points{distinct} ({counts})")
+        yield Wrapped(f"{self.output}: {summary.points:,} points{distinct} ({counts_text(summary.counts)})")
         if summary.friction_counts:
-            counts = ", ".join(
-                f"{count:,} {name}" for name, count in counts_by_name(summary.friction_counts).items()
-            )
-            yield Wrapped(f"with each friction law: {counts}")
+            yield Wrapped(f"with each friction law: {counts_text(summary.friction_counts)}")
         failures = self.records()
         for failure in failures:
             inputs = ", ".join(f"{name}={label(value)}" for name, value in failure["at"].items())
@@ -111,8 +107,7 @@ class SweepOutcome(Displayed):
         failures = {
             s: count for s, count in counts.items() if s >= FIRST_FAILURE
         } or self.summary.friction_failures
-        reasons = (f"{count:,} {name}" for name, count in counts_by_name(failures).items())
-        return f"{self.output}: {failed:,} of {self.summary.points:,} points failed ({', '.join(reasons)})"
+        return f"{self.output}: {failed:,} of {self.summary.points:,} points failed ({counts_text(failures)})"
 
 
 def error_table(worst: Mapping[str, Mapping[str, float]]) -> Table:

@@ -16,7 +16,7 @@ from ..engine.trajectories import axes_of_arrays, probe_index
 from ..errors import ModelError, ResultError
 from ..formatting import number, quantity, safe_text
 from .factored import read_inputs
-from .schema import parts_of_models
+from .schema import parts_of_laws
 from .slabs import MAX_SUMMARY_POINTS, is_computed, over_varying_dims, slabs
 from .summary import MAX_SMALL_INDENTATION, Summary
 
@@ -85,9 +85,28 @@ def result_notes(summary: Summary) -> Iterator[str]:
 
 
 def with_depths(summary: Summary, dataset: xr.Dataset) -> Summary:
-    """Add `deep` and `deepest` of a dataset to its summary."""
-    depths = _depth_summary(dataset)
-    return replace(summary, deep=depths.deep, deepest=depths.deepest)
+    """Add `deep` and `deepest` of a dataset to its summary, but for models of more computed points than it has."""
+    inputs, summary = inputs_of(dataset), replace(summary)
+    if inputs is None or "peak_indentation" not in dataset:
+        return summary
+    try:
+        varied = axes_of_arrays([smaller_radius_at(inputs, probe_index(inputs))])
+    except (ModelError, KeyError):
+        # a part of a result, or one that was changed, may lack what the radii follow from
+        return summary
+    radius_dims = [axis.name for number, axis in enumerate(inputs.axes) if number in varied]
+    for place, part in parts_of_laws(dataset, ["model"]):
+        points, weight = over_varying_dims(part, ["peak_indentation"], *radius_dims)
+        dims = [axis.name for axis in inputs.axes if axis.name in points.dims]
+        depth = points.variables["peak_indentation"].transpose(*dims)
+        if depth.size > MAX_SUMMARY_POINTS and is_computed(depth):
+            continue
+        for slab in slabs(depth.sizes):
+            radius = smaller_radius_at(inputs, inputs.index([slab.get(a.name, slice(1)) for a in inputs.axes]))
+            absent = tuple(number for number, axis in enumerate(inputs.axes) if axis.name not in dims)
+            values = {"peak_indentation": depth.isel(slab).values}
+            summary.add(values, place, (), radius.squeeze(absent) if inputs.axes else radius, weight)
+    return summary
 
 
 def inputs_of(dataset: xr.Dataset) -> Inputs | None:
@@ -98,29 +117,3 @@ def inputs_of(dataset: xr.Dataset) -> Inputs | None:
         return None
     is_complete = all(inputs.materials_of(ball) <= inputs.materials.keys() for ball in "12")
     return inputs if is_complete else None
-
-
-def _depth_summary(dataset: xr.Dataset) -> Summary:
-    """Find `deep` and `deepest` from the radii, without models of more computed points than a summary has."""
-    summary = Summary()
-    inputs = inputs_of(dataset)
-    if inputs is None:
-        return summary
-    try:
-        varied = axes_of_arrays([smaller_radius_at(inputs, probe_index(inputs))])
-    except (ModelError, KeyError):
-        # a part of a result, or one that was changed, may lack what the radii follow from
-        return summary
-    radius_dims = [axis.name for number, axis in enumerate(inputs.axes) if number in varied]
-    for model, part in enumerate(parts_of_models(dataset) if "peak_indentation" in dataset else ()):
-        points, weight = over_varying_dims(part, ["peak_indentation"], *radius_dims)
-        dims = [axis.name for axis in inputs.axes if axis.name in points.dims]
-        depth = points.variables["peak_indentation"].transpose(*dims)
-        if depth.size > MAX_SUMMARY_POINTS and is_computed(depth):
-            continue
-        for slab in slabs(depth.sizes):
-            radius = smaller_radius_at(inputs, inputs.index([slab.get(a.name, slice(1)) for a in inputs.axes]))
-            absent = tuple(number for number, axis in enumerate(inputs.axes) if axis.name not in dims)
-            values = {"peak_indentation": depth.isel(slab).values}
-            summary.add(values, model, (), radius.squeeze(absent) if inputs.axes else radius, weight)
-    return summary

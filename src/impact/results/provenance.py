@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -78,18 +78,15 @@ def check_plugins(attributes: Mapping[str, object], plugins: Plugins, name: str)
     Traceback (most recent call last):
     impact.errors.UsageError: results.h5: made with mine of my.py; give it again with plugins=["FILE"]
     """
-    stored = _stored_plugins(attributes, name)
-    current = _current_plugins(plugins)
     # hashes of files and of Python values differ: a model supplied in another way cannot be compared
     missing = {
         key: record
-        for key, record in stored.items()
-        if key not in current or _how_to_supply(current[key]) != _how_to_supply(record)
+        for key, record, current in _stored_and_current(attributes, plugins, name)
+        if current is None or _how_to_supply(current) != _how_to_supply(record)
     }
     if missing:
-        named = ", ".join(
-            f"{key} of {_plugin_origin(record) or 'a Python value'}" for key, record in missing.items()
-        )
+        origins = {key: record.package or record.file or "a Python value" for key, record in missing.items()}
+        named = ", ".join(f"{key} of {origin}" for key, origin in origins.items())
         ways = " and ".join(sorted({_how_to_supply(record) for record in missing.values()}))
         again = "it" if len(missing) == 1 else "them"
         raise UsageError(f"{name}: made with {safe_text(named)}; give {again} again with {ways}")
@@ -97,39 +94,32 @@ def check_plugins(attributes: Mapping[str, object], plugins: Plugins, name: str)
 
 def changed_plugins(attributes: Mapping[str, object], plugins: Plugins, name: str) -> tuple[str, ...]:
     """List, in a sentence each, the plug-ins whose current version differs from that of a result."""
-    current = _current_plugins(plugins)
     return tuple(
         f"{safe_text(name)}: was made with another version of "
-        f"{safe_text(_plugin_origin(record) or f'the model {key}')}: "
-        f"its SHA-256 is {safe_text(record.sha256, 64)}, this one's is {current[key].sha256}"
-        for key, record in _stored_plugins(attributes, name).items()
-        if record.sha256 and current[key].sha256 and record.sha256 != current[key].sha256
+        f"{safe_text(record.package or record.file or f'the model {key}')}: "
+        f"its SHA-256 is {safe_text(record.sha256, 64)}, this one's is {current.sha256}"
+        for key, record, current in _stored_and_current(attributes, plugins, name)
+        if current and current.sha256 and record.sha256 and record.sha256 != current.sha256
     )
 
 
 def unknown_plugins(attributes: Mapping[str, object], plugins: Plugins, name: str) -> tuple[str, ...]:
     """List, in a sentence each, the plug-ins without a hash, which cannot be compared with that of a result."""
-    current = _current_plugins(plugins)
     return tuple(
         f"{safe_text(name)}: the model {safe_text(key)} is a Python value that no file defines, so that it cannot "
         "be known to be the one that the result was made with; expected a model in a Python file"
-        for key, record in _stored_plugins(attributes, name).items()
-        if not (record.sha256 and current[key].sha256)
+        for key, record, current in _stored_and_current(attributes, plugins, name)
+        if not (current and current.sha256 and record.sha256)
     )
 
 
-def _stored_plugins(attributes: Mapping[str, object], name: str) -> dict[str, PluginRecord]:
-    records: dict[str, PluginRecord] = read_attribute(attributes, "plugins", name, required=True)
-    return records
-
-
-def _current_plugins(plugins: Plugins) -> dict[str, PluginRecord]:
-    return {key: PluginRecord(**record) for key, record in plugins.record.items()}
-
-
-def _plugin_origin(record: PluginRecord) -> str | None:
-    """Name the file or the package of a model."""
-    return record.package or record.file
+def _stored_and_current(
+    attributes: Mapping[str, object], plugins: Plugins, name: str
+) -> Iterator[tuple[str, PluginRecord, PluginRecord | None]]:
+    """Yield the key of each plug-in of a result, its record there, and that of the one given now."""
+    current = {key: PluginRecord(**record) for key, record in plugins.record.items()}
+    for key, record in read_attribute(attributes, "plugins", name, required=True).items():
+        yield key, record, current.get(key)
 
 
 def _how_to_supply(record: PluginRecord) -> str:

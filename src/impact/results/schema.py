@@ -309,30 +309,31 @@ def plan_coordinates(plan: Plan) -> xr.Coordinates:
     for name, value in plan.config.scalars.items():
         coordinates[name] = ((), value, coordinate_attributes(plan, name))
     coordinates["exponent"] = (*_exponents(plan), {"units": "1", "long_name": "compliance exponent n"})
-    if "alpha" in plan.inputs.names():
-        equation = "e = 1 - alpha (v1 - v2)  (24)"
-        attributes = {"units": "1", "long_name": "requested restitution", "equation": equation}
-        speed = ("speed", "angle") if "speed" in plan.inputs.names() else ("v1",)
-        restitutions = _derived_values(plan, ("alpha", *speed, "v2"), partial(restitution_at, plan.inputs))
-        coordinates["e"] = (*restitutions, attributes)
+    names = plan.inputs.names()
+
+    def derive(name: str, sources: Sequence[str], formula: Callable[[Index], Array], **attributes: str) -> None:
+        """Add a coordinate that follows from inputs, along their axes."""
+        axes = sorted({axis for source in sources for axis in plan.inputs.axes_of(source)})
+        region = [slice(None) if axis in axes else slice(1) for axis in range(len(plan.shape))]
+        values = formula(plan.inputs.index(region)).reshape([plan.shape[axis] for axis in axes])
+        dims = tuple(plan.config.axes[axis].name for axis in axes)
+        coordinates[name] = (dims, values, {**coordinate_attributes(plan, name), **attributes})
+
+    if "alpha" in names:
+        sources = ("alpha", *(("speed", "angle") if "speed" in names else ("v1",)), "v2")
+        texts = {"long_name": "requested restitution", "equation": "e = 1 - alpha (v1 - v2)  (24)"}
+        derive("e", sources, partial(restitution_at, plan.inputs), **texts)
     for ball in "12":
-        material = (
-            "material",
-            f"material{ball}",
-            *(f"materials.{name}.rho" for name in plan.inputs.materials_of(ball)),
-        )
-        if f"m{ball}" not in plan.inputs.names():
-            attributes = coordinate_attributes(plan, f"m{ball}") | {"equation": "m = (4/3) pi R^3 rho"}
-            masses = _derived_values(plan, (f"R{ball}", *material), partial(mass_at, plan.inputs, ball))
-            coordinates[f"m{ball}"] = (*masses, attributes)
-        elif plan.frictions and f"R{ball}" not in plan.inputs.names():
-            attributes = coordinate_attributes(plan, f"R{ball}") | {"equation": "m = (4/3) pi R^3 rho"}
-            radii = _derived_values(plan, (f"m{ball}", *material), partial(_radius, plan.inputs, ball))
-            coordinates[f"R{ball}"] = (*radii, attributes)
-    if "speed" in plan.inputs.names():
-        attributes = coordinate_attributes(plan, "v1") | {"equation": "v1 = v2 + speed cos(angle)"}
-        velocities = _derived_values(plan, ("speed", "angle", "v2"), partial(velocity_at, plan.inputs, "1"))
-        coordinates["v1"] = (*velocities, attributes)
+        densities = (f"materials.{name}.rho" for name in plan.inputs.materials_of(ball))
+        material = ("material", f"material{ball}", *densities)
+        equation = "m = (4/3) pi R^3 rho"
+        if f"m{ball}" not in names:
+            derive(f"m{ball}", (f"R{ball}", *material), partial(mass_at, plan.inputs, ball), equation=equation)
+        elif plan.frictions and f"R{ball}" not in names:
+            derive(f"R{ball}", (f"m{ball}", *material), partial(_radius, plan.inputs, ball), equation=equation)
+    if "speed" in names:
+        velocity = partial(velocity_at, plan.inputs, "1")
+        derive("v1", ("speed", "angle", "v2"), velocity, equation="v1 = v2 + speed cos(angle)")
     return xr.Coordinates(coordinates, indexes={})
 
 
@@ -419,24 +420,22 @@ def foreign_dims(dataset: xr.Dataset, model: str, friction: str = "") -> list[Ha
     return [dim for dim in dataset.dims if is_foreign(columns_along(dataset, dim), model, friction)]
 
 
-def parts_of_models(dataset: xr.Dataset) -> Iterator[xr.Dataset]:
-    """Select each model of a result, at the first position along the parameters of other models."""
-    for model, key in enumerate(dataset["model"].values):
-        first = dict.fromkeys(foreign_dims(dataset, str(key)), slice(0, 1))
-        yield dataset.isel({"model": model, **first})
+def parts_of_laws(dataset: xr.Dataset, dims: Iterable[Hashable]) -> Iterator[tuple[tuple[int, ...], xr.Dataset]]:
+    """Select each model, or each pair, of variables with some dimensions, and its position along those of laws.
 
-
-def parts_of_pairs(dataset: xr.Dataset) -> Iterator[xr.Dataset]:
-    """Select each pair of a result, at the first position along the parameters of other models and frictions."""
-    for model, key in enumerate(dataset["model"].values):
-        for friction, friction_key in enumerate(dataset["friction"].values):
-            first = dict.fromkeys(foreign_dims(dataset, str(key), str(friction_key)), slice(0, 1))
-            yield dataset.isel({"model": model, "friction": friction, **first})
+    Each is at the first position along the parameters of other laws; without the dimension of models it is all.
+    """
+    law_dims = [dim for dim in ("model", "friction") if dim in dims] if "model" in dims else []
+    keys = [dataset[dim].values.tolist() for dim in law_dims]
+    for place in np.ndindex(*map(len, keys)):
+        names = [str(of_dim[position]) for of_dim, position in zip(keys, place, strict=True)]
+        first = dict.fromkeys(foreign_dims(dataset, *names), slice(0, 1)) if names else {}
+        yield place, dataset.isel({**dict(zip(law_dims, place, strict=True)), **first})
 
 
 def count_points(dataset: xr.Dataset) -> int:
     """Count the points of a result: cells for a model, without repetitions along parameters of other laws."""
-    sizes = [part.sizes for part in parts_of_models(dataset)] if "model" in dataset.dims else [dataset.sizes]
+    sizes = [part.sizes for _, part in parts_of_laws(dataset, {"model"} & {*dataset.dims})]
     return sum(math.prod(size for dim, size in of_model.items() if dim != "friction") for of_model in sizes)
 
 
@@ -452,16 +451,6 @@ def _exponents(plan: Plan) -> tuple[tuple[str, ...], Array]:
 
 def _radius(inputs: Inputs, ball: str, index: Index) -> Array:
     return radius_at(inputs, ball, index, mass_at(inputs, ball, index))
-
-
-def _derived_values(
-    plan: Plan, names: Sequence[str], formula: Callable[[Index], Array]
-) -> tuple[tuple[str, ...], Array]:
-    """Compute values from inputs, along the axes of those inputs."""
-    axes = sorted({axis for name in names for axis in plan.inputs.axes_of(name)})
-    region = [slice(None) if axis in axes else slice(1) for axis in range(len(plan.shape))]
-    values = formula(plan.inputs.index(region))
-    return tuple(plan.config.axes[axis].name for axis in axes), values.reshape([plan.shape[axis] for axis in axes])
 
 
 def design_record(config: Config) -> dict[str, object]:

@@ -7,10 +7,8 @@ It is also the identity of a result: equal inputs give equal files within one in
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 from ..config.files import RESULT_MAGIC, file_hint
 from ..errors import MissingFileError, ResultError
@@ -43,7 +41,14 @@ def write_seal(file: Any) -> str:
 
 def check_seal(path: Path) -> str:
     """Return the seal of a file; raise a ResultError for one that is damaged or not a result of this schema."""
-    with open_regular_file(path) as file:
+    if not path.exists():
+        raise MissingFileError("does not exist")
+    if not path.is_file():
+        raise ResultError("is not a regular file")
+    # also a file of the system such as /proc/kmsg, of which reading might never end
+    if not path.stat().st_size:
+        raise ResultError("is not a readable result (empty: it does not begin with the header of a sealed file)")
+    with path.open("rb") as file:
         header = file.read(USER_BLOCK_BYTES)
         if header.startswith(HDF5_MAGIC):
             raise ResultError(
@@ -63,26 +68,12 @@ def check_seal(path: Path) -> str:
     return seal
 
 
-def is_result(path: Path) -> bool:
-    """Check whether a file begins like a result of this schema version or of version 1."""
+def is_result(path: Path, begins: tuple[bytes, ...] = (RESULT_MAGIC, HDF5_MAGIC)) -> bool:
+    """Check whether a file begins like a result of this schema version or, by default, of version 1."""
     if not path.is_file() or not path.stat().st_size:
         return False
     with path.open("rb") as file:
-        return file.read(len(RESULT_MAGIC)).startswith((RESULT_MAGIC, HDF5_MAGIC))
-
-
-@contextmanager
-def open_regular_file(path: Path) -> Iterator[BinaryIO]:
-    """Open a regular file for reading."""
-    if not path.exists():
-        raise MissingFileError("does not exist")
-    if not path.is_file():
-        raise ResultError("is not a regular file")
-    # also a file of the system such as /proc/kmsg, of which reading might never end
-    if not path.stat().st_size:
-        raise ResultError("is not a readable result (empty: it does not begin with the header of a sealed file)")
-    with path.open("rb") as file:
-        yield file
+        return file.read(len(RESULT_MAGIC)).startswith(begins)
 
 
 def _digest(file: Any) -> str:

@@ -26,14 +26,7 @@ HALF = ("first_half", "total_half")
 
 
 def sensitivity_template(plan: Plan, of: str, others: Sequence[str]) -> xr.Dataset:
-    """Build the dataset of a sensitivity study with placeholders for its numbers.
-
-    Parameters
-    ----------
-    plan : of its points
-    of : the output
-    others : names of the axes other than those of models and samples
-    """
+    """Build the dataset of a study of an output with placeholders; `others` are axes but of models and samples."""
     variables_of_plan = plan_coordinates(plan).variables.items()
     coordinates = {name: variable for name, variable in variables_of_plan if SAMPLE not in variable.dims}
     paths = [InputName.parse(name).config_key for name in plan.config.distributions]

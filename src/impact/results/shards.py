@@ -14,7 +14,9 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from ..atomic import atomic_write, check_outputs
 from ..config.draft import settings_of
@@ -179,14 +181,15 @@ def _complete_shard(output: Path, plan: Plan, shard: Shard, command: Sequence[st
     return ShardProgress(folder, len(ranges), len(plan.ranges), progress.trajectories, progress.failed, shard)
 
 
-@dataclass(frozen=True)
-class _ShardRecord:
-    """The record of a shard in its work folder."""
+class _ShardRecord(BaseModel):
+    """The record of a shard in its work folder; it is validated, since the folder may come from anywhere."""
 
-    shard: Shard
+    model_config = ConfigDict(strict=True, frozen=True)
+
+    shard: Annotated[Shard, BeforeValidator(lambda numbers: Shard.parse("/".join(map(str, numbers))))]
     command: tuple[str, ...]
-    core: str
-    attributes: Mapping[str, Any]
+    core: Annotated[str, Field(pattern=f"^({'|'.join(CORES)})$")]
+    attributes: dict[str, Any]
 
 
 def merge(
@@ -265,27 +268,16 @@ def merge(
 
 
 def _read_record(folder: Path) -> _ShardRecord:
-    """Read the record of a shard; it is validated, since the folder may come from anywhere."""
+    """Read the record of a shard."""
     try:
         if not (folder / SHARD_FILE_NAME).is_file():
             raise ValueError
-        fields = json.loads((folder / SHARD_FILE_NAME).read_text(encoding="utf-8"))
-        number, of = fields["shard"]
-        command, core, attributes = fields["command"], fields["core"], fields["attributes"]
-        is_valid = (
-            isinstance(number, int)
-            and isinstance(of, int)
-            and 1 <= number <= of
-            and isinstance(command, list)
-            and all(isinstance(word, str) for word in command)
-            and core in CORES
-            and {*RECORDED_ATTRIBUTES} <= attributes.keys()
-        )
-        if not is_valid:
+        record = _ShardRecord.model_validate_json((folder / SHARD_FILE_NAME).read_bytes())
+        if not {*RECORDED_ATTRIBUTES} <= record.attributes.keys():
             raise ValueError
-    except (OSError, ValueError, TypeError, AttributeError, KeyError, RecursionError):
+    except (OSError, ValueError, TypeError):
         raise UsageError(f"{folder}: is not a shard; expected a work folder of impact sweep --shard K/N") from None
-    return _ShardRecord(Shard(number, of), tuple(command), core, attributes)
+    return record
 
 
 def _locate_ranges(

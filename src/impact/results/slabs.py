@@ -23,39 +23,25 @@ VARIES_ALONG, ORIGINAL_DIMS = "varies_along", "axes"
 Slab = dict[Hashable, slice]
 
 
-def slabs(sizes: Mapping[Hashable, int], points: int = SLAB_POINTS) -> Iterator[Slab]:
-    """Divide all points, in C order, into slabs of at most `points` points.
+def slabs(
+    sizes: Mapping[Hashable, int], points: int = SLAB_POINTS, *, chunks: Sequence[int] | None = None
+) -> Iterator[Slab]:
+    """Divide all points, in C order, into slabs of about `points` points, of whole chunks if these have lengths.
 
     >>> list(slabs({"e": 2, "v1": 3}, 2))[:2]
     [{'e': slice(0, 1, None), 'v1': slice(0, 2, None)}, {'e': slice(0, 1, None), 'v1': slice(2, 3, None)}]
     >>> list(slabs({}))
     [{}]
-    """
-    shape = tuple(sizes.values())
-    # axes after `split` are whole in every slab, those before it have length one
-    split = next((axis for axis in range(len(shape)) if math.prod(shape[axis + 1 :]) <= points), 0)
-    step = max(1, points // max(1, math.prod(shape[split + 1 :])))
-    lengths = (*(1 for _ in shape[:split]), step, *shape[split + 1 :])
-    yield from _tiles(sizes, lengths[: len(shape)])
-
-
-def aligned_slabs(
-    sizes: Mapping[Hashable, int], lengths: Sequence[int], points: int = SLAB_POINTS
-) -> Iterator[Slab]:
-    """Divide all points into slabs of about `points` points, of whole chunks with the given lengths.
-
-    >>> [where["v1"] for where in aligned_slabs({"e": 2, "v1": 4}, (2, 2), 4)]
+    >>> [where["v1"] for where in slabs({"e": 2, "v1": 4}, 4, chunks=(2, 2))]
     [slice(0, 2, None), slice(2, 4, None)]
     """
-    shape, wide = tuple(sizes.values()), list(lengths)
+    shape = tuple(sizes.values())
+    lengths = [*(chunks or (1,) * len(shape))]
+    # the last axes are whole in every slab
     for axis in reversed(range(len(shape))):
-        wide[axis] = min(wide[axis] * max(1, points // math.prod(wide)), shape[axis])
-    yield from _tiles(sizes, wide)
-
-
-def _tiles(sizes: Mapping[Hashable, int], lengths: Sequence[int]) -> Iterator[Slab]:
+        lengths[axis] = min(lengths[axis] * max(1, points // math.prod(lengths)), max(1, shape[axis]))
     # an empty axis has no slab
-    steps = [range(0, size, max(1, length)) for size, length in zip(sizes.values(), lengths, strict=True)]
+    steps = [range(0, size, length) for size, length in zip(shape, lengths, strict=True)]
     for starts in itertools.product(*steps):
         yield {
             dim: slice(start, min(start + length, size))

@@ -6,7 +6,7 @@ import math
 import operator
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 import xarray as xr
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..contact.status import FIRST_FAILURE, FrictionStatus, Status
 from .attributes import SummaryRecord
-from .schema import parts_of_models, parts_of_pairs
+from .schema import parts_of_laws
 from .slabs import MAX_SUMMARY_POINTS, distinct_points, is_computed, slabs
 from .trajectory_table import ExpandedSlab, TrajectoryTable, computed_array, expand
 
@@ -23,6 +23,8 @@ ERROR_VARIABLES = ("e_error", "v1_error", "v2_error", "closed_form_error", "ener
 MAX_FAILED_AT = 3
 # limit of small indentations, as a fraction of the smaller radius
 MAX_SMALL_INDENTATION = 0.1
+S = TypeVar("S", Status, FrictionStatus)
+Place = TypeVar("Place", int, tuple[int, ...])
 
 
 @dataclass
@@ -78,39 +80,27 @@ class Summary:
     def add(
         self,
         values: Mapping[str, NDArray[Any]],
-        model: int,
+        place: tuple[int, ...],
         start: Sequence[int],
         radius: NDArray[Any] | None = None,
         weight: int = 1,
     ) -> Summary:
-        """Add points of a model from an index on, each `weight` times; the radius [m] is of the smaller ball."""
+        """Add points from an index on, each `weight` times; the radius [m] is of the smaller ball.
+
+        `place` is the number of the model, or those of the model and the friction law of a pair.
+        """
+        model = place[0]
         if "status" in values:
-            self._count(values["status"], model, start, weight)
+            self.points += weight * values["status"].size
+            self._count(values["status"], Status, self.counts, self.failed_at, model, start, weight)
+        if "friction_status" in values:
+            tally = self.friction_counts, self.friction_failed_at
+            self._count(values["friction_status"], FrictionStatus, *tally, place, start, weight)
         for name in ERROR_VARIABLES:
             if name in values:
                 self._judge(name, model, values[name])
         if radius is not None and "peak_indentation" in values:
             self._measure(values["peak_indentation"], radius, weight)
-        return self
-
-    def add_friction(
-        self,
-        values: Mapping[str, NDArray[Any]],
-        pair: tuple[int, ...],
-        start: Sequence[int],
-        weight: int = 1,
-    ) -> Summary:
-        """Count the points of a pair from an index on by their friction status, each `weight` times."""
-        array = values["friction_status"]
-        failed = (array >= FIRST_FAILURE) & (array != FrictionStatus.NOT_COMBINABLE)
-        n_more = self.max_failed_at - len(self.friction_failed_at)
-        for offsets in np.argwhere(failed)[:n_more].tolist():
-            index = tuple(map(operator.add, start, offsets))
-            self.friction_failed_at.append((FrictionStatus(int(array[tuple(offsets)])), pair, index))
-        statuses, counts = np.unique(array, return_counts=True)
-        for number, count in zip(statuses.tolist(), counts.tolist(), strict=True):
-            status = FrictionStatus(number)
-            self.friction_counts[status] = self.friction_counts.get(status, 0) + weight * count
         return self
 
     def _measure(self, indentation: NDArray[Any], radius: NDArray[Any], weight: int) -> None:
@@ -119,17 +109,27 @@ class Summary:
             self.deep += weight * int(np.count_nonzero(share > MAX_SMALL_INDENTATION))
             self.deepest = float(np.fmax.reduce(share, axis=None, initial=self.deepest))
 
-    def _count(self, status: NDArray[np.int8], model: int, start: Sequence[int], weight: int) -> None:
-        self.points += weight * status.size
-        times = np.bincount(status.reshape(-1))
+    def _count(
+        self,
+        array: NDArray[np.int8],
+        statuses: type[S],
+        counts: dict[S, int],
+        failed_at: list[tuple[S, Place, tuple[int, ...]]],
+        place: Place,
+        start: Sequence[int],
+        weight: int,
+    ) -> None:
+        """Count points by their status, and list the first that failed."""
+        times = np.bincount(array.reshape(-1))
         for number in np.flatnonzero(times).tolist():
-            status_code = Status(number)
-            self.counts[status_code] = self.counts.get(status_code, 0) + weight * int(times[number])
-        if times[FIRST_FAILURE:].any() and len(self.failed_at) < self.max_failed_at:
-            n_more = self.max_failed_at - len(self.failed_at)
-            for offsets in np.argwhere(status >= FIRST_FAILURE)[:n_more].tolist():
+            status = statuses(number)
+            counts[status] = counts.get(status, 0) + weight * int(times[number])
+        n_more = self.max_failed_at - len(failed_at)
+        if n_more > 0 and times[FIRST_FAILURE:].any():
+            failed = (array >= FIRST_FAILURE) & (array != FrictionStatus.NOT_COMBINABLE)
+            for offsets in np.argwhere(failed)[:n_more].tolist():
                 index = tuple(map(operator.add, start, offsets))
-                self.failed_at.append((Status(int(status[tuple(offsets)])), model, index))
+                failed_at.append((statuses(int(array[tuple(offsets)])), place, index))
 
     def _judge(self, name: str, model: int, values: NDArray[Any]) -> None:
         largest = float(np.fmax.reduce(np.abs(values), axis=None, initial=np.nan))
@@ -144,59 +144,38 @@ def add_slab(summary: Summary, table: TrajectoryTable, slab: ExpandedSlab) -> No
         return
     first = tuple(slice(None) if axis in axes else slice(1) for axis in range(len(slab.region)))
     counted = {name: array[first or ...] for name, array in slab.values.items()}
-    if len(slab.place) > 1:
-        summary.add_friction(counted, slab.place, [part.start for part in slab.region])
-        return
     radius = np.fmin(slab.impacts.R1, slab.impacts.R2)
-    summary.add(counted, slab.number, [part.start for part in slab.region], radius)
+    summary.add(counted, slab.place, [part.start for part in slab.region], radius)
 
 
-def summarize(
-    dataset: xr.Dataset, max_failed_at: int = MAX_FAILED_AT, max_points: float = MAX_SUMMARY_POINTS
-) -> Summary:
+def summarize(dataset: xr.Dataset, max_failed_at: int = MAX_FAILED_AT) -> Summary:
     """Summarize a result of any size.
 
     Each variable is evaluated over the axes along which it varies, one model after another, and each of its points
-    counts as often as it occurs. A computed variable that varies over more than `max_points` points of a model is
+    counts as often as it occurs. A computed variable that varies over more than MAX_SUMMARY_POINTS of a model is
     not evaluated: the error is then missing from `worst`, or the points are `not_counted`. The first distinct
     failed points in C order are recorded, at the first position along each axis on which the status is constant.
     """
     names = [name for name in ("status", *ERROR_VARIABLES) if name in dataset]
     record = _common_record(dataset, names)
-    if (
-        record is not None
-        and max_points == MAX_SUMMARY_POINTS
-        and (
-            # it lists all failures, or as many as required
-            len(record.failed_at) < MAX_FAILED_AT or max_failed_at <= MAX_FAILED_AT
-        )
-    ):
+    # it lists all failures, or as many as required
+    if record is not None and (len(record.failed_at) < MAX_FAILED_AT or max_failed_at <= MAX_FAILED_AT):
         return _stored_summary(record, dataset, names, max_failed_at)
     summary = Summary(max_failed_at=max_failed_at)
+    parts = [(names, law) for law in parts_of_laws(dataset, ["model"])]
     if "friction_status" in dataset:
-        count_friction(summary, dataset, max_points)
-    for model, model_data in enumerate(parts_of_models(dataset)):
-        for name in names:
-            variable, weight = distinct_points(model_data, name)
-            if variable.size <= max_points or not is_computed(variable):
+        parts += [(["friction_status"], law) for law in parts_of_laws(dataset, ["model", "friction"])]
+    for names_of_law, (place, part) in parts:
+        for name in names_of_law:
+            variable, weight = distinct_points(part, name)
+            if variable.size <= MAX_SUMMARY_POINTS or not is_computed(variable):
                 for slab in slabs(variable.sizes):
                     start = [slab[dim].start for dim in variable.dims]
-                    summary.add({name: variable.isel(slab).values}, model, start, weight=weight)
+                    summary.add({name: variable.isel(slab).values}, place, start, weight=weight)
             elif name == "status":
                 summary.points += weight * variable.size
                 summary.not_counted += weight * variable.size
     return summary
-
-
-def count_friction(summary: Summary, dataset: xr.Dataset, max_points: float) -> None:
-    """Count the points of pairs of a model and a friction law by their friction status."""
-    for number, pair in enumerate(parts_of_pairs(dataset)):
-        place = divmod(number, dataset.sizes["friction"])
-        variable, weight = distinct_points(pair, "friction_status")
-        if variable.size <= max_points or not is_computed(variable):
-            for slab in slabs(variable.sizes):
-                start = [part.start for part in slab.values()]
-                summary.add_friction({"friction_status": variable.isel(slab).values}, place, start, weight)
 
 
 class Extremes(NamedTuple):
@@ -237,9 +216,7 @@ def extremes_of(dataset: xr.Dataset, name: str) -> Extremes | None:
 
 def _distinct_parts(dataset: xr.Dataset, name: str) -> list[tuple[xr.Variable, int]] | None:
     """List the distinct points of a variable of each model, and their weights; None if they are too many."""
-    dims = dataset.variables[name].dims
-    laws = parts_of_pairs if "friction" in dims else parts_of_models
-    parts = [distinct_points(part, name) for part in (laws(dataset) if "model" in dims else (dataset,))]
+    parts = [distinct_points(part, name) for _, part in parts_of_laws(dataset, dataset.variables[name].dims)]
     evaluations = sum(variable.size for variable, _ in parts)
     return None if evaluations > MAX_SUMMARY_POINTS and is_computed(dataset.variables[name]) else parts
 
@@ -253,10 +230,9 @@ def summarize_table(dataset: xr.Dataset, table: TrajectoryTable) -> tuple[Summar
     for name in map(str, dataset.data_vars):
         parts = _distinct_parts(dataset, name)
         extremes[name] = None if parts is None else Extremes()
-        of_friction = "friction" in dataset[name].dims
-        laws = parts_of_pairs if of_friction else parts_of_models
-        distinct = parts or [distinct_points(part, name) for part in laws(dataset)]
-        for model, (variable, weight) in enumerate(distinct, len(table.laws) if of_friction else 0):
+        dims = dataset[name].dims
+        distinct = parts or [distinct_points(part, name) for _, part in parts_of_laws(dataset, {"model", *dims})]
+        for model, (variable, weight) in enumerate(distinct, len(table.laws) if "friction" in dims else 0):
             is_judged = name in ("status", "friction_status", *ERROR_VARIABLES)
             if parts is not None or (is_judged and variable.size <= MAX_SUMMARY_POINTS):
                 sizes = tuple(variable.sizes[axis] for axis in axes)
@@ -275,10 +251,7 @@ def summarize_table(dataset: xr.Dataset, table: TrajectoryTable) -> tuple[Summar
                 values[name] = np.broadcast_to(typed if region else typed.reshape(()), size)
                 so_far = extremes[name]
                 extremes[name] = so_far and so_far.add(values[name], weight)
-            if "friction_status" in values:
-                summary.add_friction(values, table.place(model), [part.start for part in region], weight)
-            if model < len(table.laws):
-                summary.add(values, model, [part.start for part in region], weight=weight)
+            summary.add(values, table.place(model), [part.start for part in region], weight=weight)
     return summary, extremes
 
 
@@ -342,6 +315,11 @@ def worst_by_model(summary: Summary, dataset: xr.Dataset) -> dict[str, dict[str,
         name: {keys[model]: largest for model, largest in by_model.items()}
         for name, by_model in summary.worst.items()
     }
+
+
+def counts_text(counts: Mapping[Any, int]) -> str:
+    """Write the number of points by status."""
+    return ", ".join(f"{count:,} {name}" for name, count in counts_by_name(counts).items())
 
 
 def counts_by_name(counts: Mapping[Any, int]) -> dict[str, int]:

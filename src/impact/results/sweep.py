@@ -391,12 +391,7 @@ def find_finished(path: Path, plan: Plan) -> SweepOutcome | None:
         dataset = open_result(path)
     except ResultError:
         return None
-    if dataset.attrs.get("fingerprint") != plan.fingerprint:
-        dataset.close()
-        return None
-    axes = dict(zip((axis.name for axis in plan.config.axes), plan.shape, strict=True))
-    frictions = {"friction": len(plan.frictions)} if plan.frictions else {}
-    if dict(dataset.sizes) != {"model": len(plan.models), **frictions, **axes}:
+    if dataset.attrs.get("fingerprint") != plan.fingerprint or dict(dataset.sizes) != plan.sizes:
         dataset.close()
         return None
     return SweepOutcome(dataset, summarize(dataset), plan.trajectories, is_new=False, output=path)

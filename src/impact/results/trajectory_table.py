@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Hashable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from functools import cached_property
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -40,12 +40,13 @@ from ..engine.trajectories import (
     TrajectoryMap,
     TrajectoryRange,
     axes_of_arrays,
+    checked_arrays,
     even_size,
     probe_index,
 )
 from .attributes import SummaryRecord
 from .schema import attributes_of
-from .slabs import ORIGINAL_DIMS, VARIES_ALONG, aligned_slabs, slabs
+from .slabs import ORIGINAL_DIMS, VARIES_ALONG, slabs
 
 # a law's rule of K is evaluated as a whole, and stored in a file, up to this many values
 MAX_STIFFNESS_VALUES = 10**6
@@ -102,15 +103,6 @@ class TrajectoryRows:
         return trajectories
 
 
-class NamedFriction(Protocol):
-    """What outputs depend on of a friction law: a `FrictionLaw`, or what a file stores of it."""
-
-    @property
-    def key(self) -> str: ...
-    @property
-    def kind(self) -> FrictionKind: ...
-
-
 @dataclass(frozen=True)
 class TrajectoryTable:
     """The trajectories of a sweep, with everything else that the outputs depend on.
@@ -119,7 +111,7 @@ class TrajectoryTable:
     maps : of each model, then of the pairs of each model with each friction law
     stiffness : K of each law that has a rule for it but no formula (a law of a file); None otherwise
     summary : of all points, if the file contains one
-    frictions : the friction laws
+    frictions : the kinds of the friction laws by key
     """
 
     inputs: Inputs
@@ -128,7 +120,7 @@ class TrajectoryTable:
     rows: TrajectoryRows
     stiffness: tuple[Stiffness | None, ...]
     summary: SummaryRecord | None = None
-    frictions: tuple[NamedFriction, ...] = ()
+    frictions: Mapping[str, FrictionKind] = field(default_factory=dict)
 
     def numbers(self, of_friction: bool) -> range:
         """The numbers of the maps of the models, or of the pairs."""
@@ -143,7 +135,7 @@ class TrajectoryTable:
     def keys(self, number: int) -> tuple[str, ...]:
         """The key of the model of a map, and that of the friction law of a pair."""
         model, *friction = self.place(number)
-        return (self.laws[model].key, *(self.frictions[law].key for law in friction))
+        return (self.laws[model].key, *([*self.frictions][law] for law in friction))
 
     @cached_property
     def checks(self) -> tuple[frozenset[str], ...]:
@@ -157,7 +149,8 @@ class TrajectoryTable:
 def table_of(plan: Plan, read: Callable[[int, int, int], Record]) -> TrajectoryTable:
     """Build the trajectory table of a plan; for `read` see `TrajectoryRows`."""
     rows, no_rules = TrajectoryRows(plan.maps, read), (None,) * len(plan.models)
-    return TrajectoryTable(plan.inputs, plan.models, plan.maps, rows, no_rules, frictions=plan.frictions)
+    frictions = {friction.key: friction.kind for friction in plan.frictions}
+    return TrajectoryTable(plan.inputs, plan.models, plan.maps, rows, no_rules, frictions=frictions)
 
 
 def table_of_ranges(plan: Plan, load: Callable[[TrajectoryRange], Record]) -> TrajectoryTable:
@@ -181,7 +174,7 @@ def expand(table: TrajectoryTable, number: int, index: Index, names: Sequence[st
     if not friction:
         return impacts, outputs(law, impacts, result, names, checked)
     tangential = table.rows.take(number, table.maps[number].rows(index))
-    of_friction = (build_oblique(table.inputs, impacts, index), tangential, table.frictions[friction[0]].kind)
+    of_friction = (build_oblique(table.inputs, impacts, index), tangential, table.frictions[table.keys(number)[1]])
     return impacts, outputs(law, impacts, result, names, checked, of_friction)
 
 
@@ -193,13 +186,8 @@ def varies_along(table: TrajectoryTable, number: int, names: Sequence[str]) -> d
     index = probe_index(inputs, {"n"})
     impacts = build_impacts(inputs, law, index, table.stiffness[model])
     # assume that every check that may fail does, so that the masks have all axes that they may have
-    with np.errstate(all="ignore"):
-        checked_arrays = {
-            "e": [impacts.e],
-            "v0": [impacts.v0],
-            "length": [impacts.v0, impacts.length, impacts.energy, impacts.time],
-        }
-    shapes = [array.shape for check in table.checks[model] for array in checked_arrays[check]]
+    arrays = checked_arrays(impacts)
+    shapes = [array.shape for check in table.checks[model] for array in arrays[check]]
     checked = np.broadcast_shapes((1,) * dimensions(index), *shapes)
     status = _alternating_statuses(checked, Status.NO_IMPACT, Status.OUT_OF_RANGE)
 
@@ -211,7 +199,7 @@ def varies_along(table: TrajectoryTable, number: int, names: Sequence[str]) -> d
     collisions, of_friction = blank(CollisionResult, model, Status.MAX_STEPS), None
     if friction:
         tangential = blank(TangentialResult, number, FrictionStatus.MAX_STEPS, FrictionStatus.LIMIT)
-        of_friction = (build_oblique(inputs, impacts, index), tangential, table.frictions[friction[0]].kind)
+        of_friction = (build_oblique(inputs, impacts, index), tangential, table.frictions[table.keys(number)[1]])
     values = outputs(law, impacts, collisions, names, status, of_friction)
     return {name: tuple(sorted(axes_of_arrays([values[name]]))) for name in names}
 
@@ -432,7 +420,7 @@ def expanded_slabs(
             for variable in variables
             if variable.of_friction == of_friction and (variable.per_model or number == 0)
         ]
-        for slab in aligned_slabs(sizes, chunks) if chunks else slabs(sizes):
+        for slab in slabs(sizes, chunks=chunks):
             region = tuple(slab.values())
             index = table.inputs.index(region)
             impacts, arrays = expand(table, number, index, [variable.name for variable in chosen])

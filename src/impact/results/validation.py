@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 
 import numpy as np
 import xarray as xr
@@ -14,7 +14,6 @@ import xarray as xr
 from ..config.input_names import InputName
 from ..config.tables import MATERIAL_KEYS, MATERIAL_QUANTITIES, SWEEP_QUANTITIES
 from ..contact.simulate import TABLE_COLUMNS
-from ..contact.status import FRICTION_STATUSES, STATUSES
 from ..contact.tangential import TangentialResult
 from ..contact.variables import AXES, OUTPUTS
 from ..errors import ResultError
@@ -22,9 +21,9 @@ from ..formatting import safe_text
 from .attributes import ATTRIBUTE_TYPES, read_attribute
 from .kinds import Kind, kind_of
 from .schema import (
+    BOARD,
+    CALIBRATION,
     CALIBRATION_TEXTS,
-    CHECK_STATUSES,
-    FIT_STATUSES,
     MODEL_METADATA,
     SCHEMA,
     STUDY_COORDINATES,
@@ -77,11 +76,24 @@ def is_quantity(name: str, axes: tuple[str, ...]) -> bool:
     return bool(kinds - {"history"}) or (bool(kinds) and axes == ("t",))
 
 
-# required attributes of a result: text, in part JSON, and numbers
-TEXT_ATTRIBUTES = ("title", "config", "config_set", "fingerprint", "impact_version", "packages", "plugins")
+# required attributes by kind: text, in part JSON; and numbers of results
+_SWEEP_TEXTS = ("title", "config", "config_set", "fingerprint", "impact_version", "packages", "plugins")
+TEXT_ATTRIBUTES: Mapping[Kind, Sequence[str]] = {
+    "sweep": _SWEEP_TEXTS,
+    "sensitivity study": _SWEEP_TEXTS,
+    "calibration": (*_SWEEP_TEXTS, "noise", "data_file", "varied", "fit_paths", "fit_bounds"),
+    "board": ("title", "suite", "impact_version", "packages"),
+    "history": (),
+}
 NUMBER_ATTRIBUTES = ("rtol", "max_steps")
-BOARD_ATTRIBUTES = ("title", "suite", "impact_version", "packages")
-CALIBRATION_ATTRIBUTES = ("noise", "data_file", "varied", "fit_paths", "fit_bounds")
+# axes whose labels differ, and statuses, with what each is called in a message
+UNIQUE_LABELS = {"model": "a model", "engine": "an engine", "check": "a check"}
+STATUS_NOUNS = {
+    "status": "status",
+    "friction_status": "status",
+    "fit_status": "outcome of a fit",
+    "check_status": "outcome of a check",
+}
 # attributes of factored files, which a dataset does not have
 FACTORED_ATTRIBUTES = ("laws", "axes", "summary", "pairs", "frictions")
 # statuses that are checked at a time
@@ -90,14 +102,11 @@ STATUS_SLAB_POINTS = 2**22
 
 def schema_violation(dataset: xr.Dataset) -> str | None:
     """The first reason why a dataset is neither a result nor a time history, or None."""
-    checks = (
-        _name_violations,
-        _axis_violations,
-        _type_violations,
-        _attribute_violations,
-        FORM_VIOLATIONS.get(kind_of(dataset), _result_violations),
-        _study_violations,
-    )
+    kind = kind_of(dataset)
+    checks = [_name_violations, _axis_violations, _type_violations, _attribute_violations, _status_violations]
+    if kind != "board":
+        checks.append(_history_violations if kind == "history" else _result_violations)
+    checks.append(_study_violations)
     return next((safe_text(fault) for check in checks for fault in check(dataset)), None)
 
 
@@ -109,10 +118,13 @@ def _name_violations(dataset: xr.Dataset) -> Iterator[str]:
 
 
 def _axis_violations(dataset: xr.Dataset) -> Iterator[str]:
-    """Axes without values."""
+    """Axes without values, or with a label that occurs twice."""
     for name, size in dataset.sizes.items():
         if name not in dataset.coords or not size:
             yield f"its axis {name} has no values"
+    for label, noun in UNIQUE_LABELS.items():
+        if label in dataset.indexes and not dataset.indexes[label].is_unique:
+            yield f"{noun} occurs twice"
 
 
 def _type_violations(dataset: xr.Dataset) -> Iterator[str]:
@@ -131,7 +143,7 @@ def _type_violations(dataset: xr.Dataset) -> Iterator[str]:
 
 
 def _attribute_violations(dataset: xr.Dataset) -> Iterator[str]:
-    """Attributes of files only, and JSON of another type than expected."""
+    """Attributes of files only, JSON of another type than expected, and missing texts."""
     for key in FACTORED_ATTRIBUTES:
         if key in dataset.attrs:
             yield f"{key}: an attribute of files in layout factored"
@@ -140,6 +152,19 @@ def _attribute_violations(dataset: xr.Dataset) -> Iterator[str]:
             read_attribute(dataset.attrs, key)
         except ResultError as error:
             yield str(error)
+    for key in TEXT_ATTRIBUTES[kind_of(dataset)]:
+        if not isinstance(dataset.attrs.get(key), str):
+            yield f"no {key}, or not as text"
+
+
+def _status_violations(dataset: xr.Dataset) -> Iterator[str]:
+    """Numbers that are no status; computed statuses always are one."""
+    for name, noun in STATUS_NOUNS.items():
+        if name in dataset and not (is_lazy(dataset[name].variable) and VARIES_ALONG in dataset[name].encoding):
+            known = [*{**OUTPUTS, **CALIBRATION, **BOARD}[name].flags.values()]
+            parts = (dataset[name].isel(where).values for where in slabs(dataset[name].sizes, STATUS_SLAB_POINTS))
+            if any(not np.isin(np.unique(part), known).all() for part in parts):
+                yield f"{name}: got a number that is no {noun}"
 
 
 def _history_violations(dataset: xr.Dataset) -> Iterator[str]:
@@ -150,41 +175,18 @@ def _history_violations(dataset: xr.Dataset) -> Iterator[str]:
 
 
 def _result_violations(dataset: xr.Dataset) -> Iterator[str]:
-    """What every result has: models with metadata, known statuses and attributes."""
+    """What every result has: models with metadata, and numbers of the solver."""
     if "model" not in dataset.dims:
         yield "model is not an axis; select models as a list, sel(model=[...])"
-    elif not dataset.indexes["model"].is_unique:
-        yield "a model occurs twice"
     for name in MODEL_METADATA:
         if name not in dataset or dataset[name].dims != ("model",):
             yield f"{name} of the models is missing"
     for name, variable in OUTPUTS.items():
         if name in dataset and not variable.per_model and "model" in dataset[name].dims:
             yield f"{name}: lies along model"
-    for name, statuses in (("status", STATUSES), ("friction_status", FRICTION_STATUSES)):
-        if name in dataset and _has_unknown_status(dataset[name], statuses):
-            yield f"{name}: got a number that is no status"
-    yield from _missing_texts(dataset, TEXT_ATTRIBUTES)
     for key in NUMBER_ATTRIBUTES:
         if not isinstance(dataset.attrs.get(key), int | float | np.number):
             yield f"no {key}, or not as a number"
-
-
-def _board_violations(dataset: xr.Dataset) -> Iterator[str]:
-    """What every board has: unique labels, known statuses and attributes."""
-    for name in ("engine", "check"):
-        if name in dataset.dims and not dataset.indexes[name].is_unique:
-            yield f"{name}: a label occurs twice"
-    if "check_status" in dataset and not np.isin(dataset["check_status"], [*CHECK_STATUSES.values()]).all():
-        yield "check_status: got a number that is no outcome of a check"
-    yield from _missing_texts(dataset, BOARD_ATTRIBUTES)
-
-
-def _missing_texts(dataset: xr.Dataset, keys: Iterable[str]) -> Iterator[str]:
-    """Attributes that are missing or not text."""
-    for key in keys:
-        if not isinstance(dataset.attrs.get(key), str):
-            yield f"no {key}, or not as text"
 
 
 def _study_violations(dataset: xr.Dataset) -> Iterator[str]:
@@ -210,39 +212,9 @@ def _study_violations(dataset: xr.Dataset) -> Iterator[str]:
     for name, dim in STUDY_COORDINATES[kind].items():
         if name not in absent and (name not in dataset.coords or dataset[name].dims != (dim,)):
             yield f"{name}: expected a coordinate along {dim}"
-    if kind == "calibration":
-        yield from _calibration_violations(dataset)
-    elif kind == "sensitivity study":
-        yield from _sensitivity_violations(dataset)
-
-
-def _calibration_violations(dataset: xr.Dataset) -> Iterator[str]:
-    """Attributes and outcomes of fits that a calibration does not have."""
-    yield from _missing_texts(dataset, CALIBRATION_ATTRIBUTES)
-    if len(read_attribute(dataset.attrs, "fit_paths")) != dataset.sizes.get("parameter"):
+    if kind == "calibration" and len(read_attribute(dataset.attrs, "fit_paths")) != dataset.sizes["parameter"]:
         yield "fit_paths: expected a config path for each parameter"
-    if "fit_status" in dataset and not np.isin(dataset["fit_status"].values, range(len(FIT_STATUSES))).all():
-        yield "fit_status: got a number that is no outcome of a fit"
-
-
-def _sensitivity_violations(dataset: xr.Dataset) -> Iterator[str]:
-    """Attributes that a sensitivity study does not have."""
-    if dataset.attrs.get("of") not in OUTPUTS:
+    if kind == "sensitivity study" and dataset.attrs.get("of") not in OUTPUTS:
         yield "of: expected the name of an output"
-    if not read_attribute(dataset.attrs, "design"):
+    if kind == "sensitivity study" and not read_attribute(dataset.attrs, "design"):
         yield "no design"
-
-
-# what a dataset has that is not the result of a sweep, or of a study that has its coordinates
-FORM_VIOLATIONS: Mapping[Kind, Callable[[xr.Dataset], Iterator[str]]] = {
-    "history": _history_violations,
-    "board": _board_violations,
-}
-
-
-def _has_unknown_status(status: xr.DataArray, known: Sequence[int]) -> bool:
-    """Whether a status is unknown; computed statuses are always known."""
-    if is_lazy(status.variable) and VARIES_ALONG in status.encoding:
-        return False
-    parts = (status.isel(where).values for where in slabs(status.sizes, STATUS_SLAB_POINTS))
-    return any(not np.isin(np.unique(part), known).all() for part in parts)

@@ -25,7 +25,7 @@ from .kinds import kind_of, require_result, require_sweep
 from .layouts import LAYOUTS
 from .netcdf import RegionValues, encode_attribute, read_variables, write_dataset
 from .schema import MODEL_METADATA
-from .seal import check_seal, write_seal
+from .seal import check_seal, is_result, write_seal
 from .selection import select, select_laws
 from .slabs import slabs
 from .trajectory_table import in_memory, table_of_result
@@ -289,10 +289,6 @@ class ImpactBackend(BackendEntrypoint):
 
     def guess_can_open(self, filename_or_obj: Any) -> bool:
         try:
-            path = Path(filename_or_obj)
-            if not path.is_file():
-                return False
-            with path.open("rb") as file:
-                return file.read(len(RESULT_MAGIC)) == RESULT_MAGIC
+            return is_result(Path(filename_or_obj), (RESULT_MAGIC,))
         except (OSError, TypeError, ValueError):
             return False
