@@ -52,8 +52,9 @@ peers: $(VENV)/dev
 		$(PEERS)/bin/python -m pip install --quiet --disable-pip-version-check "$$wheel" < /dev/null || echo "not installed: $$wheel"; \
 	done
 
+# a third of the time these tests wait for other programs to start
 test-peers: peers  ## compare entries of codes with LAMMPS, LIGGGHTS, YADE, MuJoCo, Drake, Simbody, OpenSees, Kratos, PyBullet, EXUDYN and Newton
-	PEERS_VENV=$(PEERS) $(BIN)/python -m pytest -n auto --dist worksteal --durations=20 -m peers tests/test_peers.py tests/test_friction_peers.py tests/test_exported_scripts.py tests/test_conform.py
+	PEERS_VENV=$(PEERS) $(BIN)/python -m pytest -n 3 --dist worksteal --durations=40 -m peers tests/test_peers.py tests/test_friction_peers.py tests/test_exported_scripts.py tests/test_conform.py
 
 # with a release of LAMMPS from 2022 beside the newest one
 conform: peers  ## run the engines of impact conform, and write their board docs/conform/board.md

@@ -211,7 +211,7 @@ def test_a_history_at_uniform_times(cli: Run, tmp_path: Path) -> None:
     done = cli(*words, "--times", "200", cwd=tmp_path)
     assert (done.returncode, done.stderr) == (2, "--times 200: expected --history FILE as well\n")
     done = cli(*words, "--history", "h.h5", "--times", "1", cwd=tmp_path)
-    assert (done.returncode, done.stderr) == (2, "times: got 1, expected a whole number >= 2\n")
+    assert (done.returncode, done.stderr) == (2, "--times: got 1, expected a whole number >= 2\n")
     done = cli(*words, "--at", "K=1e8", "--history", "h.h5", "--times", "200", cwd=tmp_path)
     assert (done.returncode, done.stderr) == (0, "h.h5: 200 points in time\n")
     # parameters of the law have their units
