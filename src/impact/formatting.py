@@ -129,13 +129,13 @@ def label(value: object) -> str:
 
 
 def rounded(value: float, digits: int, *, up: bool) -> float:
-    """Round a number to digits, to the side where a bound of it still holds.
+    """Round a number to digits, to the side where a bound of it still holds but for rounding errors.
 
-    >>> rounded(1.16977e-05, 3, up=False), rounded(0.0242711, 4, up=True)
-    (1.16e-05, 0.02428)
+    >>> rounded(1.16977e-05, 3, up=False), rounded(0.0242711, 4, up=True), rounded(0.3 - 1e-16, 3, up=False)
+    (1.16e-05, 0.02428, 0.3)
     """
     rounding = ROUND_CEILING if up else ROUND_FLOOR
-    return float(Context(prec=digits, rounding=rounding).create_decimal_from_float(value))
+    return float(Context(prec=digits, rounding=rounding).create_decimal(f"{value:.13g}"))
 
 
 def quantity(value: object, unit: str = "1", digits: int = 6) -> str:

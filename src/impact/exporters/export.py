@@ -225,7 +225,7 @@ def export(
     with nullcontext() if parameter else suppress(UsageError):
         if name:
             needed = timestep.needed_parameter(
-                problem.point, Plugins(), name, dt, ADVISED_TOL, problem.law, problem.outputs
+                problem.point, Plugins(), name, dt, ADVISED_TOL, problem.law, problem.outputs, advised
             )
     needed_text = str(needed or (timestep.missing_parameter(parameter, ADVISED_TOL) if parameter else ""))
     header = _header(problem, collision, at_dt, advised, needed_text)

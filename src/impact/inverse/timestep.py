@@ -365,6 +365,11 @@ def timestep(
     law, collision = fixed_step_law(point.config, phases, scheme, of_friction=True)
     warn_of_point(point_source, point, collision["e_out"])
     steps = time_steps(law.contact_time, counts or (() if given else STEPS_PER_CONTACT), given)
+    needed, found = None, None
+    if tol is not None:
+        needed = needed_steps(law, tol, collision["e_out"])
+        if parameter is not None:
+            found = needed_parameter(point, plugin_set, parameter, given[0], tol, law, collision, needed)
     return TimestepResult(
         model=law.model.key,
         scheme=law.scheme,
@@ -372,14 +377,12 @@ def timestep(
         e_continuous=collision["e_out"],
         contact_time=law.contact_time,
         rows=timestep_rows(law, steps),
-        needed=None if tol is None else needed_steps(law, tol, collision["e_out"]),
+        needed=needed,
         phases=phases,
         tol=tol,
         solved=point.solved,
         parameter=parameter or "",
-        needed_parameter=None
-        if parameter is None or tol is None
-        else needed_parameter(point, plugin_set, parameter, given[0], tol, law, collision),
+        needed_parameter=found,
         rayleigh_time=law.rayleigh_time,
         friction=law.oblique.pair.friction.key if law.oblique else "",
         beta_continuous=collision.get("beta", math.nan),
@@ -535,11 +538,15 @@ def compensated_e(law: FixedStepLaw, dt: Array) -> Array:
 
 
 def needed_steps(
-    law: FixedStepLaw, tol: float, e_continuous: float, most: int = MAX_STEPS_PER_CONTACT, start: int = 2
+    law: FixedStepLaw,
+    tol: float,
+    e_continuous: float,
+    most: int = MAX_STEPS_PER_CONTACT,
+    nearby: NeededSteps | None = None,
 ) -> NeededSteps | None:
     """Search for the smallest number of steps per contact with which every phase is within a tolerance.
 
-    The search begins at `start`: a number that is enough for a similar law mostly is the answer.
+    The search begins at the number that a similar law needs, which mostly is the answer.
     """
     target = law.e if law.has_e else e_continuous
     if not target > 0.0:
@@ -555,7 +562,8 @@ def needed_steps(
         error = float(np.abs(e - target).max()) / (tol * target)
         return math.log(error or EXACT_ERROR) if math.isfinite(error) else math.inf
 
-    lower, upper, turn = start - 1, start, 0
+    upper, turn = 2 if nearby is None else min(max(nearby.steps_per_contact, 2), most), 0
+    lower = upper - 1
     if lower > 1 and log_error(lower) <= 0.0:
         lower, upper = 1, lower
     while log_error(upper) > 0.0:
@@ -585,14 +593,16 @@ def needed_parameter(
     tol: float,
     law: FixedStepLaw,
     collision: Mapping[str, float],
+    needed: NeededSteps | None = None,
 ) -> NeededParameter | None:
     """Find the value of a parameter from which on every phase is within a tolerance at a step dt [s].
 
-    The law and the collision are those of the point. Where its damping was solved for, e is kept by the damping in
-    the contact's own units, which is enough where the law has a single time scale, else by solving again.
+    The law, the collision and, where they are known, the needed steps are those of the point. Where its damping
+    was solved for, e is kept by the damping in the contact's own units, which is enough where the law has a single
+    time scale, else by solving again.
     """
     if name == RELAXATION_TIME:
-        return _needed_relaxation_time(point, plugins, dt, tol, law, collision)
+        return _needed_relaxation_time(point, plugins, dt, tol, law, collision, needed)
     config, model = point.config, law.model
     e = None if point.solved is None else float(config.scalars["e"])
     unknown, path, value = _seek(config, law, name)
@@ -622,12 +632,11 @@ def needed_parameter(
         slope = math.log(nearby.contact_time / law.contact_time) / math.log(NEARBY)
     if abs(slope) < MIN_SLOPE:
         raise UsageError(f"{argument('parameter')}: {name} does not set the contact time of {model.key}")
-    changed, start = config, 2
+    changed = config
     for _ in range(MAX_SECANTS):
-        needed = needed_steps(law, tol, collision["e_out"], MAX_SECANT_STEPS, start)
+        needed = needed_steps(law, tol, collision["e_out"], MAX_SECANT_STEPS, needed)
         if needed is None:
             return None
-        start = needed.steps_per_contact
         distance = math.log(law.contact_time / (needed.steps_per_contact * dt))
         if abs(distance) < SECANT_TOLERANCE:
             return NeededParameter(
@@ -662,6 +671,7 @@ def _needed_relaxation_time(
     tol: float,
     law: FixedStepLaw,
     collision: Mapping[str, float],
+    known: NeededSteps | None,
 ) -> NeededParameter | None:
     """Find the relaxation time of SAP, and the K with which it keeps e, from which it follows."""
     role = argument("parameter")
@@ -674,7 +684,7 @@ def _needed_relaxation_time(
             f"{role}: {RELAXATION_TIME} = C/K sets e at a given K, and not the contact time: expected "
             f"{argument('at', 0.8, key='e')} or another e < 1, which K and {RELAXATION_TIME} together keep"
         )
-    needed = needed_parameter(point, plugins, "K", dt, tol, law, collision)
+    needed = needed_parameter(point, plugins, "K", dt, tol, law, collision, known)
     if needed is None:
         return None
     return replace(
