@@ -131,6 +131,15 @@ def test_a_law_at_a_limit_of_the_physics_is_ranked_by_its_criterion(tmp_path: Pa
     assert (swept["model"].item(), swept["e"].item()) == ("tsuji-1992", 1.0)
 
 
+def test_a_law_without_a_parameter_to_fit_is_first_where_one_more_parameter_improves_the_fit_little() -> None:
+    """AICc, not the reduced chi2, ranks: e improves chi2 by 1.9 and costs 2 + 4/3."""
+    data = {"columns": {"e_out": [0.939, 0.945, 0.951, 0.957, 0.963]}, "sigma": 0.01}
+    fit = impact.calibrate(ELASTIC | {"data": data})
+    assert fit["model"].values.tolist() == ["kuwabara-kono-1987", "tsuji-1992"]
+    assert (fit["chi2_reduced"][0] > fit["chi2_reduced"][1]).item()
+    assert fit["aicc"].diff("model").item() == pytest.approx(2.0 + 4.0 / 3.0 - 5 * 0.63**2, abs=0.01)
+
+
 def test_the_best_config_has_the_law_that_fits_best_at_a_bound_too(tmp_path: Path) -> None:
     """A search that ends at 0.96 is still nearer to the data than a law without a parameter to fit."""
     change = {"sweep": ELASTIC["sweep"] | {"e": {"fit": [0.5, 0.96]}}}
