@@ -644,6 +644,18 @@ def test_the_tolerance_on_beta_is_four_indentations_over_the_effective_radius(tm
     assert wall.beta_uncertainty == wall.uncertainty == 1e-9
 
 
+@pytest.mark.parametrize(
+    ("code", "run"), [("lammps", r"^run +(\d+)$"), ("mujoco", r"^mujoco.mj_step\(model, data, (\d+)\)$")]
+)
+def test_a_script_runs_until_two_contact_times_after_the_first_contact(code: str, run: str) -> None:
+    """The balls begin up to three steps before the contact."""
+    contact_time = impact.export(code, at={"e": 0.5}).as_dict()["contact_time"]
+    for steps_per_contact in (7, 100):
+        script = impact.export(code, at={"e": 0.5}, dt=contact_time / steps_per_contact, script=True).script
+        (steps,) = re.findall(run, script, re.MULTILINE)
+        assert 3 + 2 * steps_per_contact <= int(steps) <= 3 + 3 * steps_per_contact
+
+
 @pytest.mark.parametrize(("phase", "value"), list(enumerate(["nan", "inf", "-nan", "nan"])))
 def test_a_restitution_that_is_no_number_differs_at_any_phase(
     tmp_path: Path, predicted: tuple[float, ...], phase: int, value: str
