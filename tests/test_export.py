@@ -625,8 +625,9 @@ def test_verify_runs_the_script_that_is_exported(tmp_path: Path) -> None:
 
 
 def test_the_tolerance_on_beta_is_four_indentations_over_the_effective_radius(tmp_path: Path) -> None:
-    """The normal of two balls turns, which adds a part of the speed to the slip; a wall has a normal that does not."""
+    """The normal of two balls turns, which adds a part of the speed to the slip; that of a wall does not."""
     program = write_program(tmp_path / "lmp", RELEASE + 'echo "beta = 0.5"; echo "e_out = 0.6"')
+
     def verify(angle: float, **inputs: float) -> tuple[Verification, float]:
         laws = {"models": default_law("lammps"), "frictions": "lammps-mindlin"}
         config = source("soft", "soft", v1=0.5, mu=0.3, angle=angle, **inputs) | laws
