@@ -611,7 +611,9 @@ def test_verify_exits_with_0_for_the_predicted_restitutions_and_with_1_for_other
     others = (*predicted[:2], predicted[2] + 1e-8, predicted[3])
     differing = cli(*LAMMPS, lammps_that_prints(tmp_path, others))
     assert (differing.returncode, differing.stderr) == (1, "")
-    assert differing.stdout.splitlines()[-1] == "DIFFERS: largest difference 1e-08, uncertainty 1e-09"
+    *_, first, second, third, fourth, _, verdict = differing.stdout.splitlines()
+    assert verdict == "DIFFERS: largest difference 1e-08, uncertainty 1e-09"
+    assert [row.split()[-1] for row in (first, second, third, fourth)] == ["0", "0", "1e-08", "0"]
 
 
 def test_verify_runs_the_script_that_is_exported(tmp_path: Path) -> None:
