@@ -193,8 +193,10 @@ def _add_many_links(file: h5py.File) -> None:
 
 
 def _add_many_attributes(file: h5py.File) -> None:
+    # by the low-level interface, which takes a fifth of the time
+    holder, scalar = file["e"].id, h5s.create(h5s.SCALAR)
     for number in range(10_000):
-        file["e"].attrs.create(f"x{number}", 1)
+        h5a.create(holder, b"x%d" % number, h5t.STD_I8LE, scalar)
 
 
 def _add_dataset(file: h5py.File, name: str, **options: object) -> None:

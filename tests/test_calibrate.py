@@ -72,6 +72,12 @@ def test_the_estimate_of_a_constant_is_the_mean() -> None:
     assert fit["upper"] == pytest.approx(0.5 + half, abs=1e-7)
 
 
+def test_one_point_more_than_parameters_is_enough_for_a_reduced_chi2() -> None:
+    for values, expected in (([0.49, 0.51], 2.0), ([0.5], np.nan)):
+        fit = impact.calibrate(LINEAR | {"data": {"columns": {"e_out": values}, "sigma": 0.01}, "solver": QUICK})
+        assert fit["chi2_reduced"].item() == pytest.approx(expected, rel=1e-3, nan_ok=True)
+
+
 def test_measured_beads_have_the_statistics_that_their_authors_print() -> None:
     """Mean 0.8217, standard deviation 0.0155, and 0.0044 on both sides of the interval."""
     fit = impact.calibrate(FOLDER / "hdpe.toml", overrides=[ONE_LAW[1]]).sel(
@@ -129,6 +135,15 @@ def test_a_law_at_a_limit_of_the_physics_is_ranked_by_its_criterion(tmp_path: Pa
     assert law["lower"].item() == pytest.approx(1.0 - 1.959964 * 0.01 / np.sqrt(5.0), abs=2e-4)
     swept = impact.sweep(tmp_path / "best.toml")
     assert (swept["model"].item(), swept["e"].item()) == ("tsuji-1992", 1.0)
+
+
+def test_a_law_without_a_parameter_to_fit_is_first_where_one_more_parameter_improves_the_fit_little() -> None:
+    """AICc, not the reduced chi2, ranks: e improves chi2 by 1.9 and costs 2 + 4/3."""
+    data = {"columns": {"e_out": [0.939, 0.945, 0.951, 0.957, 0.963]}, "sigma": 0.01}
+    fit = impact.calibrate(ELASTIC | {"data": data})
+    assert fit["model"].values.tolist() == ["kuwabara-kono-1987", "tsuji-1992"]
+    assert (fit["chi2_reduced"][0] > fit["chi2_reduced"][1]).item()
+    assert fit["aicc"].diff("model").item() == pytest.approx(2.0 + 4.0 / 3.0 - 5 * 0.63**2, abs=0.01)
 
 
 def test_the_best_config_has_the_law_that_fits_best_at_a_bound_too(tmp_path: Path) -> None:

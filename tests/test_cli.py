@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import io
 import itertools
 import json
 import os
@@ -11,14 +13,18 @@ import signal
 import subprocess
 import sys
 import time
+import warnings
 from pathlib import Path
 
 import numpy as np
 import pytest
+import typer
 import xarray as xr
 from rich.cells import cell_len
 
 import impact
+from impact.cli import exits
+from impact.errors import UsageError
 from impact.plots.data import read_points
 
 from .conftest import ROOT, WIDE, Run
@@ -287,6 +293,45 @@ def test_an_invalid_command_line_is_one_line(cli: Run, words: list[str], line: s
     assert refused.stdout == ""
     assert refused.stderr.startswith(line)
     assert len(refused.stderr.splitlines()) == 1
+
+
+class Terminal(io.StringIO):
+    """A stream to a terminal."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+ERRORS = (
+    exits.Interrupted(signal.SIGINT, "nothing was written"),
+    UsageError("no e"),
+    typer.BadParameter("no e"),
+    MemoryError("5 TiB"),
+    OSError(errno.ENOSPC, "No space left on device"),
+)
+
+
+@pytest.mark.usefixtures("command_line_words")
+@pytest.mark.parametrize("error", ERRORS, ids=lambda error: type(error).__name__)
+def test_an_error_is_red_on_a_terminal_that_shows_colours_and_a_note_is_not(
+    monkeypatch: pytest.MonkeyPatch, error: Exception
+) -> None:
+    def printed() -> list[str]:
+        terminal = Terminal()
+        monkeypatch.setattr(sys, "stderr", terminal)
+        assert exits.run_command_line(fail, debug=False) != 0
+        return terminal.getvalue().splitlines()
+
+    def fail() -> None:
+        exits.print_line("a note")
+        raise error
+
+    monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)
+    monkeypatch.setenv("NO_COLOR", "1")
+    note, line = printed()
+    assert (note, "\x1b" in line) == ("a note", False)
+    monkeypatch.delenv("NO_COLOR")
+    assert printed() == [note, f"\x1b[31m{line}\x1b[0m"]
 
 
 def test_a_full_standard_output_is_a_storage_error(forked: ForkServer) -> None:

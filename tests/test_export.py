@@ -22,7 +22,7 @@ from impact.exporters.problem import prepare_export
 from impact.exporters.programs import run_program
 from impact.exporters.registry import CODES
 from impact.exporters.releases import first_law, installed_version
-from impact.exporters.verification import extrapolate
+from impact.exporters.verification import Verification, extrapolate
 
 from .conftest import Run, assert_refused, assert_same_output, default_law, examples_of, write_program
 
@@ -611,7 +611,9 @@ def test_verify_exits_with_0_for_the_predicted_restitutions_and_with_1_for_other
     others = (*predicted[:2], predicted[2] + 1e-8, predicted[3])
     differing = cli(*LAMMPS, lammps_that_prints(tmp_path, others))
     assert (differing.returncode, differing.stderr) == (1, "")
-    assert differing.stdout.splitlines()[-1] == "DIFFERS: largest difference 1e-08, uncertainty 1e-09"
+    *_, first, second, third, fourth, _, verdict = differing.stdout.splitlines()
+    assert verdict == "DIFFERS: largest difference 1e-08, uncertainty 1e-09"
+    assert [row.split()[-1] for row in (first, second, third, fourth)] == ["0", "0", "1e-08", "0"]
 
 
 def test_verify_runs_the_script_that_is_exported(tmp_path: Path) -> None:
@@ -622,6 +624,39 @@ def test_verify_runs_the_script_that_is_exported(tmp_path: Path) -> None:
     # a comment comes before it
     lines = sum(not line.startswith("#") for line in export.script.splitlines())
     assert export.verification.measured == (lines,) * 4
+
+
+def test_the_tolerance_on_beta_is_four_indentations_over_the_effective_radius(tmp_path: Path) -> None:
+    """The normal of two balls turns, which adds a part of the speed to the slip; that of a wall does not."""
+    program = write_program(tmp_path / "lmp", RELEASE + 'echo "beta = 0.5"; echo "e_out = 0.6"')
+
+    def verify(angle: float, **inputs: float) -> tuple[Verification, float]:
+        laws = {"models": default_law("lammps"), "frictions": "lammps-mindlin"}
+        config = source("soft", "soft", v1=0.5, mu=0.3, angle=angle, **inputs) | laws
+        verification = impact.export("lammps", source=config, verify=True, program=str(program)).verification
+        assert verification is not None
+        return verification, impact.sweep(config)["peak_indentation"].item() / 0.03
+
+    for angle in (0.1, 0.8):
+        balls, indentation = verify(angle)
+        assert balls.beta_measured == (0.5,) * 4
+        assert balls.uncertainty == pytest.approx(4.0 * indentation / math.cos(angle), rel=1e-9)
+        # beta is a ratio of slips: the smaller the slip, the larger the tolerance
+        assert balls.beta_uncertainty == pytest.approx(4.0 * indentation / math.sin(angle), rel=1e-9)
+    wall, _ = verify(0.1, R2=math.inf, m2=math.inf)
+    assert wall.beta_uncertainty == wall.uncertainty == 1e-9
+
+
+@pytest.mark.parametrize(
+    ("code", "run"), [("lammps", r"^run +(\d+)$"), ("mujoco", r"^mujoco.mj_step\(model, data, (\d+)\)$")]
+)
+def test_a_script_runs_until_two_contact_times_after_the_first_contact(code: str, run: str) -> None:
+    """The balls begin up to three steps before the contact."""
+    contact_time = impact.export(code, at={"e": 0.5}).as_dict()["contact_time"]
+    for steps_per_contact in (7, 100):
+        script = impact.export(code, at={"e": 0.5}, dt=contact_time / steps_per_contact, script=True).script
+        (steps,) = re.findall(run, script, re.MULTILINE)
+        assert 3 + 2 * steps_per_contact <= int(steps) <= 3 + 3 * steps_per_contact
 
 
 @pytest.mark.parametrize(("phase", "value"), list(enumerate(["nan", "inf", "-nan", "nan"])))

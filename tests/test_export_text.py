@@ -6,6 +6,7 @@ numbers from the lines, and its equation of motion is integrated with scipy.
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -206,6 +207,11 @@ def test_chrono_says_what_its_settings_enter_for_the_laws_that_have_them_only() 
         "the stiffness follows from the characteristic impact velocity": {(key, True) for key in hooke},
         "the damping is divided by characteristic_vel": {("chrono-smc-flores", True)},
         "the stiffness does not depend on the radii": {(plain, True), (plain, False)},
+        # the stiffness of these has R*, and the system without Multicore takes it from the collision detection
+        "with Bullet, R* is one value for all contacts": {
+            ("chrono-smc-hooke", True),
+            *itertools.product(("chrono-smc-hertz", "kuwabara-kono-1987"), (True, False)),
+        },
     }
     named: dict[str, set[tuple[str, bool]]] = {text: set() for text in about}
     for key, materials, inputs, at in CHRONO:

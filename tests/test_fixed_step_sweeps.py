@@ -338,6 +338,9 @@ def test_a_single_impact_has_the_values_of_the_sweep_and_no_history(tmp_path: Pa
     single = impact.run(tmp_path / "c.toml", at=at)
     assert single.values["e_out"] == impact.sweep(tmp_path / "c.toml")["e_out"].isel(model=0).sel(at).item()
     assert single.history is None
+    # the result is that of a scheme, not of the law, and says so
+    assert single.rows()["integrator"].startswith("kick-drift ")
+    assert "integrator" not in impact.run().rows()
     assert (single.e_kinetic, single.e_energetic) == (single.values["e_kinetic"], single.values["e_energetic"])
     done = cli("run", "c.toml", "--history", "h.h5", cwd=tmp_path)
     assert done.returncode == 2

@@ -172,6 +172,18 @@ def test_solve_finds_the_mu_that_slides_with_a_given_beta() -> None:
     assert str(sticks).startswith("hertz with coulomb-1785: no value of mu gives beta = 0.4; beta is from -1 to 0")
 
 
+def test_solve_finds_a_slip_speed_of_a_friction_law() -> None:
+    """Its natural size is a speed, that of the impact, and not a number of the contact law."""
+    law = {"drake-regularized": {"v_s": 0.01}}
+    source = config(frictions="drake-regularized", friction=law, angle=0.7, mu=0.3, v1=1e-3)
+    found = impact.solve("hertz", "v_s", {"beta": -0.4}, source=source)
+    assert found.as_dict()["unit"] == "m/s"
+    (root,) = found.roots
+    assert 1e-6 < root.value < 1e-2
+    at = {"friction.drake-regularized.v_s": root.value}
+    assert impact.run(source, model="hertz", at=at).values["beta"] == pytest.approx(-0.4, abs=1e-8)
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("name", ["kt_over_kn", "friction.lammps-mindlin.kt_over_kn"])
 def test_solve_finds_a_friction_parameter_that_gives_the_output_again(name: str) -> None:

@@ -16,7 +16,7 @@ import impact
 from impact.engine.plugins import installed, read_plugins
 from impact.errors import ModelError
 
-from .conftest import ROOT, Run, code_blocks
+from .conftest import ROOT, Run, assert_refused, code_blocks
 from .fork_server import CompletedCommand, ForkServer
 
 PAGE = (ROOT / "docs" / "extending.md").read_text(encoding="utf-8")
@@ -125,6 +125,14 @@ def test_the_check_of_a_law_that_raises_gives_the_line_and_the_text(cli: Run, tm
     assert [line for line in done.stderr.splitlines() if line.startswith("note: ")] == [
         f"note: {reason}" for reason in REASONS
     ]
+
+
+def test_a_check_of_a_file_with_a_key_checks_that_model_alone(cli: Run, tmp_path: Path) -> None:
+    (tmp_path / "raising.py").write_text(RAISING, encoding="utf-8")
+    done = cli("models", "branching", "--check", "raising.py", "--json", cwd=tmp_path)
+    assert [report["model"] for report in json.loads(done.stdout)] == ["branching"]
+    done = cli("models", "brnching", "--check", "raising.py", cwd=tmp_path)
+    assert_refused(done, 'no model "brnching"; did you mean "branching"?')
 
 
 def test_an_unknown_argument_of_a_formula_is_an_error_when_the_file_is_loaded(cli: Run, tmp_path: Path) -> None:

@@ -80,6 +80,7 @@ def test_shards_in_any_order_merge_to_the_file_of_the_whole_sweep(
     assert completed.returncode == 0, completed.stderr
     assert content(folder) == whole
     assert "results.h5: 300 points from" in completed.stderr
+    assert "more than one folder" not in completed.stderr
     assert all(path.is_dir() for path in folders)
 
 
