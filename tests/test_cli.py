@@ -784,6 +784,9 @@ def test_a_shell_completes_models_keys_axes_and_outputs(forked: ForkServer, stor
     assert completed("impact", "models", "thornton") == keys
     assert completed("impact", "run", "--model", "thornton") == keys
     assert completed("impact", "models", "--family", "elastic-") == ["elastic-plastic"]
+    laws = [key for key in impact.frictions() if key.startswith("lammps")]
+    assert len(laws) > 1
+    assert completed("impact", "run", "--friction", "lammps") == laws
     assert completed("impact", "swe") == ["sweep"]
 
 

@@ -651,6 +651,23 @@ def test_verify_exits_with_1_and_names_the_phase_of_a_restitution_that_is_no_num
     assert (data["agrees"], data["rows"][1]["measured"]) == (False, None)
 
 
+def test_with_friction_only_two_balls_may_differ_by_the_turn_of_their_normal(tmp_path: Path) -> None:
+    law, friction = "lammps-coeff-restitution-hooke", "lammps-linear-history"
+    at = {"mu": 0.3, "angle": "40 deg", "v1": 1.0, "e": 0.8, "R1": 0.05, "K": 1e9, f"friction.{friction}.k_t": 1e9}
+    uncertainties, betas = [], []
+    for other in ({"R2": 0.05}, {"m2": math.inf}):
+        program = str(lammps_that_prints(tmp_path, [0.5] * 4))
+        export = impact.export("lammps", law, at=at | other, friction=friction, verify=True, program=program)
+        assert export.verification is not None
+        uncertainties.append(export.verification.uncertainty)
+        betas.append(export.verification.beta_uncertainty)
+    # the normal turns by about the indentation over R*
+    both = impact.run(model=law, friction=friction, at=at | {"R2": 0.05})
+    turn = both.values["peak_indentation"] / 0.025
+    assert turn < uncertainties[0] < betas[0] < 10.0 * turn
+    assert (uncertainties[1], betas[1]) == (1e-9, 1e-9)
+
+
 @pytest.mark.parametrize(
     ("means", "exact"),
     [
