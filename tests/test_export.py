@@ -324,7 +324,9 @@ def test_the_impact_material_of_opensees_has_the_peak_force_and_the_loss_of_hert
     """At the indentation d it has Hertz' force, and its loop has the energy that Hertz' spring loses to e."""
     K, e, d = 1e8, 0.6, 1e-4
     at = {"opensees-impact-material.d": d}
-    numbers = impact.export("opensees", "opensees-impact-material", source=source(K=K, e=e), at=at).parameters
+    export = impact.export("opensees", "opensees-impact-material", source=source(K=K, e=e), at=at)
+    assert any("another speed gives another restitution" in line for line in export.header)
+    numbers = export.parameters
     first, second, end = (float(numbers[name]) for name in ("K1", "K2", "delta_y"))
     # compression is negative there
     assert end == pytest.approx(-0.1 * d, rel=1e-15)
@@ -354,6 +356,16 @@ def test_kratos_gets_the_restitution_in_the_relation_of_the_materials() -> None:
     export = impact.export("kratos", default_law("kratos"), source=source("soft", "hard"))
     assert (export.parameters["YOUNG_MODULUS"], export.parameters["YOUNG_MODULUS2"]) == (1e9, 5e9)
     assert '    "COEFFICIENT_OF_RESTITUTION": 0.5,' in export.lines
+
+
+@pytest.mark.parametrize(("friction", "mu"), [(None, 0.0), ("kratos-viscous-coulomb", 0.3)])
+def test_the_relation_of_kratos_has_the_friction_of_the_config(friction: str | None, mu: float) -> None:
+    config = source("soft", "soft", **({"mu": mu, "angle": "40 deg"} if friction else {}))
+    law, version = default_law("kratos"), "10.4.4"
+    lines = impact.export("kratos", law, source=config, friction=friction, code_version=version).lines
+    assert [line for line in lines if "_FRICTION" in line] == [
+        f'    "{name}_FRICTION": {value},' for name, value in (("STATIC", mu), ("DYNAMIC", mu), ("ROLLING", 0.0))
+    ]
 
 
 def test_mujoco_gets_a_damping_ratio_and_a_constant_impedance() -> None:
