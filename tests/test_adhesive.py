@@ -12,7 +12,7 @@ from impact.contact.closed_forms.adhesive import jkr_root
 from impact.contact.impacts import Impacts
 from impact.contact.models import find
 from impact.contact.output_formulas import Outputs, collide
-from impact.contact.status import Status
+from impact.contact.status import FrictionStatus, Status
 
 from .problems import table1_impacts
 
@@ -29,6 +29,30 @@ def sticking_speed(impacts: Impacts) -> float:
     """Thornton and Ning (1998), equation (54)."""
     R, E = 1 / (1 / impacts.R1[0] + 1 / impacts.R2[0]), 1 / (0.91 / impacts.E1[0] + 0.91 / impacts.E2[0])
     return float(np.sqrt(14.18 / impacts.m[0]) * (GAMMA**5 * R**4 / E**2) ** (1 / 6))
+
+
+@pytest.mark.parametrize(
+    ("key", "parameters", "speeds"),
+    [
+        ("jkr-1971", {"gamma": 0.05}, [0.001, 0.2]),
+        ("luding-2008", {"k2": 5.0, "kc": 3.0, "phi": 1e-3}, [0.001, 5.0]),
+    ],
+)
+def test_friction_of_balls_that_adhesion_holds_is_at_its_limit_and_no_failure(
+    key: str, parameters: dict[str, float], speeds: list[float]
+) -> None:
+    swept = impact.sweep(
+        {
+            "models": key,
+            "frictions": "coulomb-1785",
+            "sweep": {"v1": speeds, "R1": 1e-4, "R2": 1e-4, "mu": 0.3, "angle": "40 deg", "material": "soft"},
+            "materials": {"soft": {"E": 1e6, "nu": 0.3, "rho": 1000.0}},
+            "model": {key: parameters},
+            "friction": {"coulomb-1785": {"limit": "positive"}},
+        }
+    )
+    assert swept["status"].values.ravel().tolist() == [Status.LIMIT, Status.OK]
+    assert swept["friction_status"].values.ravel().tolist() == [FrictionStatus.LIMIT, FrictionStatus.OK]
 
 
 def test_balls_with_a_neck_rebound_by_thornton_and_ning_and_stick_below_a_speed():

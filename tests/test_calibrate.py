@@ -63,6 +63,16 @@ def test_curves_and_bands_pass_through_the_predictions(drops: xr.Dataset) -> Non
     np.testing.assert_allclose(law["residual"], drops["measured"] - law["predicted"], atol=1e-15)
 
 
+def test_each_of_several_outputs_has_a_curve_through_its_own_predictions() -> None:
+    columns = {"v1": [1.0, 2.0], "e_out": [0.5, 0.5], "sigma_e_out": [0.01, 0.01]}
+    columns |= {"contact_time": [3e-3, 3e-3], "sigma_contact_time": [1e-3, 1e-3]}
+    sweep = {name: value for name, value in LINEAR["sweep"].items() if name != "v1"}
+    fit = impact.calibrate({**LINEAR, "sweep": sweep, "data": {"columns": columns}}).isel(model=0)
+    assert fit["output_name"].values.tolist() == ["e_out", "contact_time"]
+    for output, curve in zip(fit["output_name"].values, fit["curve"].values, strict=True):
+        np.testing.assert_allclose(curve[[0, -1]], fit["predicted"][fit["output"] == output], rtol=1e-9)
+
+
 def test_the_estimate_of_a_constant_is_the_mean() -> None:
     """With the interval of normal errors, 0.5 -+ 1.96 0.01/sqrt(3)."""
     fit = impact.calibrate(LINEAR).isel(model=0, parameter=0)

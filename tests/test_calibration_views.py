@@ -146,6 +146,7 @@ def test_a_damaged_calibration_is_refused_in_one_line(drops: xr.Dataset, tmp_pat
         "fit_status: got float64": drops.assign(fit_status=drops["fit_status"].astype(float)),
         "no outcome of a fit": drops.assign(fit_status=drops["fit_status"] + np.int8(9)),
         "noise": drops.assign_attrs(noise=3),
+        "fit_paths: expected a config path for each parameter": drops.assign_attrs(fit_paths="[]"),
         "measured: expected a coordinate along point": drops.drop_vars("measured"),
     }
     for number, (message, dataset) in enumerate(damaged.items()):

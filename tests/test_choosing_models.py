@@ -234,6 +234,8 @@ def test_a_law_states_its_equation_reference_and_year(key):
     # the year is that of the reference and of the key, unless the law was derived or is from a code
     assert law.evidence.state == "derived" or law.family == "codes" or str(law.year) in law.reference
     assert {int(year) for year in re.findall(r"(?:19|20)\d\d", key)} <= {law.year}
+    # a title states when a code got the law, or a later state of the code
+    assert all(law.year <= int(year) for year in re.findall(r"\b(?:19|20)\d\d\b", law.title))
     for parameter in law.parameters:
         assert parameter.meaning
 

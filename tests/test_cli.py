@@ -493,6 +493,9 @@ def test_info(cli: Run, stored: Path) -> None:
         assert words in page
     names = [line.split(" ")[0] for line in page.split("\n\n")[0].splitlines() if line[:1].strip()]
     assert names[:5] == ["file", "title", "dimensions", "points", "layout"]
+    # how the result was made, as far as it was set
+    assert {"rtol", "materials", "impact_version"} <= {*names}
+    assert not {"integrator", "plugins"} & {*names}
     # texts of each model are no values of an input
     assert not {"equation", "reference", "doi", "year"} & {*names}
     assert names.count("title") == 1
@@ -829,7 +832,19 @@ def test_a_shell_completes_models_keys_axes_and_outputs(forked: ForkServer, stor
     assert completed("impact", "models", "thornton") == keys
     assert completed("impact", "run", "--model", "thornton") == keys
     assert completed("impact", "models", "--family", "elastic-") == ["elastic-plastic"]
+    laws = [key for key in impact.frictions() if key.startswith("lammps")]
+    assert len(laws) > 1
+    assert completed("impact", "run", "--friction", "lammps") == laws
     assert completed("impact", "swe") == ["sweep"]
+
+
+def test_ctrl_c_ends_a_command_with_one_line_that_is_red_on_a_terminal(forked: ForkServer, tmp_path: Path) -> None:
+    plugin = tmp_path / "pressed.py"
+    plugin.write_text("raise KeyboardInterrupt", encoding="utf-8")
+    words = ("models", "--plugin", plugin)
+    done, printed = printed_on_terminal(forked, *words, stream="stderr")
+    assert (done.returncode, done.stdout, printed) == (130, "", "\x1b[31minterrupted\x1b[0m\r\n")
+    assert forked(*words).stderr == "interrupted\n"
 
 
 def test_a_tolerance_in_percent(cli: Run, stored: Path) -> None:

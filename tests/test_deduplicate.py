@@ -205,6 +205,8 @@ def test_the_trajectories_of_a_plan_of_any_size_are_counted() -> None:
     assert 50 * 10_100 < estimated.bytes < 100 * 10_100 + 500_000
     full = estimate({**config, "output": {"layout": "full"}}, plugins=[SPEED], max_points=10**15)
     assert full.bytes > 100 * plan.points
+    # all points are written in the full layout only; a point takes more than 1 ns
+    assert full.seconds > 1e-9 * plan.points > estimated.seconds
     assert [model.axes for model in estimated.models] == [("e",), ("v1",)]
 
 

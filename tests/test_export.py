@@ -324,7 +324,9 @@ def test_the_impact_material_of_opensees_has_the_peak_force_and_the_loss_of_hert
     """At the indentation d it has Hertz' force, and its loop has the energy that Hertz' spring loses to e."""
     K, e, d = 1e8, 0.6, 1e-4
     at = {"opensees-impact-material.d": d}
-    numbers = impact.export("opensees", "opensees-impact-material", source=source(K=K, e=e), at=at).parameters
+    export = impact.export("opensees", "opensees-impact-material", source=source(K=K, e=e), at=at)
+    assert any("another speed gives another restitution" in line for line in export.header)
+    numbers = export.parameters
     first, second, end = (float(numbers[name]) for name in ("K1", "K2", "delta_y"))
     # compression is negative there
     assert end == pytest.approx(-0.1 * d, rel=1e-15)
@@ -354,6 +356,16 @@ def test_kratos_gets_the_restitution_in_the_relation_of_the_materials() -> None:
     export = impact.export("kratos", default_law("kratos"), source=source("soft", "hard"))
     assert (export.parameters["YOUNG_MODULUS"], export.parameters["YOUNG_MODULUS2"]) == (1e9, 5e9)
     assert '    "COEFFICIENT_OF_RESTITUTION": 0.5,' in export.lines
+
+
+@pytest.mark.parametrize(("friction", "mu"), [(None, 0.0), ("kratos-viscous-coulomb", 0.3)])
+def test_the_relation_of_kratos_has_the_friction_of_the_config(friction: str | None, mu: float) -> None:
+    config = source("soft", "soft", **({"mu": mu, "angle": "40 deg"} if friction else {}))
+    law, version = default_law("kratos"), "10.4.4"
+    lines = impact.export("kratos", law, source=config, friction=friction, code_version=version).lines
+    assert [line for line in lines if "_FRICTION" in line] == [
+        f'    "{name}_FRICTION": {value},' for name, value in (("STATIC", mu), ("DYNAMIC", mu), ("ROLLING", 0.0))
+    ]
 
 
 def test_mujoco_gets_a_damping_ratio_and_a_constant_impedance() -> None:
@@ -684,6 +696,23 @@ def test_verify_exits_with_1_and_names_the_phase_of_a_restitution_that_is_no_num
     lammps_that_prints(tmp_path, [predicted[0], "nan", "nan", "nan"])
     data = json.loads(cli(*LAMMPS, program, "--json").stdout)["verification"]
     assert (data["agrees"], data["rows"][1]["measured"]) == (False, None)
+
+
+def test_with_friction_only_two_balls_may_differ_by_the_turn_of_their_normal(tmp_path: Path) -> None:
+    law, friction = "lammps-coeff-restitution-hooke", "lammps-linear-history"
+    at = {"mu": 0.3, "angle": "40 deg", "v1": 1.0, "e": 0.8, "R1": 0.05, "K": 1e9, f"friction.{friction}.k_t": 1e9}
+    uncertainties, betas = [], []
+    for other in ({"R2": 0.05}, {"m2": math.inf}):
+        program = str(lammps_that_prints(tmp_path, [0.5] * 4))
+        export = impact.export("lammps", law, at=at | other, friction=friction, verify=True, program=program)
+        assert export.verification is not None
+        uncertainties.append(export.verification.uncertainty)
+        betas.append(export.verification.beta_uncertainty)
+    # the normal turns by about the indentation over R*
+    both = impact.run(model=law, friction=friction, at=at | {"R2": 0.05})
+    turn = both.values["peak_indentation"] / 0.025
+    assert turn < uncertainties[0] < betas[0] < 10.0 * turn
+    assert (uncertainties[1], betas[1]) == (1e-9, 1e-9)
 
 
 @pytest.mark.parametrize(

@@ -245,6 +245,10 @@ def test_a_wall_of_chrono_gets_a_mass_that_does_not_change_the_effective_one() -
     )
     (mass,) = arguments(export.lines, r"wall->SetMass\(#\)")
     assert mass * M1 / (mass + M1) == pytest.approx(M1, rel=2e-9)
+    # the header says so to whoever writes another wall
+    two_balls = impact.export("chrono", default_law("chrono"), source=config("soft", "hard", e=0.5))
+    about_mass = ["mass of a fixed body" in "".join(each.header) for each in (export, two_balls)]
+    assert about_mass == [True, False]
 
 
 def test_flores_at_another_speed_than_its_characteristic_one_is_warned_about() -> None:

@@ -153,6 +153,17 @@ def test_a_parameter_at_a_bound_is_reported(values: Array, status: str) -> None:
     assert (result.lower[0] == 0.05) == (status == "at_bound")
 
 
+@pytest.mark.parametrize(("least", "most", "value", "bound"), [(0.05, 0.9, 0.99, 0.05), (0.01, 0.1, 0.5, 0.1)])
+def test_the_derivative_at_a_bound_is_that_of_the_prediction(
+    least: float, most: float, value: float, bound: float
+) -> None:
+    """No value beyond the bound is predicted, so that the derivative is taken from one side."""
+    result = fit("zeta", [least], [most], np.full(20, value), 0.01)
+    assert result.estimate[0] == bound
+    slope = -np.pi * restitution(np.array(bound)) / (1.0 - bound**2) ** 1.5
+    assert result.jacobian[:, 0] == pytest.approx(float(slope), rel=1e-5)
+
+
 def test_as_many_points_as_parameters_are_too_few() -> None:
     functions = {"line": lambda rows: rows[:, :1] + rows[:, 1:] * X[:2]}
     data = DataPoints(np.array([0.5, 0.6]), np.full(2, 0.01), "scale")

@@ -374,6 +374,13 @@ def test_a_pair_lacks_what_its_friction_law_needs(
     assert check_friction(pair, oblique).tolist() == [expected]
 
 
+def test_liggghts_needs_a_restitution_only_where_its_tangential_damping_is_on() -> None:
+    impacts = impacts_of(e=[np.nan, np.nan, RESTITUTION])
+    oblique = oblique_of(impacts, parameters={"tangential_damping": [0.0, 1.0, 1.0]})
+    statuses = check_friction(Pair(find("hertz"), find_friction("liggghts-history")), oblique).tolist()
+    assert statuses == [FrictionStatus.OK, FrictionStatus.INVALID_PARAMETER, FrictionStatus.OK]
+
+
 def test_adhesion_is_combined_with_the_friction_of_a_pressing_force() -> None:
     impacts = impacts_of(parameters={"gamma": np.array([0.0, 5.0])})
     for key, limit, expected in (

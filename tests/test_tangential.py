@@ -227,6 +227,8 @@ LAWS: list[tuple[str, TangentialForm]] = [
     ("tsuji-1992", TangentialForm("dashpot", damping_power=0.25)),
     (ZETA, spring(cap="spring")),
     (BOUNCY, spring()),
+    # some of these contacts end where the spring is held at its limit
+    (BOUNCY, spring(0.5, 0.25, cap="both")),
     ("bilinear", spring()),
 ]
 

@@ -165,6 +165,8 @@ def test_a_step_that_is_too_long_is_no_restitution_and_ends_with_exit_code_3(cli
     assert (table.returncode, printed.returncode) == (3, 3)
     assert "unstable        –          –           –" in table.stdout
     assert "unstable at 338 of 400 phases, the step is too long" in table.stderr
+    # also where another step is short enough
+    assert cli(*words, "--steps-per-contact", "50").returncode == 3
     result = json.loads(printed.stdout)
     (row,) = result["rows"]
     assert (row["status"], row["failed"]) == ("unstable", 338)

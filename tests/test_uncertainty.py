@@ -204,6 +204,10 @@ def test_several_outputs_of_one_run_have_the_studies_of_each(cli: Run, tmp_path:
         assert [row["total"] for row in study["indices"]] == alone["total"].values.tolist()
     printed = cli(*words, *both, cwd=tmp_path).stdout
     assert [line.partition(":")[0] for line in printed.splitlines() if ": mean " in line] == list(outputs)
+    # the table of each output begins with the input of the largest total index
+    rows = [line.split()[0] for line in printed.splitlines() if line.startswith("sweep.")]
+    ranked = [sorted(study["indices"], key=lambda row: -row["total"]) for study in studies]
+    assert rows == [row["input"] for indices in ranked for row in indices]
     done = cli(*words, *both, "-o", "s.h5", cwd=tmp_path)
     assert (done.returncode, done.stderr) == (2, "--output: got 2 outputs (--of), expected one for a file\n")
     assert not (tmp_path / "s.h5").exists()

@@ -504,7 +504,7 @@ def solve_phases(
     params: Params,
     n: int,
     solve: SolvePhase,
-    never_separates: NDArray[np.bool_] | bool = False,
+    never_separates: NDArray[np.bool_] | bool,
 ) -> Phases:
     """Solve approach and restitution of n impacts, see `integrate_phases`."""
     back = motion.restitution_law(law)

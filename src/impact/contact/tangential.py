@@ -168,15 +168,21 @@ def _simulate_distinct(
     )
     columns = (*given, *coefficient)
     chosen = (status == STATUS_OK) & ~given.is_trivial
+    exact = exact_restitution(model, law_values, count)
+
+    def integrate_distinct(problems: simulate.DistinctProblems) -> TangentialResult:
+        never_separates = exact[problems.rows][problems.first] == 0.0
+        return _integrate(form, problems, never_separates, rtol, max_steps, recorded)
+
     parts = [
-        (problems.rows, _integrate(form, problems, rtol, max_steps, recorded).take(problems.row_of_impact))
+        (problems.rows, integrate_distinct(problems).take(problems.row_of_impact))
         for problems in simulate.distinct_problems(model, n, law_values, chosen, collapse, columns)
     ]
     result = TangentialResult.joined(count, status, parts)
     if form.kind == "coulomb":
         # with infinite damping the balls stop at first contact
         result.sliding_impulse[status == LIMIT] = 1.0
-        result.exact[:] *= 1.0 + exact_restitution(model, law_values, count)
+        result.exact[:] *= 1.0 + exact
     return result
 
 
@@ -272,6 +278,7 @@ def _coefficient_arguments(form: TangentialForm) -> tuple[str, ...]:
 def _integrate(
     form: TangentialForm,
     problems: simulate.DistinctProblems,
+    never_separates: Mask,
     rtol: float,
     max_steps: int,
     recorded: list[RecordedSlip] | None,
@@ -312,7 +319,7 @@ def _integrate(
             recorded.append(RecordedSlip(phase, solution.recorded))
         return solution
 
-    phases = simulate.solve_phases(law, problems.params, n, solve)
+    phases = simulate.solve_phases(law, problems.params, n, solve, never_separates)
     state, steps = states[0].copy(), phases.approach.steps.copy()
     if phases.restitution is not None:
         state[:, phases.rows] = states[1]

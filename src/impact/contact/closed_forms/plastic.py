@@ -41,6 +41,11 @@ def luding_restitution(size: Array | float, k2: Array, kc: Array, shallow: Array
 
     >>> luding_restitution(1.0, np.array([1.0, 4.0, 4.0]), np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 1.0]))
     array([1. , 0.5, 0. ])
+
+    Beyond the plastic depth, where the unloading has the stiffness k₂:
+
+    >>> luding_restitution(2.0, np.array([4.0]), np.array([0.0]), np.array([1.0])).round(6)
+    array([0.901388])
     """
     with np.errstate(divide="ignore"):
         depth = np.divide(1.0, shallow)
