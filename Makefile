@@ -54,7 +54,7 @@ peers: $(VENV)/dev
 
 # a third of the time these tests wait for other programs to start
 test-peers: peers  ## compare entries of codes with LAMMPS, LIGGGHTS, YADE, MuJoCo, Drake, Simbody, OpenSees, Kratos, PyBullet, EXUDYN and Newton
-	PEERS_VENV=$(PEERS) $(BIN)/python -m pytest -n 3 --dist worksteal --durations=40 -m peers tests/test_peers.py tests/test_friction_peers.py tests/test_exported_scripts.py tests/test_conform.py
+	PEERS_VENV=$(PEERS) $(BIN)/python -m pytest -n 3 --dist worksteal --durations=40 -m peers $(shell grep -l "mark.peers" tests/test_*.py)
 
 # with a release of LAMMPS from 2022 beside the newest one
 conform: peers  ## run the engines of impact conform, and write their board docs/conform/board.md
