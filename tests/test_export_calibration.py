@@ -119,3 +119,14 @@ def test_a_law_without_an_estimate_is_refused(fit: Path) -> None:
     lost = dataset.assign(estimate=dataset["estimate"].where(dataset["model"] != "tsuji-1992"))
     with pytest.raises(UsageError, match="tsuji-1992: the fit has no estimate, its status is ok"):
         impact.export("lammps", source=lost, code_version="22Jul2025")
+
+
+def test_laws_without_an_aicc_have_no_weight_and_none_is_named(tmp_path: Path) -> None:
+    """Three points are too few for the correction of AICc with a parameter and the scale of the noise."""
+    few = {"columns": {name: values[:3] for name, values in DROPS["data"]["columns"].items()}, "noise": "scale"}
+    path = tmp_path / "few.h5"
+    result = impact.calibrate({**DROPS, "models": DROPS["models"][:3], "data": few}, output=path)
+    assert result["aicc"].isnull().all()
+    assert result["weight"].isnull().all()
+    export = impact.export("lammps", source=path, at={"v1": 1.0}, code_version="22Jul2025", model="tsuji-1992")
+    assert not any("weight" in line or "AICc" in line for line in (*export.header, *export.warnings))

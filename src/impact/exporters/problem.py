@@ -210,9 +210,14 @@ def _fit_notes(code: Code, version: str, key: str, calibration: Calibration) -> 
     laws = calibration.laws
     chosen = position_of_law(laws, key, calibration.name)
     weights = calibration.dataset["weight"].values.tolist()
-    named = [f"{law}, weight {number(weight, 3)}" for law, weight in zip(laws, weights, strict=True)]
+    # too few points have no AICc and no weights
+    has_weights = not any(map(math.isnan, weights))
+    named = [
+        f"{law}, weight {number(weight, 3)}" if has_weights else law
+        for law, weight in zip(laws, weights, strict=True)
+    ]
     is_in_code = [has_law(code, law.split(" with ")[0], version) for law in laws]
-    notes = [f"{calibration.name}: {named[chosen]}, law {chosen + 1} of {len(laws)} by AICc"]
+    notes = [f"{calibration.name}: {named[chosen]}, law {chosen + 1} of {len(laws)}{' by AICc' * has_weights}"]
     others = [name for position, name in enumerate(named) if is_in_code[position] and position != chosen]
     if others:
         notes.append(f"{argument('model', 'KEY')} exports another law that was fitted: {'; '.join(others)}")

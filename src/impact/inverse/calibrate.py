@@ -421,12 +421,14 @@ def _calibration_dataset(config: Config, plugins: Plugins, laws: Mapping[str, Fi
 
 
 def akaike_weights(aicc: Mapping[str, float]) -> dict[str, float]:
-    """Weigh laws by their AICc; 0 for those without one.
+    """Weigh laws by their AICc; 0 for those without one, NaN if none has one.
 
     >>> akaike_weights({"hertz": 3.0, "tsuji-1992": 3.0, "bilinear": math.nan})
     {'hertz': 0.5, 'tsuji-1992': 0.5, 'bilinear': 0.0}
+    >>> akaike_weights({"hertz": math.nan})
+    {'hertz': nan}
     """
     smallest = min((value for value in aicc.values() if not math.isnan(value)), default=0.0)
     likelihood = {key: np.exp(-0.5 * np.nan_to_num(value - smallest, nan=np.inf)) for key, value in aicc.items()}
     total = sum(likelihood.values())
-    return {key: float(value / total) if total else 0.0 for key, value in likelihood.items()}
+    return {key: float(value / total) if total else math.nan for key, value in likelihood.items()}
