@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import warnings
 from collections.abc import Mapping
 from pathlib import Path
@@ -42,6 +43,7 @@ DIALECTS = {
     "percent in a cell": PLAIN.replace("0.91", "91 %"),
     "other columns": "Nr.;v1 [cm/s];e_out;sigma;specimen;Bemerkung;\n"
     "1;12,5;0,91;0,01;a;;\n2;100;0,85;0,01;a;kalt, 2.5 mm;\n3;250,25;0,8;0,02;b;;\n",
+    "spaces around quotes": re.sub("[^,\n]+", ' "\\g<0>" ', PLAIN).replace(",", ";"),
     "separator line": "sep=;\n" + PLAIN.replace(",", ";"),
 }
 
@@ -248,6 +250,11 @@ REFUSED = {
         'a.csv:1: got "v1 [cm/s]", expected [m/s] as in its',
     ),
     "an open quote": (V + '1,"1\n', {}, "a.csv:2: not CSV: unexpected end of data"),
+    "text after a quote": (
+        'v1;e_out\n1;"0,5" x\n',
+        {},
+        "a.csv:2: not CSV: ';' expected after '\"'",
+    ),
     "a wrong key": (
         V + "1,1\n",
         {"separator": "|"},

@@ -246,9 +246,9 @@ def read_csv(
 
 def _split(numbered: Sequence[tuple[int, str]], separator: str) -> dict[int, list[str]]:
     """Split lines into cells, by the number of the line; a csv.Error begins with it."""
-    reader = csv.reader(
-        (line for _, line in numbered), delimiter=separator, strict=True, skipinitialspace=separator != "\t"
-    )
+    # csv knows spaces before a quoted cell, and none after it
+    lines = (re.sub(rf'(?<!")" +(?={separator}|$)', '"', line) for _, line in numbered)
+    reader = csv.reader(lines, delimiter=separator, strict=True, skipinitialspace=separator != "\t")
     rows = {}
     try:
         for row in reader:
@@ -261,15 +261,15 @@ def _split(numbered: Sequence[tuple[int, str]], separator: str) -> dict[int, lis
 def _find_separator(path: Path, numbered: Sequence[tuple[int, str]], is_looked_for: Callable[[str], bool]) -> str:
     """Recognise the separator by the header: it separates all rows alike, and names that are looked for."""
     readings: dict[str, list[list[str]]] = {}
-    errors: list[str] = []
+    errors: dict[str, str] = {}
     for mark in SEPARATORS:
         try:
             readings[mark] = list(_split(numbered, mark).values())
         except csv.Error as error:
-            errors.append(f"{path}:{error}")
+            errors[mark] = f"{path}:{error}"
     readings = {mark: rows for mark, rows in readings.items() if len(rows[0]) > 1}
     if errors and not readings:
-        raise ConfigError(errors[0])
+        raise ConfigError(errors[max(errors, key=numbered[0][1].count)])
     regular = {mark: rows for mark, rows in readings.items() if len({*map(len, rows)}) == 1} or readings
     readings = {mark: rows for mark, rows in regular.items() if any(map(is_looked_for, rows[0]))} or regular
     if len(readings) > 1 and any(is_looked_for(header) for rows in readings.values() for header in rows[0]):
