@@ -115,9 +115,11 @@ class _Drawing:
         values = status.isel({dim: place for dim, place in position.items() if dim in status.dims}).values
         return bool(((values < FIRST_FAILURE) & (values != NO_IMPACT)).any())
 
-    def choice_at(self, choice: Choice, index: Mapping[Hashable, int]) -> Choice:
-        """Choose the same figure at other values of axes."""
-        sel = {str(dim): self.dataset[dim].values[position].item() for dim, position in index.items()}
+    def choice_at(self, kind: Kind, choice: Choice, position: Mapping[Hashable, int]) -> Choice:
+        """Choose the same figure at other values of axes: labels of axes, or the inputs of a motion."""
+        if kind.source == "history":
+            return replace(choice, sel=_inputs_at(self.dataset, position))
+        sel = {str(dim): self.dataset[dim].values[index].item() for dim, index in position.items()}
         return replace(choice, sel={**(choice.sel or {}), **sel})
 
 
@@ -151,9 +153,11 @@ def figures_of(
             except ImpactError as error:
                 left_out.append(f"The figure {kind.name} is left out: {'; '.join(error.problems)}")
                 continue
-            others += [(place_on_page, kind, choice, index) for index in other_values.drawn]
+            others += [
+                (place_on_page, kind, drawing.choice_at(kind, choice, {**position, **index}), index)
+                for index in other_values.drawn
+            ]
         for first, kind, choice, index in others:
-            choice = drawing.choice_at(choice, index)
             more = drawing.plot_data(kind, choice)
             if more is not None:
                 caption = f"As Figure {first}, at {_changes_text(dataset, index)}."
@@ -170,20 +174,26 @@ class _OtherValues:
 
     @classmethod
     def of(cls, drawing: _Drawing, kind: Kind, choice: Choice, position: Mapping[Hashable, int]) -> _OtherValues:
-        """Compare the numbers of a figure at the values of all other axes, at most MAX_COMPARED combinations."""
+        """Compare the numbers of a figure at the values of all other axes, at most MAX_COMPARED combinations.
+
+        Motions are integrated for it: they are compared at the first and the last value of each axis alone.
+        """
         sizes = drawing.dataset.sizes
         dims = [dim for dim in position if sizes[dim] > 1]
-        if kind.source == "history" or not dims:
-            return cls([f"Other values of {_and(dims)} are not drawn."] if dims else [], [])
-        count = {dim: sizes[dim] for dim in dims}
-        while math.prod(count.values()) > MAX_COMPARED:
-            count[max(count, key=lambda dim: count[dim])] -= 1
-        compared = {dim: _spread(sizes[dim], count[dim], position[dim]) for dim in dims}
+        if kind.source == "history":
+            one_each = [{dim: place} for dim in dims for place in (0, sizes[dim] - 1)]
+            compared = [{dim: position[dim] for dim in dims}, *({**position, **index} for index in one_each)]
+        else:
+            count = {dim: sizes[dim] for dim in dims}
+            while math.prod(count.values()) > MAX_COMPARED:
+                count[max(count, key=lambda dim: count[dim])] -= 1
+            places = itertools.product(*(_spread(sizes[dim], count[dim], position[dim]) for dim in dims))
+            compared = [dict(zip(dims, place, strict=True)) for place in places]
         tables = {
-            index: _numbers(
-                drawing.plot_data(kind, drawing.choice_at(choice, dict(zip(dims, index, strict=True))))
+            tuple(index[dim] for dim in dims): _numbers(
+                drawing.plot_data(kind, drawing.choice_at(kind, choice, {**position, **index}))
             )
-            for index in itertools.product(*compared.values())
+            for index in compared
         }
         differ = []
         for axis, dim in enumerate(dims):
@@ -191,24 +201,21 @@ class _OtherValues:
             pairs = ((table, tables[*index[:axis], base, *index[axis + 1 :]]) for index, table in tables.items())
             if not all(_are_equal(*pair) for pair in pairs):
                 differ.append(dim)
-        return cls(*_described(drawing, dims, differ, compared, position))
+        return cls(*_described(drawing, dims, differ, len(tables), position))
 
 
 def _described(
     drawing: _Drawing,
     dims: Sequence[Hashable],
     differ: Sequence[Hashable],
-    compared: Mapping[Hashable, Sequence[int]],
+    compared_count: int,
     position: Mapping[Hashable, int],
 ) -> tuple[list[str], list[Mapping[Hashable, int]]]:
     """Describe which axes do not matter and what is not drawn; choose the values that are drawn too."""
     equal, sentences, sizes = [dim for dim in dims if dim not in differ], [], drawing.dataset.sizes
     if equal:
-        thinned = any(len(compared[dim]) < sizes[dim] for dim in dims)
         combinations = math.prod(sizes[dim] for dim in dims)
-        among = (
-            f" of {math.prod(map(len, compared.values())):,} of {combinations:,} combinations" if thinned else ""
-        )
+        among = f" of {compared_count:,} of {combinations:,} combinations" if compared_count < combinations else ""
         verb = "do" if len(equal) > 1 else "does"
         sentences.append(f"{_and(equal)} {verb} not matter (differences{among} below {MAX_DIFFERENCE:.1%}).")
     drawn = _drawn_too(drawing, differ, position)
