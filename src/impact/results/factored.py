@@ -27,8 +27,9 @@ from ..contact.materials import Material
 from ..contact.model import Law, Parameter
 from ..contact.records import Record
 from ..contact.simulate import CollisionResult
+from ..contact.slip_motion import FrictionKind
 from ..contact.status import FRICTION_STATUSES, STATUSES, Status
-from ..contact.tangential import FrictionKind, TangentialResult
+from ..contact.tangential import TangentialResult
 from ..contact.variables import OUTPUTS, Variable
 from ..engine.build_impacts import Stiffness, has_stiffness_rule, mass_at, radius_at, values_at, velocity_at
 from ..engine.inputs import Index, Inputs, index_of

@@ -29,8 +29,9 @@ from ..contact.model import Law
 from ..contact.output_formulas import Outputs, outputs
 from ..contact.records import Record
 from ..contact.simulate import CollisionResult
+from ..contact.slip_motion import FrictionKind
 from ..contact.status import FrictionStatus, Status
-from ..contact.tangential import FrictionKind, TangentialResult
+from ..contact.tangential import TangentialResult
 from ..contact.variables import AXES, Variable
 from ..engine.build_impacts import Stiffness, build_impacts, build_oblique, has_stiffness_rule
 from ..engine.inputs import Index, Inputs, dimensions
