@@ -11,7 +11,7 @@ import json
 import math
 import operator
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -22,9 +22,8 @@ from .._version import __version__
 from ..array_types import Array
 from ..config.grid import Axis
 from ..config.input_names import is_input
-from ..contact.formula_calls import Formula
 from ..contact.materials import Material
-from ..contact.model import Law, Parameter
+from ..contact.model import Law, Parameter, StoredLaw
 from ..contact.records import Record
 from ..contact.simulate import CollisionResult
 from ..contact.slip_motion import FrictionKind
@@ -58,19 +57,6 @@ WITNESSES = {False: ("witness", "witness_index"), True: ("pair_witness", "witnes
 # reads some values of a variable of the table, by its name; and the parts of some lengths that it consists of
 ReadVariable = Callable[[str, slice | NDArray[np.intp]], NDArray[Any]]
 ReadParts = Callable[[str, Sequence[int]], Iterator[NDArray[Any]]]
-
-
-@dataclass(frozen=True)
-class StoredLaw:
-    """A law as stored in a file: everything that outputs depend on besides the trajectory, without formulas."""
-
-    key: str
-    exponent: float | None
-    parameters: tuple[Parameter, ...]
-    domain: Mapping[str, tuple[float, float]]
-    quantities: frozenset[str]
-    is_permanent: bool
-    stiffness: Formula | None = None
 
 
 def stored_stiffness(
