@@ -24,8 +24,7 @@ from ..config.grid import Axis
 from ..config.input_names import is_input
 from ..contact.materials import Material
 from ..contact.model import Law, Parameter, StoredLaw
-from ..contact.records import Record
-from ..contact.simulate import CollisionResult
+from ..contact.records import CollisionResult, Record
 from ..contact.slip_motion import FrictionKind
 from ..contact.status import FRICTION_STATUSES, STATUSES, Status
 from ..contact.tangential import TangentialResult
