@@ -61,16 +61,6 @@ SimulatePart = Callable[..., T]
 TABLE_COLUMNS = CollisionResult.columns()
 
 
-@dataclass(frozen=True)
-class RecordedCollision:
-    """Impacts integrated through both phases; `params` are those of the impacts that entered restitution."""
-
-    result: CollisionResult
-    approach: Solution
-    restitution: Solution | None
-    params: Params
-
-
 # computes the collisions of distinct impacts, see `integrate_collisions`
 ComputeCollisions = Callable[..., CollisionResult]
 
@@ -368,7 +358,7 @@ def integrate_phases(
     record: bool = False,
     never_separates: NDArray[np.bool_] | bool = False,
     core: str = "numpy",
-) -> RecordedCollision:
+) -> tuple[CollisionResult, Phases]:
     """Integrate n impacts, with params of shape (n,), through approach and restitution.
 
     Impacts of the mask `never_separates` are known to stay together, where they do not part. The core "numba"
@@ -414,7 +404,7 @@ def integrate_phases(
         result.steps[rows] += restitution.steps
         if law.model.release == "force":
             result.permanent[rows] += motion.indentation(law, restitution.state[0])
-    return RecordedCollision(result, approach, restitution, phases.params)
+    return result, phases
 
 
 def integrate_collisions(
@@ -428,9 +418,10 @@ def integrate_collisions(
     core: str = "numpy",
 ) -> CollisionResult:
     """Integrate n impacts; see `integrate_phases`."""
-    return integrate_phases(
+    result, _ = integrate_phases(
         law, params, n, rtol=rtol, max_steps=max_steps, never_separates=never_separates, core=core
-    ).result
+    )
+    return result
 
 
 @dataclass(frozen=True)
