@@ -10,8 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from copy import copy
-from dataclasses import dataclass, fields
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +23,7 @@ from .formula_calls import Formula, argument_names
 from .model import ForceModel
 from .motion import MotionLaw, force_at_peak, indentation, unloading_state
 from .powers import power
+from .records import CollisionResult
 from .status import Status
 from .velocity_coordinates import force_form
 
@@ -124,27 +124,6 @@ def friction_problem(key: str, kind: str, scheme: str, only: str = "") -> str:
     return "" if kind in kinds else f'scheme "{scheme}" does not take the friction law {key}, expected {expected}'
 
 
-@dataclass(frozen=True)
-class FixedStepResult:
-    """Collisions at a fixed step, in the contact's own units; arrays of shape (n,).
-
-    `e_out` is NaN for a collision that fails, `peak` the largest indentation at the end of a step, `permanent` the
-    residual indentation of the law, `force` the largest force before a step, `steps` the number of steps, `status`
-    a `Status`. `approach_work` and `restitution_work` are twice the works done against the force of the law while
-    the indentation grows and falls, by the trapezoidal rule over the ends of the steps, from the first touch to
-    the end of the contact, which are inside a step.
-    """
-
-    e_out: Array
-    peak: Array
-    permanent: Array
-    force: Array
-    approach_work: Array
-    restitution_work: Array
-    steps: NDArray[np.int32]
-    status: NDArray[np.int8]
-
-
 def check_scheme(model: ForceModel, n: float, scheme: str) -> None:
     """Raise a UsageError if there is no such scheme, or if it does not take the law."""
     if scheme not in SCHEMES:
@@ -162,7 +141,7 @@ def collide_at_fixed_step(
     max_steps: int | Array,
     scheme: str = KICK_DRIFT,
     slip: FixedStepSlip | None = None,
-) -> FixedStepResult:
+) -> CollisionResult:
     """Simulate collisions by a scheme with a fixed step.
 
     The contact begins with the overlap `phase * step * v0` at the first step that sees it. The contact ends with
@@ -177,6 +156,13 @@ def collide_at_fixed_step(
     phase : where in its step the contact begins, 0 < phase <= 1, shape (k,)
     max_steps : for all or of shape (k,); a collision that takes more never separates
     slip : the slip under friction, which is advanced to the end of each contact
+
+    Returns
+    -------
+    CollisionResult : without `chi` and `exact`; `e_out` is NaN for a collision that fails, `peak` the largest
+        indentation at the end of a step, `force` the largest force before a step. The works are those against the
+        force of the law, by the trapezoidal rule over the ends of the steps, from the first touch to the end of
+        the contact, which are inside a step
     """
     check_scheme(model, n, scheme)
     count = step.size
@@ -340,12 +326,10 @@ class _Contacts:
         self.slip = None if self.slip is None else self.slip.take(active)
 
 
-def _run(contacts: _Contacts, slip: FixedStepSlip | None) -> FixedStepResult:
-    count = contacts.x.size
-    arrays: dict[str, NDArray[Any]] = {field.name: np.full(count, np.nan) for field in fields(FixedStepResult)}
-    arrays["steps"] = contacts.limit.astype(np.int32)
-    arrays["status"] = np.full(count, Status.NOT_SEPARATED, np.int8)
-    result = FixedStepResult(**arrays)
+def _run(contacts: _Contacts, slip: FixedStepSlip | None) -> CollisionResult:
+    count, step_size = contacts.x.size, contacts.step
+    result = CollisionResult.blank(count)
+    result.steps[:], result.status[:] = contacts.limit, Status.NOT_SEPARATED
     active = np.ones(count, bool)
     contacts.begin_work()
     for step in range(1, int(contacts.limit.max(initial=0)) + 1):
@@ -375,4 +359,4 @@ def _run(contacts: _Contacts, slip: FixedStepSlip | None) -> FixedStepResult:
             if np.count_nonzero(active) < (1.0 - COMPACTION_SHARE) * active.size:
                 contacts.keep(active)
                 active = np.ones(contacts.x.size, bool)
-    return result
+    return replace(result, contact_time=result.steps * step_size)

@@ -28,8 +28,8 @@ from .materials import effective_shear_modulus
 from .model import NOT_VERIFIED, ForceModel, Parameter
 from .powers import distinct_values
 from .rigid import ObliqueImpacts
+from .slip_motion import FrictionKind, TangentialForm
 from .status import FrictionStatus
-from .tangential import FrictionKind, TangentialForm
 
 Mask = NDArray[np.bool_]
 # how the stiffness of the tangential spring is chosen, where the user sets no kt_over_kn: a constant k_t;
@@ -62,7 +62,7 @@ class FrictionLaw:
     parameters : parameters that the user sets in `[friction.KEY]`
     same_as : key of the law that this one is another name for, or ""
     stiffness, damping : how the stiffness of the spring, and the damping, are chosen; "" for none
-    memory, cap, coefficient : see `impact.contact.tangential.TangentialForm`
+    memory, cap, coefficient : see `impact.contact.slip_motion.TangentialForm`
     scheme : the only scheme that it is of, see `impact.contact.fixed_step.SCHEMES`; "" for a continuous law
 
     Raises

@@ -86,32 +86,32 @@ def integrate_history(
         values = with_coefficients(model, with_units(dimensionless_values(model, impacts), n), 1)
         law = motion.MotionLaw.of(model, n, bool(is_strong(model, values, 1)[0]))
         params = tuple(np.asarray(values[name]) for name in law.names)
-        collision = integrate_phases(law, params, 1, rtol, max_steps, record=True)
-    if collision.restitution is None or collision.result.status[0] != Status.OK:
+        result, phases = integrate_phases(law, params, 1, rtol, max_steps, record=True)
+    if phases.restitution is None or result.status[0] != Status.OK:
         return None
-    peak_time, duration = (float(phase.state[2, 0]) for phase in (collision.approach, collision.restitution))
+    peak_time, duration = (float(phase.state[2, 0]) for phase in (phases.approach, phases.restitution))
     approach_times = restitution_times = None
     if times is not None:
         uniform = np.linspace(0.0, peak_time + duration, times) if isinstance(times, int) else times
         approach_times = uniform[uniform <= peak_time]
         restitution_times = np.minimum(uniform[uniform > peak_time] - peak_time, duration)
-    approach = _phase(law, motion.approach_problem(law), collision.approach.recorded, params, approach_times)
+    approach = _phase(law, motion.approach_problem(law), phases.approach.recorded, params, approach_times)
     back_law = motion.restitution_law(law)
     restitution = _phase(
         back_law,
         motion.restitution_problem(back_law),
-        collision.restitution.recorded,
-        collision.params,
+        phases.restitution.recorded,
+        phases.params,
         restitution_times,
     )
 
     residual = (
-        collision.params[motion.UNLOADING_PARAMS.index("residual") - len(motion.UNLOADING_PARAMS)]
+        phases.params[motion.UNLOADING_PARAMS.index("residual") - len(motion.UNLOADING_PARAMS)]
         if model.unloading
         else np.zeros(1)
     )
     unit_t = impacts.length / impacts.v0
-    t = np.concatenate([approach.t, collision.approach.state[2] + restitution.t]) * unit_t
+    t = np.concatenate([approach.t, phases.approach.state[2] + restitution.t]) * unit_t
     delta = np.concatenate([approach.x, residual + restitution.x]) * impacts.length
     v = np.concatenate([approach.v, restitution.v]) * impacts.v0
     force = np.concatenate([approach.F, restitution.F]) * (impacts.m * impacts.v0 / unit_t)

@@ -22,7 +22,8 @@ from ..errors import ModelError
 from ..ode.problem import Params
 from .model import ForceModel
 from .motion import MotionLaw
-from .simulate import CollisionResult, integrate_collisions
+from .records import CollisionResult
+from .simulate import integrate_collisions
 from .velocity_coordinates import is_strong
 
 DEGREE = 32

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Literal, NotRequired, Protocol, TypedDict
+from typing import Literal, NotRequired, TypedDict
 
 from ..errors import ModelError, did_you_mean
 from .evidence import Evidence
@@ -88,26 +88,17 @@ class Parameter:
     is_damping: bool = False
 
 
-class Law(Protocol):
-    """The properties of a law that the outputs of a collision depend on, besides its trajectory.
+@dataclass(frozen=True)
+class StoredLaw:
+    """A law as stored in a file: everything that outputs depend on besides the trajectory, without formulas."""
 
-    A `ForceModel` has them; a result stores them for each model, so that it can be read without the formulas.
-    """
-
-    @property
-    def key(self) -> str: ...
-    @property
-    def exponent(self) -> float | None: ...
-    @property
-    def parameters(self) -> tuple[Parameter, ...]: ...
-    @property
-    def domain(self) -> Mapping[str, tuple[float, float]]: ...
-    @property
-    def quantities(self) -> frozenset[str]: ...
-    @property
-    def is_permanent(self) -> bool: ...
-    @property
-    def stiffness(self) -> Formula | None: ...
+    key: str
+    exponent: float | None
+    parameters: tuple[Parameter, ...]
+    domain: Mapping[str, tuple[float, float]]
+    quantities: frozenset[str]
+    is_permanent: bool
+    stiffness: Formula | None = None
 
 
 class About(TypedDict):
@@ -346,3 +337,7 @@ class ForceModel:
         """
         text = ", ".join(f"{low:g} ≤ {name} ≤ {high:g}" for name, (low, high) in self.domain.items())
         return f"{text} ({self.domain_source})" if text and self.domain_source else text
+
+
+# what the outputs of a collision depend on, besides its trajectory
+Law = ForceModel | StoredLaw

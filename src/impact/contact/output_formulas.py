@@ -17,8 +17,9 @@ from .impacts import Impacts, check_inputs
 from .impulse import velocities_after
 from .model import ForceModel, Law
 from .powers import all_within
+from .records import CollisionResult
 from .rigid import ObliqueImpacts
-from .simulate import CollisionResult, ComputeCollisions, simulate
+from .simulate import ComputeCollisions, simulate
 from .status import FIRST_FAILURE, LIMIT, NO_IMPACT, STATUS_OK
 from .tangential import TangentialResult, simulate_friction
 from .variables import CENTRAL_OUTPUTS

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from ..array_types import Array
 from .status import Status
 
 # positions of trajectories; a slice for all of them, so that nothing is copied
@@ -66,3 +67,25 @@ class Record:
     def take(self, rows: Positions) -> Self:
         """Select the trajectories at some positions."""
         return type(self)(**{name: getattr(self, name)[rows] for name in self.columns()})
+
+
+@dataclass(frozen=True)
+class CollisionResult(Record):
+    """The collisions of impacts by a law, in the contact's own units; arrays of shape (n,).
+
+    `approach_work` and `restitution_work` are twice the works done against the force in the two phases, 1 and
+    -e_out^2 up to the solver's error; `chi` is the law's damping ratio and `exact` its restitution in closed form,
+    NaN for a law without them.
+    """
+
+    e_out: Array
+    peak: Array
+    permanent: Array
+    force: Array
+    contact_time: Array
+    approach_work: Array
+    restitution_work: Array
+    steps: NDArray[np.int32]
+    status: NDArray[np.int8]
+    chi: Array
+    exact: Array

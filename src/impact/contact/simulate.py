@@ -24,14 +24,14 @@ from ..ode.state import Workspace
 from . import motion
 from .deduplicate import deduplicate
 from .dimensionless import LawValues, chi_of, exact_restitution, with_coefficients, with_units
-from .fixed_step import EXACT, MAX_CONTACTS, MUJOCO_CONE, FixedStepResult, collide_at_fixed_step
+from .fixed_step import EXACT, MAX_CONTACTS, MUJOCO_CONE, collide_at_fixed_step
 from .fixed_step_slip import PREFIX, SLIP, FixedStepSlip
 from .formula_calls import argument_names, describe_error
 from .model import ForceModel
 from .numba import dispatch
 from .piecewise import in_parts
 from .powers import distinct_values
-from .records import Positions, Record, positions
+from .records import CollisionResult, Positions, Record, positions
 from .slip_motion import TangentialForm
 from .status import LIMIT, STATUS_OK, Status
 from .velocity_coordinates import VelocityCoordinate, is_strong
@@ -54,43 +54,11 @@ LINEAR_CONTACT_TIME = np.pi
 ValueArrays = Mapping[str, Array]
 
 
-@dataclass(frozen=True)
-class CollisionResult(Record):
-    """The collisions of impacts by a law, in the contact's own units; arrays of shape (n,).
-
-    `approach_work` and `restitution_work` are twice the works done against the force in the two phases, 1 and
-    -e_out^2 up to the solver's error; `chi` is the law's damping ratio and `exact` its restitution in closed form,
-    NaN for a law without them.
-    """
-
-    e_out: Array
-    peak: Array
-    permanent: Array
-    force: Array
-    contact_time: Array
-    approach_work: Array
-    restitution_work: Array
-    steps: NDArray[np.int32]
-    status: NDArray[np.int8]
-    chi: Array
-    exact: Array
-
-
 # simulates impacts with the same n: n, the values and the number of impacts, and `collapse`
 T = TypeVar("T", bound=Record)
 SimulatePart = Callable[..., T]
 # columns of the trajectory table
 TABLE_COLUMNS = CollisionResult.columns()
-
-
-@dataclass(frozen=True)
-class RecordedCollision:
-    """Impacts integrated through both phases; `params` are those of the impacts that entered restitution."""
-
-    result: CollisionResult
-    approach: Solution
-    restitution: Solution | None
-    params: Params
 
 
 # computes the collisions of distinct impacts, see `integrate_collisions`
@@ -330,12 +298,7 @@ def collide_at_fixed_steps(
         step = times / values[STEPS_PER_CONTACT]
     else:
         times, step = np.full(count, LINEAR_CONTACT_TIME), values[STEP]
-    result = replace(
-        CollisionResult.blank(count),
-        status=status,
-        chi=chi_of(law_values, count),
-        exact=exact_restitution(model, law_values, count),
-    )
+    result = replace(CollisionResult.blank(count), status=status)
 
     def collide(rows: NDArray[np.intp]) -> None:
         # at least the contacts of one step
@@ -347,7 +310,10 @@ def collide_at_fixed_steps(
         )
         if slip is not None and part is not None:
             slip.put(rows, part)
-        _put_fixed_steps(result, rows, fixed, step[rows], limits >= max_steps)
+        # where the user limits the steps
+        unfinished = np.where(limits >= max_steps, np.int8(Status.MAX_STEPS), np.int8(Status.NOT_SEPARATED))
+        status = np.where(fixed.status == Status.NOT_SEPARATED, unfinished, fixed.status)
+        result.put(rows, replace(fixed, status=status))
 
     active = np.flatnonzero(status == STATUS_OK)
     if active.size:
@@ -361,22 +327,7 @@ def collide_at_fixed_steps(
             times[unfinished] = longer
             if is_longer.any():
                 collide(unfinished[is_longer])
-    return result
-
-
-def _put_fixed_steps(
-    result: CollisionResult,
-    rows: NDArray[np.intp],
-    fixed: FixedStepResult,
-    step: Array,
-    is_limited: NDArray[np.bool_],
-) -> None:
-    """Write collisions at a fixed step to their positions; `is_limited` where the user limits the steps."""
-    unfinished = np.where(is_limited, np.int8(Status.MAX_STEPS), np.int8(Status.NOT_SEPARATED))
-    result.status[rows] = np.where(fixed.status == Status.NOT_SEPARATED, unfinished, fixed.status)
-    for name in ("e_out", "peak", "permanent", "force", "approach_work", "restitution_work", "steps"):
-        getattr(result, name)[rows] = getattr(fixed, name)
-    result.contact_time[rows] = fixed.steps * step
+    return replace(result, chi=chi_of(law_values, count), exact=exact_restitution(model, law_values, count))
 
 
 def check_coefficients(
@@ -407,7 +358,7 @@ def integrate_phases(
     record: bool = False,
     never_separates: NDArray[np.bool_] | bool = False,
     core: str = "numpy",
-) -> RecordedCollision:
+) -> tuple[CollisionResult, Phases]:
     """Integrate n impacts, with params of shape (n,), through approach and restitution.
 
     Impacts of the mask `never_separates` are known to stay together, where they do not part. The core "numba"
@@ -453,7 +404,7 @@ def integrate_phases(
         result.steps[rows] += restitution.steps
         if law.model.release == "force":
             result.permanent[rows] += motion.indentation(law, restitution.state[0])
-    return RecordedCollision(result, approach, restitution, phases.params)
+    return result, phases
 
 
 def integrate_collisions(
@@ -467,9 +418,10 @@ def integrate_collisions(
     core: str = "numpy",
 ) -> CollisionResult:
     """Integrate n impacts; see `integrate_phases`."""
-    return integrate_phases(
+    result, _ = integrate_phases(
         law, params, n, rtol=rtol, max_steps=max_steps, never_separates=never_separates, core=core
-    ).result
+    )
+    return result
 
 
 @dataclass(frozen=True)

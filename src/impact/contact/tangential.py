@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,7 @@ from .fixed_step_slip import (
     FixedStepSlip,
 )
 from .formula_calls import argument_names
+from .friction import Pair
 from .model import ForceModel
 from .piecewise import in_parts
 from .records import Record
@@ -38,14 +39,11 @@ from .slip_motion import (
     SLIP_ROW,
     TIME_ROW,
     Columns,
-    FrictionKind,
     SlipPhase,
     TangentialForm,
     Track,
 )
 from .status import LIMIT, STATUS_OK, FrictionStatus, Status
-
-__all__ = ["FrictionKind", "TangentialForm", "TangentialResult", "simulate_friction"]
 
 # contact regimes, 0 where they are not defined
 STICKS, SLIDES, BOTH = 1, 2, 3
@@ -83,18 +81,8 @@ class RecordedSlip:
     steps: tuple[Step, ...]
 
 
-class PairOfLaws(Protocol):
-    """What a trajectory needs of a `impact.contact.friction.Pair`."""
-
-    @property
-    def model(self) -> ForceModel: ...
-    @property
-    def key(self) -> str: ...
-    def form(self, n: float) -> TangentialForm: ...
-
-
 def simulate_friction(
-    pair: PairOfLaws,
+    pair: Pair,
     n: Array,
     values: simulate.ValueArrays,
     status: NDArray[np.int8],
@@ -133,7 +121,7 @@ def simulate_friction(
 
 
 def record_friction(
-    pair: PairOfLaws, n: float, values: simulate.ValueArrays, *, rtol: float, max_steps: int
+    pair: Pair, n: float, values: simulate.ValueArrays, *, rtol: float, max_steps: int
 ) -> list[RecordedSlip]:
     """Integrate the slip of one impact, a batch of length one, and record it; empty for Coulomb's friction."""
     recorded: list[RecordedSlip] = []
@@ -145,7 +133,7 @@ def record_friction(
 
 
 def _simulate_distinct(
-    pair: PairOfLaws,
+    pair: Pair,
     n: float,
     values: simulate.ValueArrays,
     count: int,
@@ -217,7 +205,7 @@ def _tangential_columns(form: TangentialForm, values: simulate.ValueArrays, coun
 
 
 def _slip_at_fixed_steps(
-    pair: PairOfLaws,
+    pair: Pair,
     n: float,
     values: simulate.ValueArrays,
     count: int,

@@ -20,8 +20,7 @@ from ..contact.friction import Pair, check_friction, friction_values
 from ..contact.frictions.multibody_codes import MUJOCO_ELLIPTIC
 from ..contact.impacts import CHECKS, Impacts, check_inputs
 from ..contact.model import ForceModel
-from ..contact.records import Record
-from ..contact.simulate import CollisionResult
+from ..contact.records import CollisionResult, Record
 from ..contact.status import STATUS_OK
 from ..contact.tangential import TangentialResult
 from .build_impacts import build_impacts, build_oblique, fixed_steps_at

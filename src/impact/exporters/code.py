@@ -21,7 +21,6 @@ PRINT_BETA = """\
 print("beta =", -(u1 + {R1} * omega1 - u2 + {rim2} * omega2) / {slip})
 print("omega1 =", omega1)
 print("omega2 =", omega2)
-print("e_out ="\
 """
 
 
@@ -95,8 +94,10 @@ class Collision:
             "x2": self["R2"],
             "y1": 0.0,
             "y2": 0.0,
+            **dict.fromkeys(("u1", "u2", "omega1", "omega2"), 0),
             "d1": 2.0 * self["R1"],
             "d2": 2.0 * self["R2"],
+            "solid": SOLID,
             "dt": self.dt,
             "steps": self.steps,
             "gap": self.gap,
@@ -146,13 +147,11 @@ class Code:
     comment : what begins and ends a comment among the lines
     notes : remarks on a law: mixing of two materials, thresholds, clamps, versions
     warnings : what a user has to know before using the lines
-    template : a complete input that prints `e_out = VALUE` last, see `script`; "" if none was ever run
-    wall : what the template has for a plane wall, by the text for ball 2 that it replaces; empty without one
+    template : of jinja2, a complete input that prints `e_out = VALUE` last, and before it, if `has_friction`,
+        `beta = VALUE` and both spins; see `script`; "" if none was ever run
     frictions : what the code calls each of its friction laws, by key of the catalogue
     has_friction : whether the code has a friction law with a law, from the keys of the law and the friction law
     shortens_arms : whether friction acts at less than the radius from the centre, by a part of the indentation
-    oblique : what the template has for an oblique impact, by the text that it replaces, before a wall; it prints
-        `beta = VALUE` and the spins before `e_out`
     wall_inputs : the inputs that a wall acts with where they differ from those of a plane of infinite mass, by
         config name, from the key of the law, the version and the values of `Collision`
     suffix, program : of the file of a script, and what runs it; None without one
@@ -173,29 +172,55 @@ class Code:
     notes: Callable[[Collision], list[str]] = lambda collision: []
     warnings: Callable[[Collision], list[str]] = lambda collision: []
     template: str = ""
-    wall: Mapping[str, str] = field(default_factory=dict)
     frictions: Mapping[str, str] = field(default_factory=dict)
     has_friction: Callable[[str, str], bool] = lambda key, friction: True
     shortens_arms: bool = False
-    oblique: Mapping[str, str] = field(default_factory=dict)
     wall_inputs: Callable[[str, str, Mapping[str, float]], Mapping[str, float]] = lambda key, version, values: {}
     suffix: str = ".py"
     program: Program | None = None
 
     def script(self, collision: Collision, parameters: Parameters) -> str:
-        """Fill the template with the lines, the parameters, `Collision.script_values`, and material2.
+        """Fill the template with the lines, the parameters, `Collision.script_values`, and what follows.
 
-        material2 is the name of the material of ball 2 in the lines: "material1" where they make only that one.
+        has_wall, has_friction : whether ball 2 is a wall, and whether the impact is oblique
+        material2 : the material of ball 2 in the lines, "material1" where they make only that one
+        balls : for each ball, not for a wall, its number and values without the number in their names
+        tuples : writes a tuple in Python with the named values of each ball
+        each : writes, in Python, values of both balls by a loop; or of ball 1, and the value of the wall
+        print_beta : of scripts in Python, "" without friction
         """
-        template = self.template
-        if collision.has_wall and not self.wall:
+        # only scripts need it
+        from jinja2 import Environment, StrictUndefined
+
+        if collision.has_wall and "has_wall" not in self.template:
             expected = f"a finite mass: no wall of {self.title} was run"
             raise UsageError(f"{argument('script')}: m2: got inf, expected {expected}")
-        for central, oblique in self.oblique.items() if collision.friction else ():
-            template = template.replace(central, oblique)
-        for ball, wall in self.wall.items() if collision.has_wall else ():
-            template = template.replace(ball, wall)
         lines = self.lines(collision, parameters)
         material2 = "material2" if any(line.startswith("material2 = ") for line in lines) else "material1"
-        values = {**parameters, **collision.script_values(), "lines": "\n".join(lines), "material2": material2}
-        return template.format(**values)
+        values = {"material1": "material1", "material2": material2, **collision.script_values()}
+        balls = [
+            {"number": ball, **{name[:-1]: text for name, text in values.items() if name.endswith(ball)}}
+            for ball in (("1",) if collision.has_wall else ("1", "2"))
+        ]
+
+        def tuples(*names: str) -> str:
+            items = [", ".join(ball[name] for name in names) for ball in balls]
+            if len(names) > 1:
+                items = [f"({item})" for item in items]
+            return f"({items[0]},)" if collision.has_wall else f"({', '.join(items)})"
+
+        def each(expression: str, loop: str, of_wall: str) -> str:
+            return f"{expression}, {of_wall}" if collision.has_wall else f"({expression} for {loop})"
+
+        environment = Environment(
+            undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True
+        )
+        return environment.from_string(self.template).render(
+            {**parameters, **values, "lines": "\n".join(lines)},
+            balls=balls,
+            has_wall=collision.has_wall,
+            has_friction=bool(collision.friction),
+            tuples=tuples,
+            each=each,
+            print_beta=PRINT_BETA.format(**values) if collision.friction else "",
+        )

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from .code import PRINT_BETA, Code, Collision, Parameters
+from .code import Code, Collision, Parameters
 from .programs import python_package
 
 # slip over the closing speed below which TAMSI takes less friction than mu N
 STICTION = 1e-5
-TWO_BALLS = """\
-from pydrake.geometry import AddContactMaterial, ProximityProperties, Sphere
+# the normal is along x, the tangent along y, so that spins are about z
+TEMPLATE = """\
+{% set joint_class = "PlanarJoint" if has_friction else "PrismaticJoint" %}
+from pydrake.geometry import AddContactMaterial, {{ "HalfSpace, " if has_wall else "" }}ProximityProperties, Sphere
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import (
     AddMultibodyPlantSceneGraph,
@@ -16,49 +18,47 @@ from pydrake.multibody.plant import (
     CoulombFriction,
     DiscreteContactApproximation,
 )
-from pydrake.multibody.tree import PrismaticJoint, SpatialInertia
+from pydrake.multibody.tree import {{ joint_class }}, SpatialInertia
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
 builder = DiagramBuilder()
-{lines}
+{{ lines }}
 plant.mutable_gravity_field().set_gravity_vector([0, 0, 0])
 joints = []
-for ball, m, R, material in ((1, {m1}, {R1}, material1), (2, {m2}, {R2}, {material2})):
-    body = plant.AddRigidBody(f"ball{{ball}}", SpatialInertia.SolidSphereWithMass(m, R))
-    joint = PrismaticJoint(f"joint{{ball}}", plant.world_frame(), body.body_frame(), [1, 0, 0])
+for ball, m, R, material in {{ tuples("number", "m", "R", "material") }}:
+    body = plant.AddRigidBody(f"ball{ball}", SpatialInertia.SolidSphereWithMass(m, R))
+{% set axis = "" if has_friction else ", [1, 0, 0]" %}
+    joint = {{ joint_class }}(f"joint{ball}", plant.world_frame(), body.body_frame(){{ axis }})
     joints.append(plant.AddJoint(joint))
-    plant.RegisterCollisionGeometry(body, RigidTransform(), Sphere(R), f"sphere{{ball}}", material)
+    plant.RegisterCollisionGeometry(body, RigidTransform(), Sphere(R), f"sphere{ball}", material)
+{% if has_wall %}
+pose = HalfSpace.MakePose([-1, 0, 0], [0, 0, 0])
+plant.RegisterCollisionGeometry(plant.world_body(), pose, HalfSpace(), "wall", {{ material2 }})
+{% endif %}
 plant.Finalize()
 simulator = Simulator(builder.Build())
 context = plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
-for joint, x, v in zip(joints, ({x1}, {x2}), ({v1}, {v2})):
+{% if has_friction %}
+for joint, xy, v, omega in zip(
+    joints, {{ tuples("x", "y") }}, {{ tuples("v", "u") }}, {{ tuples("omega") }}
+):
+    joint.set_translation(context, xy)
+    joint.set_translational_velocity(context, v)
+    joint.set_angular_velocity(context, omega)
+simulator.AdvanceTo({{ steps }} * {{ dt }})
+{% set speeds_of_wall = "(" ~ v2 ~ ", " ~ u2 ~ ")" %}
+(v1, u1), (v2, u2) = {{ each("joint.get_translational_velocity(context)", "joint in joints", speeds_of_wall) }}
+omega1, omega2 = {{ each("joint.get_angular_velocity(context)", "joint in joints", "0.0") }}
+{% else %}
+for joint, x, v in zip(joints, {{ tuples("x") }}, {{ tuples("v") }}):
     joint.set_translation(context, x)
     joint.set_translation_rate(context, v)
-simulator.AdvanceTo({steps} * {dt})
-v1, v2 = (joint.get_translation_rate(context) for joint in joints)
-print("e_out =", (v2 - v1) / {v0})
+simulator.AdvanceTo({{ steps }} * {{ dt }})
+v1, v2 = {{ each("joint.get_translation_rate(context)", "joint in joints", v2) }}
+{% endif %}
+{{ print_beta }}print("e_out =", (v2 - v1) / {{ v0 }})
 """
-# the normal is along x, the tangent along y, so that spins are about z
-OBLIQUE = {
-    "import PrismaticJoint,": "import PlanarJoint,",
-    'PrismaticJoint(f"joint{{ball}}", plant.world_frame(), body.body_frame(), [1, 0, 0])': (
-        'PlanarJoint(f"joint{{ball}}", plant.world_frame(), body.body_frame())'
-    ),
-    "for joint, x, v in zip(joints, ({x1}, {x2}), ({v1}, {v2})):": (
-        "for joint, xy, v, omega in zip(\n    joints, (({x1}, {y1}), ({x2}, {y2})), (({v1}, {u1}), ({v2}, {u2})), "
-        "({omega1}, {omega2})\n):"
-    ),
-    "joint.set_translation(context, x)": "joint.set_translation(context, xy)",
-    "joint.set_translation_rate(context, v)": (
-        "joint.set_translational_velocity(context, v)\n    joint.set_angular_velocity(context, omega)"
-    ),
-    "v1, v2 = (joint.get_translation_rate(context) for joint in joints)": (
-        "(v1, u1), (v2, u2) = (joint.get_translational_velocity(context) for joint in joints)\n"
-        "omega1, omega2 = (joint.get_angular_velocity(context) for joint in joints)"
-    ),
-    'print("e_out ="': PRINT_BETA,
-}
 
 
 def parameters(collision: Collision) -> dict[str, float | str]:
@@ -140,31 +140,8 @@ CODE = Code(
     lines=lines,
     notes=notes,
     warnings=warnings,
-    template=TWO_BALLS,
-    wall={
-        "import AddContactMaterial, ": "import AddContactMaterial, HalfSpace, ",
-        ", (2, {m2}, {R2}, {material2})": ",",
-        "plant.Finalize()": (
-            "pose = HalfSpace.MakePose([-1, 0, 0], [0, 0, 0])\n"
-            'plant.RegisterCollisionGeometry(plant.world_body(), pose, HalfSpace(), "wall", {material2})\n'
-            "plant.Finalize()"
-        ),
-        "({x1}, {x2}), ({v1}, {v2})": "({x1},), ({v1},)",
-        "(({x1}, {y1}), ({x2}, {y2})), (({v1}, {u1}), ({v2}, {u2})), ({omega1}, {omega2})": (
-            "(({x1}, {y1}),), (({v1}, {u1}),), ({omega1},)"
-        ),
-        "(v1, u1), (v2, u2) = (joint.get_translational_velocity(context) for joint in joints)": (
-            "(v1, u1), (v2, u2) = joint.get_translational_velocity(context), ({v2}, {u2})"
-        ),
-        "omega1, omega2 = (joint.get_angular_velocity(context) for joint in joints)": (
-            "omega1, omega2 = joint.get_angular_velocity(context), 0.0"
-        ),
-        "v1, v2 = (joint.get_translation_rate(context) for joint in joints)": (
-            "v1, v2 = joint.get_translation_rate(context), {v2}"
-        ),
-    },
+    template=TEMPLATE,
     frictions={"coulomb-1785": "CoulombFriction, TAMSI"},
     shortens_arms=True,
-    oblique=OBLIQUE,
     program=python_package("drake"),
 )

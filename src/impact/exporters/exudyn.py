@@ -7,27 +7,34 @@ from .programs import python_package
 
 # impactModel of each law; linear damping is added to the other two where it is not 0
 IMPACT_MODELS = {"exudyn-carvalho-gonthier": 2, "hunt-crossley-1975": 1, "kelvin-voigt": 0}
-TWO_BALLS = """\
+TEMPLATE = """\
 import exudyn
 
 system = exudyn.SystemContainer()
 mbs = system.AddSystem()
-{lines}
+{{ lines }}
 balls = [
     mbs.CreateMassPoint(referencePosition=[x, 0, 0], initialVelocity=[v, 0, 0], mass=m)
-    for m, x, v in (({m1}, {x1}, {v1}), ({m2}, {x2}, {v2}))
+    for m, x, v in {{ tuples("m", "x", "v") }}
 ]
-mbs.CreateSphereSphereContact(itemNumbers=balls, spheresRadii=[{R1}, {R2}], **contact)
+{% if has_wall %}
+balls.append(mbs.CreateGround())
+{# the diagonal, along which the quad is split, is 4 radii away #}
+corners = [[0, y * {{ R1 }}, z * {{ R1 }}] for y, z in ((-9, -9), (-9, 27), (9, 27), (9, -9))]
+mbs.CreateSphereQuadContact(itemNumbers=balls, sphereRadius={{ R1 }}, quadPoints=corners, **contact)
+{% else %}
+mbs.CreateSphereSphereContact(itemNumbers=balls, spheresRadii=[{{ R1 }}, {{ R2 }}], **contact)
+{% endif %}
 mbs.Assemble()
 settings = exudyn.SimulationSettings()
 settings.solution.file.write = False
 # steps are cut where the contact begins and ends
 settings.timeIntegration.minimumStepSize = 1e-6 * dt
-settings.timeIntegration.numberOfSteps = {steps}
-settings.timeIntegration.endTime = {steps} * dt
+settings.timeIntegration.numberOfSteps = {{ steps }}
+settings.timeIntegration.endTime = {{ steps }} * dt
 mbs.SolveDynamic(settings)
 v1, v2 = (mbs.GetObjectOutputBody(ball, exudyn.OutputVariableType.Velocity)[0] for ball in balls)
-print("e_out =", (v2 - v1) / {v0})
+print("e_out =", (v2 - v1) / {{ v0 }})
 """
 
 
@@ -63,15 +70,6 @@ CODE = Code(
     parameters=parameters,
     lines=lines,
     notes=notes,
-    template=TWO_BALLS,
-    wall={
-        " ({m2}, {x2}, {v2})": "",
-        "mbs.CreateSphereSphereContact(itemNumbers=balls, spheresRadii=[{R1}, {R2}]": (
-            "balls.append(mbs.CreateGround())\n"
-            # the diagonal, along which the quad is split, is 4 radii away
-            "corners = [[0, y * {R1}, z * {R1}] for y, z in ((-9, -9), (-9, 27), (9, 27), (9, -9))]\n"
-            "mbs.CreateSphereQuadContact(itemNumbers=balls, sphereRadius={R1}, quadPoints=corners"
-        ),
-    },
+    template=TEMPLATE,
     program=python_package("exudyn"),
 )

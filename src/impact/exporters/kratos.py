@@ -4,54 +4,15 @@ from __future__ import annotations
 
 import json
 
-from .code import PRINT_BETA, Code, Collision, Parameters
+from .code import Code, Collision, Parameters
 from .programs import python_package
 
 LAWS = {
     "kratos-hertz": "DEM_D_Hertz_viscous_Coulomb",
     "kratos-linear": "DEM_D_Linear_viscous_Coulomb",
 }
-BALL1, BALL2 = (
-    f"""\
-Begin SubModelPart ball{number}
-Begin SubModelPartNodes
-{number}
-End SubModelPartNodes
-Begin SubModelPartElements
-{number}
-End SubModelPartElements
-End SubModelPart
-"""
-    for number in (1, 2)
-)
-# a triangle around the origin
-RIGID_WALL = '''\
-with open("ballsDEM_FEM_boundary.mdpa", "w") as mesh:
-    mesh.write("""
-Begin Properties 0
-End Properties
-Begin Nodes
-3 0 -{reach} -{reach}
-4 0 {reach} -{reach}
-5 0 0 {reach}
-End Nodes
-Begin Conditions RigidFace3D3N
-1 0 3 4 5
-End Conditions
-Begin SubModelPart wall
-Begin SubModelPartNodes
-3
-4
-5
-End SubModelPartNodes
-Begin SubModelPartConditions
-1
-End SubModelPartConditions
-End SubModelPart
-""")
-'''
-TWO_BALLS = (
-    '''\
+# the normal is along x at the first touch, the tangent along y, so that spins are about z
+TEMPLATE = '''\
 import json
 import math
 import os
@@ -67,92 +28,132 @@ with open("ballsDEM.mdpa", "w") as mesh:
 Begin Properties 0
 End Properties
 Begin Nodes
-1 {x1} 0 0
-2 {x2} 0 0
+{% for ball in balls %}
+{{ ball.number }} {{ ball.x }} {{ ball.y if has_friction else "0" }} 0
+{% endfor %}
 End Nodes
 Begin Elements SphericParticle3D
-1 0 1
-2 0 2
+{% for ball in balls %}
+{{ ball.number }} 0 {{ ball.number }}
+{% endfor %}
 End Elements
 Begin NodalData RADIUS
-1 0 {R1}
-2 0 {R2}
+{% for ball in balls %}
+{{ ball.number }} 0 {{ ball.R }}
+{% endfor %}
 End NodalData
-'''
-    + BALL1
-    + BALL2
-    + '''""")
+{% for ball in balls %}
+Begin SubModelPart ball{{ ball.number }}
+Begin SubModelPartNodes
+{{ ball.number }}
+End SubModelPartNodes
+Begin SubModelPartElements
+{{ ball.number }}
+End SubModelPartElements
+End SubModelPart
+{% endfor %}
+""")
 
-{lines}
+{% if has_wall %}
+{# a triangle around the origin #}
+with open("ballsDEM_FEM_boundary.mdpa", "w") as mesh:
+    mesh.write("""
+Begin Properties 0
+End Properties
+Begin Nodes
+3 0 -{{ reach }} -{{ reach }}
+4 0 {{ reach }} -{{ reach }}
+5 0 0 {{ reach }}
+End Nodes
+Begin Conditions RigidFace3D3N
+1 0 3 4 5
+End Conditions
+Begin SubModelPart wall
+Begin SubModelPartNodes
+3
+4
+5
+End SubModelPartNodes
+Begin SubModelPartConditions
+1
+End SubModelPartConditions
+End SubModelPart
+""")
 
-materials = {{
+{% endif %}
+{{ lines }}
+
+materials = {
     "materials": [
-        {{
-            "material_name": f"material{{i}}",
+        {
+            "material_name": f"material{i}",
             "material_id": i,
-            "Variables": {{**elastic, "PARTICLE_DENSITY": mass / (4 / 3 * math.pi * radius**3)}},
-        }}
+            "Variables": {**elastic, "PARTICLE_DENSITY": mass / (4 / 3 * math.pi * radius**3)},
+        }
         for i, (elastic, mass, radius) in enumerate(
-            ((material1, {m1}, {R1}), (material2, {m2}, {R2})), 1
+{% set second = [m1, R1] if has_wall else [m2, R2] %}
+            ((material1, {{ m1 }}, {{ R1 }}), (material2, {{ second | join(", ") }})), 1
         )
     ],
     "material_relations": [
-        {{
-            "material_names_list": [f"material{{i}}", f"material{{j}}"],
+        {
+            "material_names_list": [f"material{i}", f"material{j}"],
             "material_ids_list": [i, j],
             "Variables": relation,
-        }}
+        }
         for i, j in ((1, 1), (1, 2), (2, 2))
     ],
-    "material_assignation_table": [[f"SpheresPart.ball{{i}}", f"material{{i}}"] for i in (1, 2)],
-}}
+{% if has_wall %}
+    "material_assignation_table": [["SpheresPart.ball1", "material1"], ["RigidFacePart.wall", "material2"]],
+{% else %}
+    "material_assignation_table": [[f"SpheresPart.ball{i}", f"material{i}"] for i in (1, 2)],
+{% endif %}
+}
 with open("MaterialsDEM.json", "w") as file:
     json.dump(materials, file)
-stage = DEMAnalysisStage(Kratos.Model(), Kratos.Parameters(json.dumps({{
+stage = DEMAnalysisStage(Kratos.Model(), Kratos.Parameters(json.dumps({
     **parameters,
     "problem_name": "balls",
-    "FinalTime": {steps} * parameters["MaxTimeStep"],
+    "FinalTime": {{ steps }} * parameters["MaxTimeStep"],
     "do_print_results_option": False,
     "dem_inlet_option": False,
     "GravityZ": 0.0,
-    "RotationOption": False,
+    "RotationOption": {{ has_friction }},
     "SearchTolerance": 0.01,
+{% if has_wall %}
+    "search_tolerance_against_walls": 0.01,
+{% endif %}
     "NeighbourSearchFrequency": 100,
-    "solver_settings": {{
+    "solver_settings": {
         "strategy": "sphere_strategy",
-        "material_import_settings": {{"materials_filename": "MaterialsDEM.json"}},
-    }},
-}})))
+        "material_import_settings": {"materials_filename": "MaterialsDEM.json"},
+    },
+})))
 stage.Initialize()
-balls = [stage.spheres_model_part.Nodes[i] for i in (1, 2)]
-for ball, speed in zip(balls, ({v1}, {v2})):
+balls = [stage.spheres_model_part.Nodes[i] for i in {{ tuples("number") }}]
+{% if has_friction %}
+for ball, speed, u, omega in zip(balls, {{ tuples("v") }}, {{ tuples("u") }}, {{ tuples("omega") }}):
+    ball.SetSolutionStepValue(Kratos.VELOCITY_Y, u)
+    ball.SetSolutionStepValue(Kratos.ANGULAR_VELOCITY_Z, omega)
+{% else %}
+for ball, speed in zip(balls, {{ tuples("v") }}):
+{% endif %}
     ball.SetSolutionStepValue(Kratos.VELOCITY_X, speed)
 solver = stage._GetSolver()
-for _ in range({steps}):
+for _ in range({{ steps }}):
     stage.time = solver.AdvanceInTime(stage.time)
     solver.Predict()
     solver.SolveSolutionStep()
-v1, v2 = (ball.GetSolutionStepValue(Kratos.VELOCITY_X) for ball in balls)
-print("e_out =", (v2 - v1) / {v0}, flush=True)
+{% set value = ("balls[0]" if has_wall else "ball") ~ ".GetSolutionStepValue" %}
+v1, v2 = {{ each(value ~ "(Kratos.VELOCITY_X)", "ball in balls", v2) }}
+{% if has_friction %}
+u1, u2 = {{ each(value ~ "(Kratos.VELOCITY_Y)", "ball in balls", u2) }}
+omega1, omega2 = {{ each(value ~ "(Kratos.ANGULAR_VELOCITY_Z)", "ball in balls", "0.0") }}
+{% endif %}
+{{ print_beta }}print("e_out =", (v2 - v1) / {{ v0 }}, flush=True)
 # not to end with the messages of Kratos
 os._exit(0)
 '''
-)
-# the normal is along x at the first touch, the tangent along y, so that spins are about z
-OBLIQUE = {
-    "1 {x1} 0 0\n": "1 {x1} {y1} 0\n",
-    "2 {x2} 0 0\n": "2 {x2} {y2} 0\n",
-    '"RotationOption": False': '"RotationOption": True',
-    "for ball, speed in zip(balls, ({v1}, {v2})):\n": (
-        "for ball, speed, u, omega in zip(balls, ({v1}, {v2}), ({u1}, {u2}), ({omega1}, {omega2})):\n"
-        "    ball.SetSolutionStepValue(Kratos.VELOCITY_Y, u)\n"
-        "    ball.SetSolutionStepValue(Kratos.ANGULAR_VELOCITY_Z, omega)\n"
-    ),
-    'print("e_out ="': (
-        "u1, u2 = (ball.GetSolutionStepValue(Kratos.VELOCITY_Y) for ball in balls)\n"
-        "omega1, omega2 = (ball.GetSolutionStepValue(Kratos.ANGULAR_VELOCITY_Z) for ball in balls)\n" + PRINT_BETA
-    ),
-}
 
 
 def parameters(collision: Collision) -> dict[str, float | str]:
@@ -234,34 +235,8 @@ CODE = Code(
     parameters=parameters,
     lines=lines,
     notes=notes,
-    template=TWO_BALLS,
+    template=TEMPLATE,
     frictions={"kratos-viscous-coulomb": "STATIC_FRICTION and DYNAMIC_FRICTION, the same"},
     shortens_arms=True,
-    oblique=OBLIQUE,
-    wall={
-        "2 {x2} 0 0\n": "",
-        "2 {x2} {y2} 0\n": "",
-        "2 0 2\n": "",
-        "2 0 {R2}\n": "",
-        BALL2: "",
-        "{lines}": RIGID_WALL + "\n{lines}",
-        "(material2, {m2}, {R2})": "(material2, {m1}, {R1})",
-        '[[f"SpheresPart.ball{{i}}", f"material{{i}}"] for i in (1, 2)]': (
-            '[["SpheresPart.ball1", "material1"], ["RigidFacePart.wall", "material2"]]'
-        ),
-        '    "NeighbourSearch': '    "search_tolerance_against_walls": 0.01,\n    "NeighbourSearch',
-        "for i in (1, 2)]\nfor ball": "for i in (1,)]\nfor ball",
-        "({v1}, {v2}), ({u1}, {u2}), ({omega1}, {omega2})": "({v1},), ({u1},), ({omega1},)",
-        "({v1}, {v2})": "({v1},)",
-        "u1, u2 = (ball.GetSolutionStepValue(Kratos.VELOCITY_Y) for ball in balls)": (
-            "u1, u2 = balls[0].GetSolutionStepValue(Kratos.VELOCITY_Y), {u2}"
-        ),
-        "omega1, omega2 = (ball.GetSolutionStepValue(Kratos.ANGULAR_VELOCITY_Z) for ball in balls)": (
-            "omega1, omega2 = balls[0].GetSolutionStepValue(Kratos.ANGULAR_VELOCITY_Z), 0.0"
-        ),
-        "v1, v2 = (ball.GetSolutionStepValue(Kratos.VELOCITY_X) for ball in balls)": (
-            "v1, v2 = balls[0].GetSolutionStepValue(Kratos.VELOCITY_X), {v2}"
-        ),
-    },
     program=python_package("KratosDEMApplication"),
 )

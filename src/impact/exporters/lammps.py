@@ -64,61 +64,70 @@ FRICTIONS = {
     "lammps-mindlin-rescale": "mindlin_rescale",
     "lammps-mindlin-rescale-force": "mindlin_rescale/force",
 }
-TWO_BALLS = """\
+# of LAMMPS and LIGGGHTS; the normal is along x, the tangent along y, so that spins are about z. A compute has a
+# value after the run if it was printed at the last step
+RUN = """\
+{% if has_friction %}
+compute         spin all property/atom omegaz
+{% for ball in balls %}
+group           ball{{ ball.number }} id {{ ball.number }}
+compute         spin{{ ball.number }} ball{{ ball.number }} reduce sum c_spin
+variable        omega{{ ball.number }} equal c_spin{{ ball.number }}
+{% endfor %}
+{% if has_wall %}
+variable        omega2 equal 0.0
+{% endif %}
+thermo_style    custom step v_omega1 v_omega2
+thermo          1000000000
+{% endif %}
+run             {{ steps }}
+"""
+PRINT_BETA = """\
+{% if has_friction %}
+variable        u1 equal vy[1]
+variable        u2 equal {{ u2 if has_wall else "vy[2]" }}
+variable        beta equal -(v_u1+{{ R1 }}*v_omega1-v_u2+{{ rim2 }}*v_omega2)/{{ slip }}
+print           "beta = ${beta}"
+print           "omega1 = ${omega1}"
+print           "omega2 = ${omega2}"
+{% endif %}
+"""
+TEMPLATE = (
+    """\
 units           si
 atom_style      sphere
 atom_modify     map array
 comm_modify     vel yes
 boundary        f f f
-region          box block -{reach} {reach} -{reach} {reach} -{reach} {reach}
-create_box      2 box
-create_atoms    1 single {x1} {y1} 0
-create_atoms    2 single {x2} {y2} 0
-set             atom 1 diameter {d1} mass {m1} vx {v1} vy 0 vz 0
-set             atom 2 diameter {d2} mass {m2} vx {v2} vy 0 vz 0
-neighbor        {skin} bin
-{lines}
+region          box block -{{ reach }} {{ reach }} -{{ reach }} {{ reach }} -{{ reach }} {{ reach }}
+create_box      {{ balls | length }} box
+{% for ball in balls %}
+create_atoms    {{ ball.number }} single {{ ball.x }} {{ ball.y }} 0
+{% endfor %}
+{% for ball in balls %}
+{% set size = "diameter " ~ ball.d ~ " mass " ~ ball.m %}
+{% set spin = " omega 0 0 " ~ ball.omega if has_friction else "" %}
+set             atom {{ ball.number }} {{ size }} vx {{ ball.v }} vy {{ ball.u }} vz 0{{ spin }}
+{% endfor %}
+neighbor        {{ skin }} bin
+{{ lines }}
 fix             1 all nve/sphere
+{% if not has_friction %}
 thermo          1000000000
-run             {steps}
+{% endif %}
+"""
+    + RUN
+    + """\
 variable        v1 equal vx[1]
-variable        v2 equal vx[2]
-variable        e_out equal (v_v2-v_v1)/{v0}
+variable        v2 equal {{ v2 if has_wall else "vx[2]" }}
+"""
+    + PRINT_BETA
+    + """\
+variable        e_out equal (v_v2-v_v1)/{{ v0 }}
 print           "e_out = $(v_e_out:%.17g)"
 quit
 """
-# of LAMMPS and LIGGGHTS; the normal is along x, the tangent along y, so that spins are about z
-OBLIQUE_OUTPUT = """\
-variable        u1 equal vy[1]
-variable        u2 equal vy[2]
-variable        beta equal -(v_u1+{R1}*v_omega1-v_u2+{rim2}*v_omega2)/{slip}
-print           "beta = ${{beta}}"
-print           "omega1 = ${{omega1}}"
-print           "omega2 = ${{omega2}}"
-variable        e_out equal"""
-# a compute has a value after the run if it was printed at the last step
-SPINS = """\
-compute         spin all property/atom omegaz
-group           ball1 id 1
-compute         spin1 ball1 reduce sum c_spin
-variable        omega1 equal c_spin1
-group           ball2 id 2
-compute         spin2 ball2 reduce sum c_spin
-variable        omega2 equal c_spin2
-thermo_style    custom step v_omega1 v_omega2
-thermo          1000000000
-run             {steps}"""
-OBLIQUE_WALL = {
-    "vy[2]": "{u2}",
-    "group           ball2 id 2\ncompute         spin2 ball2 reduce sum c_spin\n": "",
-    "c_spin2": "0.0",
-}
-OBLIQUE = {
-    "vx {v1} vy 0 vz 0": "vx {v1} vy {u1} vz 0 omega 0 0 {omega1}",
-    "vx {v2} vy 0 vz 0": "vx {v2} vy {u2} vz 0 omega 0 0 {omega2}",
-    "thermo          1000000000\nrun             {steps}": SPINS,
-    "variable        e_out equal": OBLIQUE_OUTPUT,
-}
+)
 
 
 def read_version(text: str) -> str:
@@ -307,17 +316,8 @@ CODE = Code(
     read_version=read_version,
     notes=notes,
     warnings=warnings,
-    template=TWO_BALLS,
-    wall={
-        "create_box      2 box": "create_box      1 box",
-        "create_atoms    2 single {x2} {y2} 0\n": "",
-        "set             atom 2 diameter {d2} mass {m2} vx {v2} vy 0 vz 0\n": "",
-        "set             atom 2 diameter {d2} mass {m2} vx {v2} vy {u2} vz 0 omega 0 0 {omega2}\n": "",
-        "vx[2]": "{v2}",
-        **OBLIQUE_WALL,
-    },
+    template=TEMPLATE,
     frictions=FRICTIONS,
-    oblique=OBLIQUE,
     suffix=".in",
     program=Program(
         "lmp",

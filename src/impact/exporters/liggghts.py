@@ -8,7 +8,7 @@ import re
 from ..errors import UsageError
 from ..formatting import number
 from .code import Code, Collision, Parameters
-from .lammps import OBLIQUE_OUTPUT, OBLIQUE_WALL, SPINS
+from .lammps import PRINT_BETA, RUN
 from .programs import Program, printed_version
 
 # model of pair style gran, and its options, by key of the catalogue
@@ -25,35 +25,37 @@ FRICTIONS = {"liggghts-history": "history", "liggghts-no-history": "no_history"}
 LEAST_E = 0.05
 # Young's moduli [Pa] below the first and above the second have to be allowed
 SOFT, HARD = 5e6, 1e9
-TWO_BALLS = """\
+TEMPLATE = (
+    """\
 units           si
 atom_style      granular
 atom_modify     map array
 boundary        f f f
 newton          off
 communicate     single vel yes
-region          box block -{reach} {reach} -{reach} {reach} -{reach} {reach} units box
+region          box block -{{ reach }} {{ reach }} -{{ reach }} {{ reach }} -{{ reach }} {{ reach }} units box
 create_box      2 box
-neighbor        {skin} bin
+neighbor        {{ skin }} bin
 neigh_modify    delay 0
-{lines}
-create_atoms    1 single {x1} {y1} 0
-create_atoms    2 single {x2} {y2} 0
-set             atom 1 diameter {d1} mass {m1} vx {v1} vy 0 vz 0
-set             atom 2 diameter {d2} mass {m2} vx {v2} vy 0 vz 0
+{{ lines }}
+{% for ball in balls %}
+create_atoms    {{ ball.number }} single {{ ball.x }} {{ ball.y }} 0
+{% endfor %}
+{% for ball in balls %}
+set             atom {{ ball.number }} diameter {{ ball.d }} mass {{ ball.m }} vx {{ ball.v }} vy {{ ball.u }} vz 0
+{% if has_friction %}
+set             atom {{ ball.number }} omegaz {{ ball.omega }}
+{% endif %}
+{% endfor %}
 fix             move all nve/sphere
-run             {steps}
-variable        e_out equal (vx[2]-vx[1])/{v0}
-print           "e_out = ${{e_out}}"
 """
-
-
-OBLIQUE = {
-    "vx {v1} vy 0 vz 0": "vx {v1} vy {u1} vz 0\nset             atom 1 omegaz {omega1}",
-    "vx {v2} vy 0 vz 0": "vx {v2} vy {u2} vz 0\nset             atom 2 omegaz {omega2}",
-    "run             {steps}": SPINS,
-    "variable        e_out equal": OBLIQUE_OUTPUT,
-}
+    + RUN
+    + PRINT_BETA
+    + """\
+variable        e_out equal ({{ v2 if has_wall else "vx[2]" }}-vx[1])/{{ v0 }}
+print           "e_out = ${e_out}"
+"""
+)
 
 
 def read_version(text: str) -> str:
@@ -187,20 +189,11 @@ CODE = Code(
     read_version=read_version,
     notes=notes,
     warnings=warnings,
-    template=TWO_BALLS,
-    wall={
-        "create_atoms    2 single {x2} {y2} 0\n": "",
-        "set             atom 2 diameter {d2} mass {m2} vx {v2} vy 0 vz 0\n": "",
-        "set             atom 2 diameter {d2} mass {m2} vx {v2} vy {u2} vz 0\n"
-        "set             atom 2 omegaz {omega2}\n": "",
-        "(vx[2]-vx[1])": "({v2}-vx[1])",
-        **OBLIQUE_WALL,
-    },
+    template=TEMPLATE,
     frictions=FRICTIONS,
     # the stiffness of Edinburgh's tangential model is another one
     has_friction=lambda key, friction: key != "liggghts-edinburgh",
     shortens_arms=True,
-    oblique=OBLIQUE,
     wall_inputs=lambda key, version, values: {f"{key}.gamma": 0.0} if key == "liggghts-edinburgh" else {},
     suffix=".in",
     program=PROGRAM,

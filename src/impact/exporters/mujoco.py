@@ -6,53 +6,64 @@ import math
 
 from ..errors import UsageError
 from ..formatting import argument
-from .code import PRINT_BETA, Code, Collision, Parameters
+from .code import Code, Collision, Parameters
 from .programs import python_package
 
 # least and largest impedance are equal: with the default, 0.9 and 0.95, the restitution depends on the indentation
 SOLIMP = "{d!r} {d!r} 0.001 0.5 2"
-TWO_BALLS = '''\
+# the normal is along x, the tangent along y, so that spins are about z; of friction only a pair of geoms has a
+# solreffriction of its own
+TEMPLATE = '''\
 import mujoco
 
 WORLD = """
 <mujoco>
-  <option timestep="{dt}" gravity="0 0 0" integrator="Euler"/>
+{% set cone = ' cone="elliptic" impratio="' ~ impratio ~ '"' if has_friction else "" %}
+  <option timestep="{{ dt }}" gravity="0 0 0" integrator="Euler"{{ cone }}/>
   <default>
-    <geom type="sphere" condim="1" solref="{solref}" solimp="{solimp}"/>
+{% if has_friction %}
+    <pair condim="3" friction="{{ friction }}" solref="{{ solref }}" solreffriction="{{ solreffriction }}"
+{#- #} solimp="{{ solimp }}"/>
+{% else %}
+    <geom type="sphere" condim="1" solref="{{ solref }}" solimp="{{ solimp }}"/>
+{% endif %}
   </default>
   <worldbody>
-    <body pos="{x1} 0 0"><joint type="slide" axis="1 0 0"/><geom size="{R1}" mass="{m1}"/></body>
-    <body pos="{x2} 0 0"><joint type="slide" axis="1 0 0"/><geom size="{R2}" mass="{m2}"/></body>
+{% for ball in balls %}
+{% if has_friction %}
+{% set y, joint, name = ball.y, "<freejoint/>", 'name="ball' ~ ball.number ~ '" ' %}
+{% else %}
+{% set y, joint, name = 0, '<joint type="slide" axis="1 0 0"/>', "" %}
+{% endif %}
+    <body pos="{{ ball.x }} {{ y }} 0">{{ joint }}<geom {{ name }}size="{{ ball.R }}" mass="{{ ball.m }}"/></body>
+{% endfor %}
+{% if has_wall %}
+    <geom {{ 'name="wall" ' if has_friction else "" }}type="plane" size="1 1 1" zaxis="-1 0 0"/>
+{% endif %}
   </worldbody>
+{% if has_friction %}
+  <contact><pair geom1="ball1" geom2="{{ "wall" if has_wall else "ball2" }}"/></contact>
+{% endif %}
 </mujoco>
 """
 model = mujoco.MjModel.from_xml_string(WORLD)
 data = mujoco.MjData(model)
-data.qvel[:] = {v1}, {v2}
-mujoco.mj_step(model, data, {steps})
-v1, v2 = map(float, data.qvel)
-print("e_out =", (v2 - v1) / {v0})
+{% if not has_friction %}
+data.qvel[:] = {{ balls | join(", ", "v") }}
+mujoco.mj_step(model, data, {{ steps }})
+v1, v2 = {{ "float(data.qvel[0]), " ~ v2 if has_wall else "map(float, data.qvel)" }}
+{% elif has_wall %}
+data.qvel[:] = {{ v1 }}, {{ u1 }}, 0, 0, 0, {{ omega1 }}
+mujoco.mj_step(model, data, {{ steps }})
+v1, u1, _, _, _, omega1 = map(float, data.qvel)
+v2, u2, omega2 = {{ v2 }}, {{ u2 }}, 0.0
+{% else %}
+data.qvel[:] = {{ v1 }}, {{ u1 }}, 0, 0, 0, {{ omega1 }}, {{ v2 }}, {{ u2 }}, 0, 0, 0, {{ omega2 }}
+mujoco.mj_step(model, data, {{ steps }})
+v1, u1, _, _, _, omega1, v2, u2, _, _, _, omega2 = map(float, data.qvel)
+{% endif %}
+{{ print_beta }}print("e_out =", (v2 - v1) / {{ v0 }})
 '''
-# of friction only a pair of geoms has a solreffriction of its own
-PAIR = (
-    '<pair condim="3" friction="{friction}" solref="{solref}" solreffriction="{solreffriction}" '
-    'solimp="{solimp}"/>'
-)
-# the normal is along x, the tangent along y, so that spins are about z
-OBLIQUE = {
-    'integrator="Euler"/>': 'integrator="Euler" cone="elliptic" impratio="{impratio}"/>',
-    '<geom type="sphere" condim="1" solref="{solref}" solimp="{solimp}"/>': PAIR,
-    '<body pos="{x1} 0 0"><joint type="slide" axis="1 0 0"/><geom': (
-        '<body pos="{x1} {y1} 0"><freejoint/><geom name="ball1"'
-    ),
-    '<body pos="{x2} 0 0"><joint type="slide" axis="1 0 0"/><geom': (
-        '<body pos="{x2} {y2} 0"><freejoint/><geom name="ball2"'
-    ),
-    "</worldbody>": '</worldbody>\n  <contact><pair geom1="ball1" geom2="ball2"/></contact>',
-    "data.qvel[:] = {v1}, {v2}": "data.qvel[:] = {v1}, {u1}, 0, 0, 0, {omega1}, {v2}, {u2}, 0, 0, 0, {omega2}",
-    "v1, v2 = map": "v1, u1, _, _, _, omega1, v2, u2, _, _, _, omega2 = map",
-    'print("e_out ="': PRINT_BETA,
-}
 OF_FRICTION = (
     "geom1 and geom2 are names of geoms; a pair has all values of a contact, and only a pair has a solreffriction",
     "solreffriction of friction -1 -b_t has the damping b_t; its stiffness does not matter; 0 0 is that of solref",
@@ -92,7 +103,8 @@ def lines(collision: Collision, parameters: Parameters) -> list[str]:
             f'<option timestep="{collision.dt!r}" integrator="Euler" cone="elliptic" '
             f'impratio="{parameters["impratio"]}"/>',
             "<default>",
-            f"  {PAIR.format(**parameters)}",
+            '  <pair condim="3" friction="{friction}" solref="{solref}" solreffriction="{solreffriction}" '
+            'solimp="{solimp}"/>'.format(**parameters),
             "</default>",
             "<contact>",
             '  <pair geom1="ball1" geom2="ball2"/>',
@@ -141,24 +153,8 @@ CODE = Code(
     comment=("<!-- ", " -->"),
     notes=notes,
     warnings=warnings,
-    template=TWO_BALLS,
-    wall={
-        '<body pos="{x2} 0 0"><joint type="slide" axis="1 0 0"/><geom size="{R2}" mass="{m2}"/></body>': (
-            '<geom type="plane" size="1 1 1" zaxis="-1 0 0"/>'
-        ),
-        "data.qvel[:] = {v1}, {v2}": "data.qvel[:] = {v1}",
-        "v1, v2 = map(float, data.qvel)": "v1, v2 = float(data.qvel[0]), {v2}",
-        '<body pos="{x2} {y2} 0"><freejoint/><geom name="ball2" size="{R2}" mass="{m2}"/></body>': (
-            '<geom name="wall" type="plane" size="1 1 1" zaxis="-1 0 0"/>'
-        ),
-        'geom2="ball2"': 'geom2="wall"',
-        ", {v2}, {u2}, 0, 0, 0, {omega2}": "",
-        ", v2, u2, _, _, _, omega2 = map(float, data.qvel)": (
-            " = map(float, data.qvel)\nv2, u2, omega2 = {v2}, {u2}, 0.0"
-        ),
-    },
+    template=TEMPLATE,
     frictions={"mujoco-elliptic": "elliptic cone, solreffriction"},
     shortens_arms=True,
-    oblique=OBLIQUE,
     program=python_package("mujoco"),
 )

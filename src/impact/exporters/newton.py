@@ -5,51 +5,55 @@ from __future__ import annotations
 import math
 
 from ..formatting import number
-from .code import PRINT_BETA, Code, Collision, Parameters
+from .code import Code, Collision, Parameters
 from .programs import python_package
 
-TWO_BALLS = """\
+# the normal is along x, the tangent along y, so that spins are about z
+TEMPLATE = """\
 import newton
 import warp as wp
 
 wp.set_device("cpu")
-{lines}
+{{ lines }}
 # the masses are those of the bodies
 contact.density = 0
 builder = newton.ModelBuilder(gravity=(0, 0, 0))
-for m, R, x in (({m1}, {R1}, {x1}), ({m2}, {R2}, {x2})):
-    moment = 0.4 * m * R**2
+{% if has_friction %}
+for m, R, x, y in {{ tuples("m", "R", "x", "y") }}:
+{% else %}
+for m, R, x in {{ tuples("m", "R", "x") }}:
+{% endif %}
+    moment = {{ solid }} * m * R**2
     inertia = wp.mat33(moment, 0, 0, 0, moment, 0, 0, 0, moment)
-    body = builder.add_body(xform=wp.transform((x, 0, 0), wp.quat_identity()), mass=m, inertia=inertia)
+{% set y = "y" if has_friction else "0" %}
+    body = builder.add_body(xform=wp.transform((x, {{ y }}, 0), wp.quat_identity()), mass=m, inertia=inertia)
     builder.add_shape_sphere(body, radius=R, cfg=contact)
+{% if has_wall %}
+builder.add_shape_plane((-1.0, 0.0, 0.0, 0.0), width=0, length=0, cfg=contact)
+{% endif %}
 model = builder.finalize()
 solver = newton.solvers.SolverSemiImplicit(model)
 state, following, control = model.state(), model.state(), model.control()
-state.body_qd.assign([({v1}, 0, 0, 0, 0, 0), ({v2}, 0, 0, 0, 0, 0)])
+{% set second = "" if has_wall else ", (" ~ [v2, u2, 0, 0, 0, omega2] | join(", ") ~ ")" %}
+state.body_qd.assign([({{ v1 }}, {{ u1 }}, 0, 0, 0, {{ omega1 }}){{ second }}])
 pipeline = newton.CollisionPipeline(model)
 contacts = pipeline.contacts()
-for _ in range({steps}):
+for _ in range({{ steps }}):
     state.clear_forces()
     pipeline.collide(state, contacts)
     solver.step(state, following, control, contacts, dt)
     state, following = following, state
+{% if has_friction and has_wall %}
+(v1, u1, *_, omega1), v2, u2, omega2 = state.body_qd.numpy()[0].tolist(), {{ v2 }}, {{ u2 }}, 0.0
+{% elif has_friction %}
+(v1, u1, *_, omega1), (v2, u2, *_, omega2) = state.body_qd.numpy().tolist()
+{% elif has_wall %}
+v1, v2 = float(state.body_qd.numpy()[0, 0]), {{ v2 }}
+{% else %}
 v1, v2 = (float(speed[0]) for speed in state.body_qd.numpy())
-print("e_out =", (v2 - v1) / {v0})
+{% endif %}
+{{ print_beta }}print("e_out =", (v2 - v1) / {{ v0 }})
 """
-# the normal is along x, the tangent along y, so that spins are about z
-OBLIQUE = {
-    "for m, R, x in (({m1}, {R1}, {x1}), ({m2}, {R2}, {x2})):": (
-        "for m, R, x, y in (({m1}, {R1}, {x1}, {y1}), ({m2}, {R2}, {x2}, {y2})):"
-    ),
-    "wp.transform((x, 0, 0)": "wp.transform((x, y, 0)",
-    "({v1}, 0, 0, 0, 0, 0), ({v2}, 0, 0, 0, 0, 0)": (
-        "({v1}, {u1}, 0, 0, 0, {omega1}), ({v2}, {u2}, 0, 0, 0, {omega2})"
-    ),
-    "v1, v2 = (float(speed[0]) for speed in state.body_qd.numpy())": (
-        "(v1, u1, *_, omega1), (v2, u2, *_, omega2) = state.body_qd.numpy().tolist()"
-    ),
-    'print("e_out ="': PRINT_BETA,
-}
 
 
 def parameters(collision: Collision) -> dict[str, float | str]:
@@ -104,21 +108,8 @@ CODE = Code(
     parameters=parameters,
     lines=lines,
     notes=notes,
-    template=TWO_BALLS,
-    wall={
-        " ({m2}, {R2}, {x2})": "",
-        " ({m2}, {R2}, {x2}, {y2})": "",
-        "model = builder": "builder.add_shape_plane((-1.0, 0.0, 0.0, 0.0), width=0, length=0, cfg=contact)\n"
-        "model = builder",
-        ", ({v2}, 0, 0, 0, 0, 0)]": "]",
-        ", ({v2}, {u2}, 0, 0, 0, {omega2})]": "]",
-        "(v1, u1, *_, omega1), (v2, u2, *_, omega2) = state.body_qd.numpy().tolist()": (
-            "(v1, u1, *_, omega1), v2, u2, omega2 = state.body_qd.numpy()[0].tolist(), {v2}, {u2}, 0.0"
-        ),
-        "(float(speed[0]) for speed in state.body_qd.numpy())": "float(state.body_qd.numpy()[0, 0]), {v2}",
-    },
+    template=TEMPLATE,
     frictions={"coulomb-1785": "kf and mu of ShapeConfig"},
     shortens_arms=True,
-    oblique=OBLIQUE,
     program=python_package("newton"),
 )

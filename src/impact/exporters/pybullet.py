@@ -4,41 +4,46 @@ from __future__ import annotations
 
 import math
 
-from .code import PRINT_BETA, Code, Collision, Parameters
+from .code import Code, Collision, Parameters
 from .programs import python_package
 
-TWO_BALLS = """\
+# the normal is along x, the tangent along y, so that spins are about z
+TEMPLATE = """\
 import pybullet as bullet
 
 bullet.connect(bullet.DIRECT)
-{lines}
+{{ lines }}
 balls = []
-for m, R, x, v in (({m1}, {R1}, {x1}, {v1}), ({m2}, {R2}, {x2}, {v2})):
+{% if has_friction %}
+for m, R, x, y, v, u, omega in (
+{% for ball in balls %}
+    ({{ ball.m }}, {{ ball.R }}, {{ ball.x }}, {{ ball.y }}, {{ ball.v }}, {{ ball.u }}, {{ ball.omega }}),
+{% endfor %}
+):
+{% set y, u, spin = "y", "u", ", [0, 0, omega]" %}
+{% else %}
+for m, R, x, v in {{ tuples("m", "R", "x", "v") }}:
+{% set y, u, spin = "0", "0", "" %}
+{% endif %}
     shape = bullet.createCollisionShape(bullet.GEOM_SPHERE, radius=R)
-    balls.append(bullet.createMultiBody(m, shape, basePosition=[x, 0, 0]))
+    balls.append(bullet.createMultiBody(m, shape, basePosition=[x, {{ y }}, 0]))
     bullet.changeDynamics(balls[-1], -1, **contact)
-    bullet.resetBaseVelocity(balls[-1], [v, 0, 0])
-for _ in range({steps}):
+    bullet.resetBaseVelocity(balls[-1], [v, {{ u }}, 0]{{ spin }})
+{% if has_wall %}
+plane = bullet.createCollisionShape(bullet.GEOM_PLANE, planeNormal=[-1, 0, 0])
+balls.append(bullet.createMultiBody(0, plane))
+bullet.changeDynamics(balls[-1], -1, **contact)
+{% endif %}
+for _ in range({{ steps }}):
     bullet.stepSimulation()
+{% if has_friction %}
+(v1, u1), (v2, u2) = (bullet.getBaseVelocity(ball)[0][:2] for ball in balls)
+omega1, omega2 = (bullet.getBaseVelocity(ball)[1][2] for ball in balls)
+{% else %}
 v1, v2 = (bullet.getBaseVelocity(ball)[0][0] for ball in balls)
-print("e_out =", (v2 - v1) / {v0})
+{% endif %}
+{{ print_beta }}print("e_out =", (v2 - v1) / {{ v0 }})
 """
-# the normal is along x, the tangent along y, so that spins are about z
-OBLIQUE = {
-    "for m, R, x, v in (({m1}, {R1}, {x1}, {v1}), ({m2}, {R2}, {x2}, {v2})):": (
-        "for m, R, x, y, v, u, omega in (\n"
-        "    ({m1}, {R1}, {x1}, {y1}, {v1}, {u1}, {omega1}),\n"
-        "    ({m2}, {R2}, {x2}, {y2}, {v2}, {u2}, {omega2}),\n"
-        "):"
-    ),
-    "[x, 0, 0]": "[x, y, 0]",
-    "[v, 0, 0])": "[v, u, 0], [0, 0, omega])",
-    "v1, v2 = (bullet.getBaseVelocity(ball)[0][0] for ball in balls)": (
-        "(v1, u1), (v2, u2) = (bullet.getBaseVelocity(ball)[0][:2] for ball in balls)\n"
-        "omega1, omega2 = (bullet.getBaseVelocity(ball)[1][2] for ball in balls)"
-    ),
-    'print("e_out ="': PRINT_BETA,
-}
 
 
 def parameters(collision: Collision) -> dict[str, float | str]:
@@ -92,18 +97,7 @@ CODE = Code(
     parameters=parameters,
     lines=lines,
     notes=notes,
-    template=TWO_BALLS,
-    wall={
-        " ({m2}, {R2}, {x2}, {v2})": "",
-        "    ({m2}, {R2}, {x2}, {y2}, {v2}, {u2}, {omega2}),\n": "",
-        "for _ in": (
-            "plane = bullet.createCollisionShape(bullet.GEOM_PLANE, planeNormal=[-1, 0, 0])\n"
-            "balls.append(bullet.createMultiBody(0, plane))\n"
-            "bullet.changeDynamics(balls[-1], -1, **contact)\n"
-            "for _ in"
-        ),
-    },
+    template=TEMPLATE,
     frictions={"coulomb-1785": "lateralFriction"},
-    oblique=OBLIQUE,
     program=python_package("pybullet"),
 )

@@ -9,7 +9,7 @@ LAWS = {
     "simbody-hunt-crossley": "HuntCrossleyForce, equal materials",
     "simbody-hunt-crossley-mixed": "HuntCrossleyForce, two materials",
 }
-TWO_BALLS = '''\
+TEMPLATE = '''\
 import opensim
 
 opensim.Logger.setLevelString("Error")
@@ -20,7 +20,7 @@ with open("contact.xml", "w") as file:
 <HuntCrossleyForce name="contact">
 <HuntCrossleyForce::ContactParametersSet name="contact_parameters">
 <objects>
-{lines}
+{{ lines }}
 </objects>
 </HuntCrossleyForce::ContactParametersSet>
 <transition_velocity>1</transition_velocity>
@@ -32,10 +32,11 @@ model = opensim.Model()
 model.setGravity(opensim.Vec3(0))
 joints = []
 for name, mass, radius, x, speed in (
-    ("1", {m1}, {R1}, {x1}, {v1}),
-    ("2", {m2}, {R2}, {x2}, {v2}),
+{% for ball in balls %}
+    ("{{ ball.number }}", {{ ball.m }}, {{ ball.R }}, {{ ball.x }}, {{ ball.v }}),
+{% endfor %}
 ):
-    body = opensim.Body("body" + name, mass, opensim.Vec3(0), opensim.Inertia(0.4 * mass * radius**2))
+    body = opensim.Body("body" + name, mass, opensim.Vec3(0), opensim.Inertia({{ solid }} * mass * radius**2))
     joint = opensim.SliderJoint("joint" + name, model.getGround(), body)
     joint.updCoordinate().setDefaultValue(x)
     joint.updCoordinate().setDefaultSpeedValue(speed)
@@ -44,15 +45,20 @@ for name, mass, radius, x, speed in (
     model.addJoint(joint)
     model.addContactGeometry(sphere)
     joints.append(joint)
+{% if has_wall %}
+{# it is where x > 0 #}
+wall = opensim.ContactHalfSpace(opensim.Vec3(0), opensim.Vec3(0), model.getGround(), "wall")
+model.addContactGeometry(wall)
+{% endif %}
 model.addForce(contact)
 state = model.initSystem()
 manager = opensim.Manager(model)
 manager.setIntegratorMethod(opensim.Manager.IntegratorMethod_RungeKutta3)
-manager.setIntegratorFixedStepSize({dt})
+manager.setIntegratorFixedStepSize({{ dt }})
 manager.initialize(state)
-state = manager.integrate({steps} * {dt})
-v1, v2 = (joint.getCoordinate().getSpeedValue(state) for joint in joints)
-print("e_out =", (v2 - v1) / {v0})
+state = manager.integrate({{ steps }} * {{ dt }})
+v1, v2 = {{ each("joint.getCoordinate().getSpeedValue(state)", "joint in joints", v2) }}
+print("e_out =", (v2 - v1) / {{ v0 }})
 '''
 
 
@@ -107,18 +113,6 @@ CODE = Code(
     lines=lines,
     comment=("<!-- ", " -->"),
     notes=notes,
-    template=TWO_BALLS,
-    wall={
-        '    ("2", {m2}, {R2}, {x2}, {v2}),\n': "",
-        # it is where x > 0
-        "model.addForce(contact)": (
-            'wall = opensim.ContactHalfSpace(opensim.Vec3(0), opensim.Vec3(0), model.getGround(), "wall")\n'
-            "model.addContactGeometry(wall)\n"
-            "model.addForce(contact)"
-        ),
-        "v1, v2 = (joint.getCoordinate().getSpeedValue(state) for joint in joints)": (
-            "v1, v2 = joint.getCoordinate().getSpeedValue(state), {v2}"
-        ),
-    },
+    template=TEMPLATE,
     program=python_package("opensim"),
 )

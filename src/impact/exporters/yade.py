@@ -6,7 +6,7 @@ import math
 import re
 
 from ..errors import UsageError
-from .code import PRINT_BETA, SOLID, Code, Collision, Parameters
+from .code import Code, Collision, Parameters
 from .programs import Program, printed_version
 
 LAWS = {
@@ -27,31 +27,41 @@ HISTORY = (
 )
 # radius of a wall in R*, in radii of the ball: without and with hertzian=True
 WALL_RADII = (1.0, 1e8)
-TWO_BALLS = """\
-{lines}
-for x, radius, mass, speed, material in (
-    ({x1}, {R1}, {m1}, {v1}, material1),
-    ({x2}, {R2}, {m2}, {v2}, {material2}),
-):
-    ball = O.bodies[O.bodies.append(utils.sphere((x, 0, 0), radius, material=material))]
-    ball.state.mass = mass
-    ball.state.vel = (speed, 0, 0)
-O.run({steps}, True)
-v1, v2 = (ball.state.vel[0] for ball in O.bodies)
-print("e_out =", (v2 - v1) / {v0})
-"""
-
 # the normal is along x, the tangent along y, so that spins are about z
-OBLIQUE = {
-    "for x, radius, mass, speed,": "for x, y, radius, mass, speed, u, spin,",
-    "({x1}, {R1}, {m1}, {v1},": "({x1}, {y1}, {R1}, {m1}, {v1}, {u1}, {omega1},",
-    "({x2}, {R2}, {m2}, {v2},": "({x2}, {y2}, {R2}, {m2}, {v2}, {u2}, {omega2},",
-    "(x, 0, 0)": "(x, y, 0)",
-    "(speed, 0, 0)": f"(speed, u, 0)\n    ball.state.inertia = ({SOLID} * mass * radius**2,) * 3\n"
-    "    ball.state.angVel = (0, 0, spin)",
-    'print("e_out ="': "u1, u2 = (ball.state.vel[1] for ball in O.bodies)\n"
-    "omega1, omega2 = (ball.state.angVel[2] for ball in O.bodies)\n" + PRINT_BETA,
-}
+TEMPLATE = """\
+{{ lines }}
+{% if has_friction %}
+for x, y, radius, mass, speed, u, spin, material in (
+{% else %}
+for x, radius, mass, speed, material in (
+{% endif %}
+{% for ball in balls %}
+{% if has_friction %}
+    ({{ [ball.x, ball.y, ball.R, ball.m, ball.v, ball.u, ball.omega, ball.material] | join(", ") }}),
+{% else %}
+    ({{ [ball.x, ball.R, ball.m, ball.v, ball.material] | join(", ") }}),
+{% endif %}
+{% endfor %}
+):
+{% set y, u = ("y", "u") if has_friction else ("0", "0") %}
+    ball = O.bodies[O.bodies.append(utils.sphere((x, {{ y }}, 0), radius, material=material))]
+    ball.state.mass = mass
+    ball.state.vel = (speed, {{ u }}, 0)
+{% if has_friction %}
+    ball.state.inertia = ({{ solid }} * mass * radius**2,) * 3
+    ball.state.angVel = (0, 0, spin)
+{% endif %}
+{% if has_wall %}
+O.bodies.append(utils.wall(0, axis=0, material={{ material2 }}))
+{% endif %}
+O.run({{ steps }}, True)
+v1, v2 = {{ each("ball.state.vel[0]", "ball in O.bodies", v2) }}
+{% if has_friction %}
+u1, u2 = {{ each("ball.state.vel[1]", "ball in O.bodies", u2) }}
+omega1, omega2 = {{ each("ball.state.angVel[2]", "ball in O.bodies", "0.0") }}
+{% endif %}
+{{ print_beta }}print("e_out =", (v2 - v1) / {{ v0 }})
+"""
 FRICTIONS = {
     "yade-mindlin": "Law2_ScGeom_MindlinPhys_Mindlin, betas",
     "yade-viscoelastic": "Law2_ScGeom_ViscElPhys_Basic, ks and cs",
@@ -220,22 +230,11 @@ CODE = Code(
     law_for_version=law_for_version,
     read_version=read_version,
     notes=notes,
-    template=TWO_BALLS,
-    wall={
-        "    ({x2}, {R2}, {m2}, {v2}, {material2}),\n": "",
-        "    ({x2}, {y2}, {R2}, {m2}, {v2}, {u2}, {omega2}, {material2}),\n": "",
-        "u1, u2 = (ball.state.vel[1] for ball in O.bodies)": "u1, u2 = ball.state.vel[1], {u2}",
-        "omega1, omega2 = (ball.state.angVel[2] for ball in O.bodies)": (
-            "omega1, omega2 = ball.state.angVel[2], 0.0"
-        ),
-        "O.run(": "O.bodies.append(utils.wall(0, axis=0, material={material2}))\nO.run(",
-        "v1, v2 = (ball.state.vel[0] for ball in O.bodies)": "v1, v2 = ball.state.vel[0], {v2}",
-    },
+    template=TEMPLATE,
     frictions=FRICTIONS,
     # betas is ignored beside en
     has_friction=lambda key, friction: key.startswith(LAWS_WITH[friction]),
     shortens_arms=True,
-    oblique=OBLIQUE,
     wall_inputs=lambda key, version, values: {"R2": WALL_RADII[is_hertzian(version)] * values["R1"]},
     program=PROGRAM,
 )

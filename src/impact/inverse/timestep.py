@@ -33,7 +33,6 @@ from ..contact.fixed_step import (
     MAX_CONTACTS,
     MAX_STEPS_PER_CONTACT,
     MUJOCO_CONE,
-    FixedStepResult,
     check_scheme,
     collide_at_fixed_step,
     default_scheme,
@@ -46,6 +45,7 @@ from ..contact.impacts import Impacts
 from ..contact.model import ForceModel, Parameter
 from ..contact.models import find
 from ..contact.output_formulas import collide
+from ..contact.records import CollisionResult
 from ..contact.rigid import ObliqueImpacts
 from ..contact.simulate import PHASE, STEP
 from ..contact.status import FIRST_FAILURE, STATUS_OK, FrictionStatus, Status
@@ -452,7 +452,7 @@ class FixedStepLaw:
         """Compute the delivered restitution at steps dt [s] over all phases, shape (k, phases)."""
         return self.collide(dt, e).e_out.reshape(dt.size, self.phases)
 
-    def collide(self, dt: Array, e: Array | None = None) -> FixedStepResult:
+    def collide(self, dt: Array, e: Array | None = None) -> CollisionResult:
         """Collide at steps dt [s] with the e to ask for at each, over all phases, shape (k,) to (k phases,)."""
         values = self._values(dt)
         if e is not None:

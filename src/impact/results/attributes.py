@@ -10,7 +10,7 @@ from typing import Annotated, Any, get_origin
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, NonNegativeInt, TypeAdapter, ValidationError
 
-from ..contact.tangential import FrictionKind
+from ..contact.slip_motion import FrictionKind
 from ..errors import ResultError
 
 # JSON has null for NaN

@@ -11,7 +11,7 @@ import json
 import math
 import operator
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -22,13 +22,12 @@ from .._version import __version__
 from ..array_types import Array
 from ..config.grid import Axis
 from ..config.input_names import is_input
-from ..contact.formula_calls import Formula
 from ..contact.materials import Material
-from ..contact.model import Law, Parameter
-from ..contact.records import Record
-from ..contact.simulate import CollisionResult
+from ..contact.model import Law, Parameter, StoredLaw
+from ..contact.records import CollisionResult, Record
+from ..contact.slip_motion import FrictionKind
 from ..contact.status import FRICTION_STATUSES, STATUSES, Status
-from ..contact.tangential import FrictionKind, TangentialResult
+from ..contact.tangential import TangentialResult
 from ..contact.variables import OUTPUTS, Variable
 from ..engine.build_impacts import Stiffness, has_stiffness_rule, mass_at, radius_at, values_at, velocity_at
 from ..engine.inputs import Index, Inputs, index_of
@@ -57,19 +56,6 @@ WITNESSES = {False: ("witness", "witness_index"), True: ("pair_witness", "witnes
 # reads some values of a variable of the table, by its name; and the parts of some lengths that it consists of
 ReadVariable = Callable[[str, slice | NDArray[np.intp]], NDArray[Any]]
 ReadParts = Callable[[str, Sequence[int]], Iterator[NDArray[Any]]]
-
-
-@dataclass(frozen=True)
-class StoredLaw:
-    """A law as stored in a file: everything that outputs depend on besides the trajectory, without formulas."""
-
-    key: str
-    exponent: float | None
-    parameters: tuple[Parameter, ...]
-    domain: Mapping[str, tuple[float, float]]
-    quantities: frozenset[str]
-    is_permanent: bool
-    stiffness: Formula | None = None
 
 
 def stored_stiffness(

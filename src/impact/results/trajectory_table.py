@@ -27,10 +27,10 @@ from ..config.tables import FIXED_STEP_INPUTS, OBLIQUE_INPUTS
 from ..contact.impacts import CHECKS, Impacts, check_inputs
 from ..contact.model import Law
 from ..contact.output_formulas import Outputs, outputs
-from ..contact.records import Record
-from ..contact.simulate import CollisionResult
+from ..contact.records import CollisionResult, Record
+from ..contact.slip_motion import FrictionKind
 from ..contact.status import FrictionStatus, Status
-from ..contact.tangential import FrictionKind, TangentialResult
+from ..contact.tangential import TangentialResult
 from ..contact.variables import AXES, Variable
 from ..engine.build_impacts import Stiffness, build_impacts, build_oblique, has_stiffness_rule
 from ..engine.inputs import Index, Inputs, dimensions
