@@ -20,6 +20,7 @@ from hypothesis import settings
 
 import impact
 from impact import formatting
+from impact.conformance.engines.liggghts import ALONE
 from impact.errors import ConfigError
 
 from .fork_server import CompletedCommand, ForkServer, start_fork_server
@@ -214,6 +215,9 @@ def no_installed_codes(
     """No test depends on the codes that are installed here, but for those that run them."""
     if request.node.get_closest_marker("peers") is None:
         monkeypatch.setenv("PATH", str(silent_programs), prepend=os.pathsep)
+        return
+    for name, value in ALONE.items():
+        monkeypatch.setenv(name, value)
 
 
 @pytest.fixture(scope="session")

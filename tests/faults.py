@@ -15,6 +15,7 @@ import resource
 import shutil
 import signal
 import subprocess
+import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -449,7 +450,7 @@ def mount_tmpfs(folder: Path, options: str) -> Iterator[None]:
 @contextmanager
 def start_sweep_server(base: Path) -> Iterator[SweepServer]:
     """Start a server; it ends with the context."""
-    with start_fork_server("tests.faults") as forked:
+    with start_fork_server(sys.executable, "-m", "tests.faults") as forked:
         yield SweepServer(forked, base)
 
 

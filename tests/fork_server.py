@@ -32,6 +32,7 @@ from typing import Any, NoReturn
 ROOT = Path(__file__).parent.parent
 POLL_INTERVAL_S = 0.002  # between checks whether a child has ended
 TIMEOUT_S = 60.0  # limit of a wait of a test
+READY = "the server is ready\n"
 
 
 @dataclass(frozen=True)
@@ -92,12 +93,12 @@ class ForkServer:
 
 
 @contextmanager
-def start_fork_server(module: str = "tests.fork_server") -> Iterator[ForkServer]:
-    """Start the server of a module; it ends with the context."""
+def start_fork_server(*command: str) -> Iterator[ForkServer]:
+    """Start a server, by default that of this module; it ends with the context."""
     # threads that a library starts before the fork do not exist in the child
     single_thread = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     with subprocess.Popen(
-        [sys.executable, "-m", module],
+        command or [sys.executable, "-m", "tests.fork_server"],
         cwd=ROOT,
         env={**os.environ, **single_thread},
         text=True,
@@ -105,6 +106,10 @@ def start_fork_server(module: str = "tests.fork_server") -> Iterator[ForkServer]
         stdout=subprocess.PIPE,
     ) as server:
         try:
+            assert server.stdout is not None
+            # the program of a server may greet first
+            if READY not in server.stdout:
+                raise RuntimeError(f"{command}: no server")
             yield ForkServer(server)
         finally:
             assert server.stdin is not None
@@ -174,6 +179,7 @@ def serve(warm_up: Callable[[], None]) -> None:
     gc.freeze()
     # a TemporaryDirectory would be removed by the first child that ends
     folder = tempfile.mkdtemp()
+    print(READY, end="", flush=True)
     for line in sys.stdin:
         ((name, request),) = json.loads(line).items()
         reply = _start(folder, **request) if name == "start" else asdict(_wait(folder, **request))
@@ -245,8 +251,6 @@ def _warm_up() -> None:
 
 def run_command(argv: list[str], cwd: str, code: str, stdout: int, stderr: int) -> NoReturn:
     """In the child: execute a command line and exit as the interpreter does."""
-    from impact.cli.main import main
-
     status: object = 99
     try:
         os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
@@ -258,6 +262,9 @@ def run_command(argv: list[str], cwd: str, code: str, stdout: int, stderr: int) 
         os.chdir(cwd)
         sys.argv = ["impact", *argv]
         exec(code, {})
+        # which the Python of another server may not have
+        from impact.cli.main import main
+
         main()
     except SystemExit as leaving:
         status = leaving.code or 0

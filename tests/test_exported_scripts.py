@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import math
 import os
+import re
 import subprocess
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -20,12 +22,14 @@ import impact
 from impact.errors import UsageError
 from impact.exporters.code import Code, Collision, Parameters
 from impact.exporters.problem import ExportProblem, prepare_export
+from impact.exporters.programs import run_program
 from impact.exporters.registry import CODES
 from impact.exporters.releases import choose_version, law_of_code
-from impact.exporters.verification import run_script, verify_scripts
+from impact.exporters.verification import Verification, run_script, verify_scripts
 
 from .conftest import Run, default_law
-from .test_peers import ENTRIES, MATERIALS, PYTHON, WITHOUT_PEER, Values, by_impact, config_of
+from .fork_server import CompletedCommand, ForkServer, start_fork_server
+from .test_peers import ENTRIES, MATERIALS, PYTHON, RUNNERS, WITHOUT_PEER, Values, config_of
 
 pytestmark = pytest.mark.peers
 
@@ -44,6 +48,40 @@ EXPORTED = {
     for entry in ENTRIES
     if code.template and entry.key in code.laws
 }
+
+
+# what a server is told to do
+RUN = """import __main__, runpy
+runpy.run_path({file!r}, __main__.names, "__main__")
+raise SystemExit
+"""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def scripts_in_forks() -> Iterator[None]:
+    """Let scripts in Python run in forks of a process that has imported what they import, which takes seconds.
+
+    In `test_a_script_runs_in_an_empty_folder` they begin anew.
+    """
+    with ExitStack() as stack, pytest.MonkeyPatch.context() as patch:
+
+        @cache
+        def server_of(*command: str) -> ForkServer:
+            return stack.enter_context(start_fork_server(*command))
+
+        def run_in_fork(
+            command: Sequence[str], folder: str, timeout_s: float
+        ) -> subprocess.CompletedProcess[str] | CompletedCommand:
+            *program, file = command
+            if program[0] != PYTHON and Path(program[0]).name != "yade":
+                return run_program(command, folder, timeout_s)
+            text = Path(folder, file).read_text(encoding="utf-8")
+            modules = re.findall(r"^(?:import|from) ([\w.]+)", text, re.MULTILINE)
+            server = server_of(*program, str(RUNNERS / "serve_scripts.py"), *modules)
+            return server(cwd=Path(folder), code=RUN.format(file=file), limit=timeout_s)
+
+        patch.setattr("impact.exporters.verification.run_program", run_in_fork)
+        yield
 
 
 def code_and_version(name: str, key: str) -> tuple[Code, str, str]:
@@ -67,32 +105,45 @@ def with_wall(collision: Values) -> Values:
     return values
 
 
+def steps_of(name: str, key: str) -> tuple[float, ...]:
+    """Steps per contact; an extrapolation to a step of zero needs finer ones."""
+    is_predicted = CODES[name].scheme is not None
+    return COARSE_STEPS if is_predicted else (float(EXPORTED[name, key].code.steps_per_contact),)
+
+
+@cache
+def run_scripts(
+    name: str, key: str, second: str, position: int, steps_per_contact: float
+) -> tuple[ExportProblem, str, float, Verification]:
+    """A problem of a collision of an entry, its program, the step [s] and what its scripts deliver."""
+    code, program, version = code_and_version(name, key)
+    collision = EXPORTED[name, key].collisions[position]
+    collision = collision if second == "ball" else with_wall(collision)
+    # without the search of `impact.export` for steps and parameters to advise, which can take ten seconds
+    problem = prepare_export(code, key, version, config_of(key, collision), {}, ())
+    if problem.model.key != key:
+        pytest.skip(f"{key}: {code.title} {version} has {problem.model.key}")
+    dt = problem.law.contact_time / steps_per_contact
+    return problem, program, dt, verify_scripts(problem, program, dt)
+
+
 @pytest.mark.parametrize("second", ["ball", "wall"])
 @pytest.mark.parametrize(("name", "key"), EXPORTED, ids=[key for _, key in EXPORTED])
 def test_an_exported_script_measures_the_predicted_restitution(
     name: str, key: str, second: str, record_property: Callable[[str, object], None]
 ) -> None:
     """Of the walls, one is at rest, the other one moves."""
-    code, program, version = code_and_version(name, key)
-    entry = EXPORTED[name, key]
-    steps = COARSE_STEPS if code.scheme is not None else (float(entry.code.steps_per_contact),)
+    code, _, version = code_and_version(name, key)
+    steps = steps_of(name, key)
     # of two, the first one is run with a wall
-    collisions = entry.collisions[len(steps) - 1 :]
-    if second == "wall":
-        collisions = [with_wall(balls) for balls in entry.collisions[:2]]
-    differences, uncertainties = [], []
-    for collision, steps_per_contact in zip(collisions, steps, strict=False):
-        source = config_of(key, collision)
-        _, contact_time = by_impact(key, collision)
-        export = impact.export(
-            name, key, source=source, dt=contact_time / steps_per_contact, verify=True, program=program
-        )
-        if export.model != key:
-            pytest.skip(f"{key}: {code.title} {version} has {export.model}")
-        assert export.verification is not None
-        differences.append(export.verification.difference)
-        uncertainties.append(export.verification.uncertainty)
-        print(export.verification)
+    first = 0 if second == "wall" else len(steps) - 1
+    verifications = [
+        run_scripts(name, key, second, first + number, steps_per_contact)[-1]
+        for number, steps_per_contact in enumerate(steps)
+    ]
+    print(*verifications, sep="\n")
+    differences = [verification.difference for verification in verifications]
+    uncertainties = [verification.uncertainty for verification in verifications]
     tolerance = TOLERANCES.get(key, 1e-9) if code.scheme is not None else max(uncertainties)
     variant = "script" if second == "ball" else "script, wall"
     record_property("peer", (code.name, version, key, variant, 4 * len(differences), max(differences), tolerance))
@@ -186,25 +237,13 @@ def replace_in_scripts(code: Code, old: str, new: str) -> Code:
     return Wrong(**vars(code))
 
 
-@cache
-def agreeing_problem(name: str, key: str, second: str) -> tuple[ExportProblem, str, float]:
-    """A problem whose unchanged script agrees with what is predicted, its program, and the step [s]."""
-    code, program, version = code_and_version(name, key)
-    entry = EXPORTED[name, key]
-    collision = entry.collisions[0] if second == "ball" else with_wall(entry.collisions[0])
-    problem = prepare_export(code, key, version, config_of(key, collision), {}, ())
-    # an extrapolation to a step of zero needs finer steps
-    dt = problem.law.contact_time / (12 if code.scheme is not None else entry.code.steps_per_contact)
-    assert verify_scripts(problem, program, dt).agrees
-    return problem, program, dt
-
-
 @pytest.mark.parametrize(
     ("name", "key", "old", "new", "second"),
     [(*words, "ball") for words in PLANTED] + [(*words, "wall") for words in PLANTED_WALLS],
 )
 def test_an_error_in_a_template_is_found(name: str, key: str, old: str, new: str, second: str) -> None:
-    problem, program, dt = agreeing_problem(name, key, second)
+    problem, program, dt, unchanged = run_scripts(name, key, second, 0, steps_of(name, key)[0])
+    assert unchanged.agrees
     wrong = replace(problem, code=replace_in_scripts(problem.code, old, new))
     assert not verify_scripts(wrong, program, dt, n_phases=1).agrees
 
@@ -250,7 +289,10 @@ def test_verify_exits_with_0_where_the_code_agrees_and_with_1_where_it_differs(c
     assert "DIFFERS" in differing.stdout
 
 
-@pytest.mark.parametrize(("name", "words"), [("lammps", ("-in",)), ("mujoco", ()), ("drake", ())])
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [("lammps", ("-in",)), ("mujoco", ()), ("drake", ()), ("newton", ()), ("yade", ("-j1", "-n", "-x"))],
+)
 def test_a_script_runs_in_an_empty_folder(cli: Run, tmp_path: Path, name: str, words: tuple[str, ...]) -> None:
     code, program, version = code_and_version(name, default_law(name))
     file = tmp_path / f"two_balls{code.suffix}"
@@ -336,15 +378,23 @@ def oblique_problem(
     return prepare_export(code, key, version, config, {}, (), friction), program
 
 
+@cache
+def run_oblique_scripts(position: int, second: str) -> tuple[ExportProblem, str, Verification]:
+    """A problem of `OBLIQUE`, its program, and what its scripts deliver."""
+    problem, program = oblique_problem(*OBLIQUE[position], second)
+    return problem, program, verify_scripts(problem, program, problem.law.contact_time / COARSE_STEPS[1])
+
+
 @pytest.mark.parametrize("second", ["ball", "wall"])
-@pytest.mark.parametrize("words", OBLIQUE, ids=lambda words: "-".join(map(str, (*words[1:3], *words[3]))))
+@pytest.mark.parametrize(
+    "position", range(len(OBLIQUE)), ids=["-".join(map(str, (*words[1:3], *words[3]))) for words in OBLIQUE]
+)
 def test_a_script_of_an_oblique_impact_measures_beta(
-    words: tuple[str, str, str, Values, Values], second: str, record_property: Callable[[str, object], None]
+    position: int, second: str, record_property: Callable[[str, object], None]
 ) -> None:
     """Where arms are the radius, against a wall to rounding; else within a part of the indentation over R*."""
-    problem, program = oblique_problem(*words, second)
-    verification = verify_scripts(problem, program, problem.law.contact_time / 31.0)
-    name, key, friction, parameters, _ = words
+    problem, _, verification = run_oblique_scripts(position, second)
+    name, key, friction, parameters, _ = OBLIQUE[position]
     variant = ", ".join((friction, *(f"{name} {value}" for name, value in parameters.items()), second, "beta"))
     worst = (verification.beta_difference, verification.beta_uncertainty)
     record_property("peer", (name, problem.version, key, variant, len(verification.beta_measured), *worst))
@@ -421,23 +471,15 @@ PLANTED_FRICTION = (
 )
 
 
-@cache
-def agreeing_oblique_problem(key: str, friction: str, second: str) -> tuple[ExportProblem, str, float]:
-    """The same as `agreeing_problem`, of the first entry of `OBLIQUE` with both laws."""
-    words = next(words for words in OBLIQUE if words[1:3] == (key, friction))
-    problem, program = oblique_problem(*words, second)
-    dt = problem.law.contact_time / 31.0
-    assert verify_scripts(problem, program, dt).agrees
-    return problem, program, dt
-
-
 @pytest.mark.parametrize(("key", "friction", "old", "new", "second"), PLANTED_FRICTION)
 def test_an_error_of_friction_in_a_template_is_found(
     key: str, friction: str, old: str, new: str, second: str
 ) -> None:
-    problem, program, dt = agreeing_oblique_problem(key, friction, second)
+    position = next(i for i, words in enumerate(OBLIQUE) if words[1:3] == (key, friction))
+    problem, program, unchanged = run_oblique_scripts(position, second)
+    assert unchanged.agrees
     wrong = replace(problem, code=replace_in_scripts(problem.code, old, new))
-    assert not verify_scripts(wrong, program, dt, n_phases=1).agrees
+    assert not verify_scripts(wrong, program, problem.law.contact_time / COARSE_STEPS[1], n_phases=1).agrees
 
 
 def test_an_oblique_script_prints_beta_and_spins_before_e_out(cli: Run) -> None:

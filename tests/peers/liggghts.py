@@ -1,11 +1,10 @@
 """LIGGGHTS as both runners use it: one process runs every collision, with `clear` between them.
 
-A process needs a third of a second to start, a collision a few milliseconds.
+A process needs a tenth of a second to start, a collision a few milliseconds.
 """
 
 from __future__ import annotations
 
-import os
 import re
 import subprocess
 from collections.abc import Callable
@@ -14,8 +13,6 @@ from pathlib import Path
 from runner import serve_all
 
 PROGRAM = "liggghts"
-# one process needs no network, for which MPI would look each time
-ENVIRONMENT = os.environ | {"OMPI_MCA_pml": "ob1", "OMPI_MCA_btl": "self"}
 
 
 def serve_scripts(
@@ -43,7 +40,6 @@ def serve_scripts(
             capture_output=True,
             text=True,
             check=False,
-            env=ENVIRONMENT,
         )
         if process.returncode or "ERROR" in process.stdout:
             raise RuntimeError(process.stdout[-2000:] + process.stderr)

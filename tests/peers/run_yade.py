@@ -50,7 +50,9 @@ def collide(
         NewtonIntegrator(damping=0, gravity=(0, 0, 0)),
     ]
     O.dt = step
-    O.run(count, True)
+    # O.run looks every 40 ms whether it is over
+    for _ in range(count):
+        O.step()
     return O.bodies[0].state.vel[0], O.bodies[1].state.vel[0]
 
 

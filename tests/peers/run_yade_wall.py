@@ -64,7 +64,9 @@ def collide(
         NewtonIntegrator(damping=0, gravity=(0, 0, 0)),
     ]
     O.dt = step
-    O.run(count, True)
+    # O.run looks every 40 ms whether it is over
+    for _ in range(count):
+        O.step()
     return -ball.state.vel[2], ball.state.vel[0], -ball.state.angVel[1]
 
 

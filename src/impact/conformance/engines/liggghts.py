@@ -47,8 +47,9 @@ NU, TANGENTIAL_STIFFNESS = 0.3, 2.0 / 7.0
 # the balls touch after half of a step, and three contact times are run
 PHASE, CONTACTS = 0.5, 3.0
 SOLID = 0.4
-# one process needs no network, for which MPI would look each time
-ENVIRONMENT = os.environ | {"OMPI_MCA_pml": "ob1", "OMPI_MCA_btl": "self"}
+# one process needs neither the network for which MPI would look each time, nor the daemon that it would start
+ALONE = {"OMPI_MCA_pml": "ob1", "OMPI_MCA_btl": "self", "OMPI_MCA_ess_singleton_isolated": "1"}
+ENVIRONMENT = os.environ | ALONE
 
 
 def collide(c: dict[str, Any]) -> dict[str, Any]:
