@@ -18,11 +18,11 @@ from fuzz_configs import Outcomes, fuzz, judge, write_files
 @pytest.mark.parametrize(
     ("count", "n_fits"),
     [
-        (15, 1),
+        (25, 1),
         pytest.param(300, 6, marks=pytest.mark.slow),
         pytest.param(1000, 20, marks=pytest.mark.long),
     ],
-    ids=["15", "300", "1000"],
+    ids=["25", "300", "1000"],
 )
 def test_every_mutated_config_ends_as_documented(
     tmp_path: Path, forked: ForkServer, count: int, n_fits: int
