@@ -162,7 +162,8 @@ class Interpolant:
     edges : of the intervals, ascending
     floors : the size of each column, where its values are smaller
     max_divisions : how often an interval is divided
-    is_needed : whether an interval with some values at its nodes, of the shape of `Interval.values`, is divided
+    is_needed : whether an interval with some values at its nodes, of the shape of `Interval.values`, is divided;
+        by default all are
 
     >>> sine = Interpolant(lambda x: np.sin(x)[:, None], [0.0, 1.0, 2.0], np.ones(1))
     >>> abs(sine(np.array([0.3, 1.7]))[:, 0] - np.sin([0.3, 1.7])).max() < 1e-14
@@ -175,7 +176,7 @@ class Interpolant:
         edges: Array | Sequence[float],
         floors: Array,
         max_divisions: int = MAX_DIVISIONS,
-        is_needed: Callable[[Array], bool] = lambda values: True,
+        is_needed: Callable[[Array], bool] | None = None,
     ) -> None:
         self.function, self.floors, self.max_divisions = function, floors, max_divisions
         self.is_needed = is_needed
@@ -264,8 +265,9 @@ class Interpolant:
         return bool(divided)
 
     def _is_divided(self, interval: Interval) -> bool:
-        is_divided = interval.divisions < self.max_divisions and interval.is_divisible
-        return is_divided and interval.values is not None and self.is_needed(interval.values)
+        if interval.values is None or interval.divisions >= self.max_divisions or not interval.is_divisible:
+            return False
+        return self.is_needed is None or self.is_needed(interval.values)
 
 
 class InterpolatedCollisions:
