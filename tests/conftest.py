@@ -28,6 +28,9 @@ from .fork_server import CompletedCommand, ForkServer, start_fork_server
 if TYPE_CHECKING:
     from .faults import SweepServer
 
+# jsonschema would build dozens of grammars of internationalized addresses, for seconds; no schema here has one
+sys.modules.setdefault("rfc3987_syntax", None)  # type: ignore[arg-type]
+
 # no test is about time
 settings.register_profile("untimed", deadline=None)
 settings.load_profile("untimed")

@@ -311,3 +311,13 @@ def test_an_axis_with_a_common_input_is_common_to_all_models() -> None:
     names = {entry.model: entry.parameters for entry in recommend(sweep_in_memory(plan)).models}
     assert names["johnson-1985"] == {}
     assert [*names["kelvin-voigt"]] == ["model.kelvin-voigt.C"]
+
+
+def test_a_missing_value_counts_once_along_parameters_of_other_laws() -> None:
+    """The balls do not meet at v1 = -1: one cell of each law, and each of its own parameter."""
+    result = impact.sweep({
+        "models": ["tsuji-1992", "ismail-stronge-2008"],
+        "sweep": {"e": 0.5, "v1": [-1.0, 1.0], "m1": 1.0, "m2": 1.0, "K": 1e9},
+        "model": {"ismail-stronge-2008": {"gamma": [1.1, 1.5, 2.0], "K": 1e7}},
+    })  # fmt: skip
+    assert impact.info(result)["variables"]["e_out"]["missing"] == 1 + 3

@@ -505,10 +505,11 @@ def test_info(cli: Run, stored: Path) -> None:
 
 
 def test_the_schema_is_printed_or_written(cli: Run, tmp_path: Path) -> None:
-    assert json.loads(cli("schema").stdout) == impact.schema()
+    schema = impact.schema()
+    assert json.loads(cli("schema").stdout) == schema
     written = cli("schema", "-o", "s.json", cwd=tmp_path)
     assert (written.returncode, written.stdout, written.stderr) == (0, "", "s.json: written\n")
-    assert json.loads((tmp_path / "s.json").read_text(encoding="utf-8")) == impact.schema()
+    assert json.loads((tmp_path / "s.json").read_text(encoding="utf-8")) == schema
 
 
 def test_no_switch_is_on_unless_it_is_given() -> None:

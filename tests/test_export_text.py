@@ -201,6 +201,7 @@ def test_chrono_takes_both_materials_or_a_modulus_that_gives_the_stiffness() -> 
     assert one["YoungModulus"] == pytest.approx(2.0 * 0.91 * 0.75e9 / math.sqrt(0.03), rel=1e-14)
 
 
+@pytest.mark.slow
 def test_chrono_says_what_its_settings_enter_for_the_laws_that_have_them_only() -> None:
     hooke, plain = {"chrono-smc-hooke", "liggghts-hooke"}, "chrono-smc-plaincoulomb"
     about = {

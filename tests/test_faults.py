@@ -60,8 +60,8 @@ def test_all_file_operations_of_a_sweep_are_recorded(sweeps: SweepServer) -> Non
     [
         (CONFIG_TEXT, 3),
         pytest.param(FACTORED_CONFIG, 4, marks=pytest.mark.slow),
-        pytest.param(CONFIG_TEXT, 40, marks=pytest.mark.faults),
-        pytest.param(FACTORED_CONFIG, 40, marks=pytest.mark.faults),
+        pytest.param(CONFIG_TEXT, 20, marks=pytest.mark.faults),
+        pytest.param(FACTORED_CONFIG, 20, marks=pytest.mark.faults),
         # all of them
         pytest.param(CONFIG_TEXT, None, marks=pytest.mark.long),
         pytest.param(FACTORED_CONFIG, None, marks=pytest.mark.long),
@@ -80,7 +80,9 @@ def test_a_sweep_killed_at_any_file_operation_is_resumed(
     report.check()
 
 
-@pytest.mark.parametrize("count", [2, pytest.param(60, marks=pytest.mark.faults)])
+@pytest.mark.parametrize(
+    "count", [2, pytest.param(25, marks=pytest.mark.faults), pytest.param(60, marks=pytest.mark.long)]
+)
 def test_a_sweep_killed_at_a_random_time_is_resumed(sweeps: SweepServer, count: int) -> None:
     report, generator, longest = (
         FaultReport("kill -9 at a random time", sweeps),
@@ -251,7 +253,7 @@ def create_folder(sweeps: SweepServer, state: State, text: str = "") -> Path:
         (CONFIG_TEXT, {"link"}, 0),
         pytest.param(CONFIG_TEXT, {"rename", "rmdir"}, 0, marks=pytest.mark.slow),
         pytest.param(FACTORED_CONFIG, {"link"}, 0, marks=pytest.mark.slow),
-        pytest.param(CONFIG_TEXT, None, 20, marks=pytest.mark.faults),
+        pytest.param(CONFIG_TEXT, None, 10, marks=pytest.mark.faults),
         pytest.param(CONFIG_TEXT, None, 60, marks=pytest.mark.long),
     ],
 )
@@ -322,9 +324,10 @@ def check_storage_error(completed: FinishedSweep, folder: Path) -> set[int]:
     [
         (CONFIG_TEXT, 2),
         pytest.param(FACTORED_CONFIG, 3, marks=pytest.mark.slow),
-        pytest.param(CONFIG_TEXT, 30, marks=pytest.mark.faults),
-        pytest.param(FACTORED_CONFIG, 30, marks=pytest.mark.faults),
+        pytest.param(CONFIG_TEXT, 15, marks=pytest.mark.faults),
+        pytest.param(FACTORED_CONFIG, 15, marks=pytest.mark.faults),
         pytest.param(CONFIG_TEXT, 120, marks=pytest.mark.long),
+        pytest.param(FACTORED_CONFIG, 60, marks=pytest.mark.long),
     ],
 )
 def test_a_sweep_is_resumed_after_a_disk_error_at_any_operation(

@@ -50,7 +50,7 @@ def impacts(pairs: Sequence[tuple[Ball, Ball]], *, mu: float, e: float) -> xr.Da
     return result
 
 
-@settings(max_examples=4)
+@settings(max_examples=2)
 @given(
     ball1=BALL, ball2=BALL, mu=st.floats(0.02, 1.5), e=st.floats(0.2, 1.0), closing=st.floats(0.1, 10.0),
     frame=st.tuples(st.floats(-5.0, 5.0), st.floats(-5.0, 5.0)), turn=st.floats(-100.0, 100.0),

@@ -103,6 +103,13 @@ def test_only_a_small_interval_around_a_kink_or_a_jump_has_no_polynomial(
     np.testing.assert_allclose(values[is_known], function(x - 0.3)[is_known], atol=1e-12)
 
 
+def test_an_interval_that_is_not_needed_is_not_divided() -> None:
+    interpolant = Interpolant(
+        lambda x: np.abs(x - 0.3)[:, None], [0.1, 1.0], np.ones(1), is_needed=lambda values: values.min() > 0.5
+    )
+    assert np.isnan(interpolant(np.array([0.11, 0.99]))).all()
+
+
 def test_laws_of_the_same_motion_share_their_polynomials() -> None:
     assert motion_key(find("hunt-crossley-1975")) == motion_key(find("lankarani-nikravesh-1990"))
     assert motion_key(find("tsuji-1992")) != motion_key(find("tsuji-1992-no-tension"))

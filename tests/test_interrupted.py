@@ -252,7 +252,9 @@ def test_a_damaged_plan_is_not_resumed(sweeps: SweepServer, change: Callable[[by
     check_refused(sweeps, folder, "--resume", message=WORK)
 
 
-@pytest.mark.parametrize("count", [3, pytest.param(80, marks=pytest.mark.faults)])
+@pytest.mark.parametrize(
+    "count", [3, pytest.param(30, marks=pytest.mark.faults), pytest.param(80, marks=pytest.mark.long)]
+)
 def test_a_block_with_a_flipped_bit_is_integrated_again(sweeps: SweepServer, count: int) -> None:
     report, generator = FaultReport("a flipped bit in a block", sweeps), random.Random(5)
     for number in pick_evenly(sorted(ALL_BLOCKS) * count, count):
@@ -356,8 +358,8 @@ def check_interrupted(completed: FinishedSweep, folder: Path, number: int, at: o
     [
         (CONFIG_TEXT, 3, 1),
         pytest.param(FACTORED_CONFIG, 3, 1, marks=pytest.mark.slow),
-        pytest.param(CONFIG_TEXT, 20, 15, marks=pytest.mark.faults),
-        pytest.param(FACTORED_CONFIG, 20, 15, marks=pytest.mark.faults),
+        pytest.param(CONFIG_TEXT, 10, 8, marks=pytest.mark.faults),
+        pytest.param(FACTORED_CONFIG, 10, 8, marks=pytest.mark.faults),
         pytest.param(CONFIG_TEXT, 60, 40, marks=pytest.mark.long),
         pytest.param(FACTORED_CONFIG, 20, 40, marks=pytest.mark.long),
     ],

@@ -156,9 +156,14 @@ MATERIALS = {"material1": ["steel", "aluminium"], "material2": "steel"}
 @pytest.mark.parametrize(
     ("config", "name", "value"),
     [
-        ({"sweep": ALONG_E}, "m2", 1.25),
+        pytest.param({"sweep": ALONG_E}, "m2", 1.25, marks=pytest.mark.slow),
         ({"sweep": {**ALONG_E, "v1": {"geomspace": [0.01, 10.0, 4]}}}, "v1", 0.0234),
-        ({"sweep": {name: value for name, value in {**ALONG_E, **MATERIALS}.items() if name != "K"}}, "m2", 1.25),
+        pytest.param(
+            {"sweep": {name: value for name, value in {**ALONG_E, **MATERIALS}.items() if name != "K"}},
+            "m2",
+            1.25,
+            marks=pytest.mark.slow,
+        ),
         ({"sweep": ALONG_E, "model": {"tsuji-1992": {"K": [1e5, 1e6]}}}, "tsuji-1992.K", 345678.0),
     ],
 )

@@ -172,6 +172,7 @@ def test_solve_finds_the_mu_that_slides_with_a_given_beta() -> None:
     assert str(sticks).startswith("hertz with coulomb-1785: no value of mu gives beta = 0.4; beta is from -1 to 0")
 
 
+@pytest.mark.slow
 def test_solve_finds_a_slip_speed_of_a_friction_law() -> None:
     """Its natural size is a speed, that of the impact, and not a number of the contact law."""
     law = {"drake-regularized": {"v_s": 0.01}}

@@ -342,8 +342,17 @@ def test_labels_of_bands_are_apart_and_inside_their_panel(
     assert min(wide.x0, narrow.x0) > panel.x1
 
 
-@pytest.mark.parametrize("width", WIDTHS)
-@pytest.mark.parametrize("count", [1, pytest.param(12, marks=pytest.mark.slow), 27])
+@pytest.mark.parametrize(
+    ("count", "width"),
+    [
+        # few and many entries, each in one width; the others are slow
+        pytest.param(
+            count, width, marks=() if (count, width) in ((1, "double"), (27, "single")) else pytest.mark.slow
+        )
+        for count in (1, 12, 27)
+        for width in WIDTHS
+    ],
+)
 def test_a_legend_leaves_room_for_the_panel(many: xr.Dataset, count: int, width: str) -> None:
     figure = impact.plot(many, kind="restitution", models=many["model"].values[:count].tolist(), width=width)
     check_layout(figure)

@@ -163,6 +163,8 @@ class Interpolant:
     edges : of the intervals, ascending
     floors : the size of each column, where its values are smaller
     max_divisions : how often an interval is divided
+    is_needed : whether an interval with some values at its nodes, of the shape of `Interval.values`, is divided;
+        by default all are
 
     >>> sine = Interpolant(lambda x: np.sin(x)[:, None], [0.0, 1.0, 2.0], np.ones(1))
     >>> abs(sine(np.array([0.3, 1.7]))[:, 0] - np.sin([0.3, 1.7])).max() < 1e-14
@@ -175,8 +177,10 @@ class Interpolant:
         edges: Array | Sequence[float],
         floors: Array,
         max_divisions: int = MAX_DIVISIONS,
+        is_needed: Callable[[Array], bool] | None = None,
     ) -> None:
         self.function, self.floors, self.max_divisions = function, floors, max_divisions
+        self.is_needed = is_needed
         bounds = np.asarray(edges, float).tolist()
         self._set([Interval(lower, upper) for lower, upper in pairwise(bounds)])
 
@@ -255,15 +259,16 @@ class Interpolant:
             values = self.function(np.concatenate([intervals[number].nodes for number in untried]))
             for number, block in zip(untried, np.split(values, len(untried)), strict=True):
                 intervals[number] = intervals[number].tried(block, self.floors)
-        divided = {
-            number
-            for number in numbers.tolist()
-            if intervals[number].is_divisible and intervals[number].divisions < self.max_divisions
-        }
+        divided = {number for number in numbers.tolist() if self._is_divided(intervals[number])}
         if untried or divided:
             parts = [i.parts() if number in divided else [i] for number, i in enumerate(intervals)]
             self._set([interval for part in parts for interval in part])
         return bool(divided)
+
+    def _is_divided(self, interval: Interval) -> bool:
+        if interval.values is None or interval.divisions >= self.max_divisions or not interval.is_divisible:
+            return False
+        return self.is_needed is None or self.is_needed(interval.values)
 
 
 class InterpolatedCollisions:

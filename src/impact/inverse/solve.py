@@ -62,6 +62,8 @@ SCAN_TOLERANCE = 1e-3
 TARGET_TOLERANCE = 10.0
 # a smaller difference between neighbours of the scan does not count as an extremum
 SCAN_NOISE = 1e-6
+# values that differ by less are one end of the range, which has six digits
+RANGE_TOLERANCE = 1e-7
 # an extremum is refined until the output differs by less, relative to itself; absolute for a restitution
 EXTREMUM_TOLERANCE = 1e-10
 # values that give the target this near to each other, relative to themselves, are one root
@@ -297,12 +299,13 @@ def solve_damping(config: Config, plugins: Plugins, e: float) -> Config:
     law = config.models[0]
     unknown = unknown_of(law, law.damping)
     # the e of the continuous law, which friction does not change
-    result = solve_input(replace(config, frictions=()), plugins, unknown, {"e_out": e})
-    if not result.roots:
-        lower, upper = map(number, result.attainable)
+    problem = SolveProblem(replace(config, frictions=()), plugins, unknown, "e_out")
+    roots, _ = _roots_and_values(problem, target_value("e_out", e), with_range=False)
+    if not roots:
+        lower, upper = map(number, _all_roots(problem, e).attainable)
         asked = argument("at", number(e), key="e")
         raise UsageError(f"{asked}: {law.key} delivers {lower} to {upper} at any {law.damping}")
-    return replace(config, scalars={**config.scalars, config_name(law, unknown): result.roots[0].value})
+    return replace(config, scalars={**config.scalars, config_name(law, unknown): roots[0]})
 
 
 def solve_input(config: Config, plugins: Plugins, unknown: Parameter, target: Mapping[str, object]) -> SolveResult:
@@ -407,19 +410,48 @@ class SolveProblem:
         """Whether polynomials are tried; friction has kinks, and schemes where the number of steps changes."""
         return not self.config.frictions and self.config.solver.integrator == EXACT
 
-    def interpolant(self, conditions: NDArray[np.intp] | None = None) -> Interpolant:
-        """Interpolate the target variable between the powers of ten of the scan, under each condition."""
+    def interpolant(
+        self, conditions: NDArray[np.intp] | None = None, target: float | None = None, *, with_range: bool = False
+    ) -> Interpolant:
+        """Interpolate the target variable between the powers of ten of the scan, under each condition.
+
+        With a target, of one condition, no interval is divided whose values are far from it, such as those at
+        damping at which balls stick; with the range also those are that may have an end of it.
+        """
         conditions = np.zeros(1, np.intp) if conditions is None else conditions
         scan = self.scan_values(per_decade=1, between_bounds=2)
         config = replace(self.config, solver=replace(self.config.solver, max_steps=self.node_steps))
         limited = replace(self, config=config)
+        smallest, largest = math.inf, -math.inf
 
         def function(x: Array) -> Array:
+            nonlocal smallest, largest
             outputs = limited.evaluate(np.repeat(x, conditions.size), np.tile(conditions, x.size))
-            return np.asarray(outputs[self.variable].values, float).reshape(x.size, conditions.size)
+            values = np.asarray(outputs[self.variable].values, float).reshape(x.size, conditions.size)
+            smallest = float(np.fmin.reduce(values, None, initial=smallest))
+            largest = float(np.fmax.reduce(values, None, initial=largest))
+            return values
+
+        def is_needed(values: Array) -> bool:
+            if target is None:
+                return True
+            lower, upper = self.reach(values)
+            is_extreme = lower < smallest - self.digits(smallest) or upper > largest + self.digits(largest)
+            # where integrations fail the range is that of the scan
+            return lower <= target <= upper or (with_range and is_extreme and bool(np.isfinite(values).all()))
 
         floors = np.full(conditions.size, float(self.is_of_order_one))
-        return Interpolant(function, scan, floors, MAX_DIVISIONS)
+        return Interpolant(function, scan, floors, MAX_DIVISIONS, is_needed)
+
+    def reach(self, values: Array) -> tuple[float, float]:
+        """Bound a function that has some values, by its range doubled; no restitution is negative."""
+        smallest, largest = float(np.nanmin(values)), float(np.nanmax(values))
+        lower, beyond = -math.inf if self.variable != "e_out" else 0.0, 0.5 * (largest - smallest)
+        return max(smallest - beyond, lower), largest + beyond
+
+    def digits(self, value: float) -> float:
+        """How far values of the variable are from each other that count as equal."""
+        return RANGE_TOLERANCE * (1.0 if self.is_of_order_one else abs(value))
 
     @property
     def node_steps(self) -> int:
@@ -452,11 +484,26 @@ class SolveProblem:
 
 
 def _all_roots(problem: SolveProblem, target: float) -> SolveResult:
-    """Find all values that give the target."""
+    """Find all values that give the target, and the range of the output."""
+    roots, values = _roots_and_values(problem, target)
+    e_out = problem.evaluate(np.array(roots))["e_out"].values.tolist() if roots else []
+    status: SolveStatus = "no_root" if not roots else "several_roots" if len(roots) > 1 else "ok"
+    if status == "ok" and roots[0] in (problem.unknown.least, problem.unknown.most):
+        status = "at_bound"
+    return _result(problem, target, status, map(Root, roots, e_out), values)
+
+
+def _roots_and_values(
+    problem: SolveProblem, target: float, *, with_range: bool = True
+) -> tuple[list[float], Array]:
+    """Find all values that give the target, ascending, and values of the output.
+
+    Without the range of the output no work is spent on values far from the target.
+    """
     scan, interpolant = problem.scan_values(), None
     known_scan, known_values = np.zeros((2, 0))
     if problem.is_smooth:
-        interpolant = problem.interpolant()
+        interpolant = problem.interpolant(None, target, with_range=with_range)
         interpolant.resolve()
         known_scan, known_values = interpolant.samples()
         scan = scan[np.isnan(interpolant(scan)[:, 0])]
@@ -468,8 +515,9 @@ def _all_roots(problem: SolveProblem, target: float) -> SolveResult:
     scale = 1.0 if problem.is_of_order_one else abs(target) or float(np.abs(np.append(values, known_values)).max())
     tolerance = TARGET_TOLERANCE * problem.config.solver.rtol * scale
     is_exact = np.abs(values - target) <= SCAN_TOLERANCE * scale
-    if scan.size:
+    if scan.size and with_range:
         is_exact[[values.argmin(), values.argmax()]] = True
+    if is_exact.any():
         exact = problem.evaluate(scan[is_exact])[problem.variable].values
         values[is_exact] = np.where(np.isnan(exact), values[is_exact], exact)
     if interpolant is None:
@@ -502,11 +550,7 @@ def _all_roots(problem: SolveProblem, target: float) -> SolveResult:
         polished = _polished(problem, interpolant, refined.x[is_root & ~is_end], target)
         roots += polished.tolist() + inside[is_end].tolist()
     roots.sort()
-    e_out = problem.evaluate(np.array(roots))["e_out"].values.tolist() if roots else []
-    status: SolveStatus = "no_root" if not roots else "several_roots" if len(roots) > 1 else "ok"
-    if status == "ok" and roots[0] in bounds:
-        status = "at_bound"
-    return _result(problem, target, status, map(Root, roots, e_out), values)
+    return roots, values
 
 
 def _known(

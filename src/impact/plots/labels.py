@@ -203,15 +203,17 @@ class LawPart(NamedTuple):
 
 def split_by_law(data: xr.Dataset, *, numbered: bool) -> Iterator[LawPart]:
     """Split a part of a result at its models, and at its friction laws where it has that dimension."""
+    # once for thousands of pairs
+    units = units_of(data) if "friction" in data.dims else {}
     for index in range(data.sizes["model"]):
         of_model = data.isel(model=index)
-        key, label = str(of_model["model"].item()), model_label(of_model, numbered=numbered)
+        key, label = str(of_model.variables["model"].values.item()), model_label(of_model, numbered=numbered)
         if "friction" not in data.dims:
             yield LawPart(label, key, "", of_model)
             continue
         for pair in (of_model.isel(friction=friction) for friction in range(data.sizes["friction"])):
-            friction_key = str(pair["friction"].item())
-            of_friction = friction_text(friction_key, scalars_of(pair), units_of(pair))
+            friction_key = str(pair.variables["friction"].values.item())
+            of_friction = friction_text(friction_key, scalars_of(pair, f"friction.{friction_key}."), units)
             # a single model is not named beside every friction law
             shown = of_friction if data.sizes["model"] == 1 else f"{label} with {of_friction}"
             yield LawPart(shown, key, friction_key, pair)

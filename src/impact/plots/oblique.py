@@ -128,7 +128,7 @@ def _pairs_along(dataset: xr.Dataset, choice: Choice, *names: str) -> tuple[Line
     )
     pairs, not_drawn = [], []
     for pair in split_by_law(line.data, numbered=choice.equations):
-        if any(np.isfinite(pair.data[name]).any() for name in names):
+        if any(np.isfinite(pair.data.variables[name].values).any() for name in names):
             pairs.append(pair)
         else:
             not_drawn.append(f"{pair.key}: {_reason(pair.data)}")

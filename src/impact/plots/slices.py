@@ -237,7 +237,7 @@ def unit_of(coordinate: xr.DataArray | xr.Variable) -> str:
 def conditions_of(dataset: xr.Dataset, *drawn: str) -> str:
     """Write the values of all inputs that are not drawn, without the parameters of laws."""
     inputs = {name: value for name, value in scalars_of(dataset).items() if name not in drawn}
-    units = {name: unit_of(dataset[name]) for name in inputs}
+    units = {name: unit_of(dataset.variables[name]) for name in inputs}
     return described_inputs(inputs, units, exponents_of(dataset))
 
 
@@ -246,9 +246,10 @@ def units_of(dataset: xr.Dataset) -> dict[str, str]:
     return {str(name): unit_of(dataset.variables[name]) for name in dataset.coords}
 
 
-def scalars_of(dataset: xr.Dataset) -> dict[str, object]:
-    """Find the inputs that have one value."""
-    variables = {name: dataset.variables[name] for name in dataset.coords if is_input(name)}
+def scalars_of(dataset: xr.Dataset, start: str = "") -> dict[str, object]:
+    """Find the inputs that have one value, and a name that begins with `start`."""
+    names = (name for name in dataset.coords if str(name).startswith(start) and is_input(name))
+    variables = {name: dataset.variables[name] for name in names}
     return {str(name): variable.values.item() for name, variable in variables.items() if variable.ndim == 0}
 
 

@@ -420,17 +420,26 @@ def foreign_dims(dataset: xr.Dataset, model: str, friction: str = "") -> list[Ha
     return [dim for dim in dataset.dims if is_foreign(columns_along(dataset, dim), model, friction)]
 
 
-def parts_of_laws(dataset: xr.Dataset, dims: Iterable[Hashable]) -> Iterator[tuple[tuple[int, ...], xr.Dataset]]:
-    """Select each model, or each pair, of variables with some dimensions, and its position along those of laws.
+def places_of_laws(
+    dataset: xr.Dataset, dims: Iterable[Hashable]
+) -> Iterator[tuple[tuple[int, ...], dict[Hashable, int | slice]]]:
+    """Find the position of each model, or each pair, of variables with some dimensions, and how to select it.
 
     Each is at the first position along the parameters of other laws; without the dimension of models it is all.
     """
     law_dims = [dim for dim in ("model", "friction") if dim in dims] if "model" in dims else []
     keys = [dataset[dim].values.tolist() for dim in law_dims]
+    columns = {dim: columns_along(dataset, dim) for dim in (dataset.dims if law_dims else ())}
     for place in np.ndindex(*map(len, keys)):
         names = [str(of_dim[position]) for of_dim, position in zip(keys, place, strict=True)]
-        first = dict.fromkeys(foreign_dims(dataset, *names), slice(0, 1)) if names else {}
-        yield place, dataset.isel({**dict(zip(law_dims, place, strict=True)), **first})
+        first = {dim: slice(0, 1) for dim, along in columns.items() if is_foreign(along, *names)}
+        yield place, {**dict(zip(law_dims, place, strict=True)), **first}
+
+
+def parts_of_laws(dataset: xr.Dataset, dims: Iterable[Hashable]) -> Iterator[tuple[tuple[int, ...], xr.Dataset]]:
+    """Select each of `places_of_laws`."""
+    for place, selection in places_of_laws(dataset, dims):
+        yield place, dataset.isel(selection)
 
 
 def count_points(dataset: xr.Dataset) -> int:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..contact.status import FIRST_FAILURE, FrictionStatus, Status
 from .attributes import SummaryRecord
-from .schema import parts_of_laws
+from .schema import parts_of_laws, places_of_laws
 from .slabs import MAX_SUMMARY_POINTS, distinct_points, is_computed, slabs
 from .trajectory_table import ExpandedSlab, TrajectoryTable, computed_array, expand
 
@@ -216,9 +216,13 @@ def extremes_of(dataset: xr.Dataset, name: str) -> Extremes | None:
 
 def _distinct_parts(dataset: xr.Dataset, name: str) -> list[tuple[xr.Variable, int]] | None:
     """List the distinct points of a variable of each model, and their weights; None if they are too many."""
-    parts = [distinct_points(part, name) for _, part in parts_of_laws(dataset, dataset.variables[name].dims)]
+    whole = dataset.variables[name]
+    if not is_computed(whole):
+        places = (place for _, place in places_of_laws(dataset, whole.dims))
+        return [(whole.isel({dim: place[dim] for dim in whole.dims if dim in place}), 1) for place in places]
+    parts = [distinct_points(part, name) for _, part in parts_of_laws(dataset, whole.dims)]
     evaluations = sum(variable.size for variable, _ in parts)
-    return None if evaluations > MAX_SUMMARY_POINTS and is_computed(dataset.variables[name]) else parts
+    return None if evaluations > MAX_SUMMARY_POINTS else parts
 
 
 def summarize_table(dataset: xr.Dataset, table: TrajectoryTable) -> tuple[Summary, dict[str, Extremes | None]]:
