@@ -1,7 +1,8 @@
-"""Tables in files: siunitx columns in .tex, chosen rows and digits, decimal commas, of pictures and of results."""
+"""Tables of text that fit, and in files: siunitx columns, chosen rows and digits, decimal commas."""
 
 from __future__ import annotations
 
+import io
 import locale
 import math
 import re
@@ -13,7 +14,7 @@ import pandas as pd
 import pytest
 
 import impact
-from impact.display import TableForm, encode_frame
+from impact.display import Table, TableForm, encode_frame, print_blocks
 from impact.errors import UsageError
 from impact.plots.data import read_points
 from impact.plots.kinds import Look
@@ -147,3 +148,22 @@ def test_a_ranking_and_steps_are_tables_of_latex_and_csv(stored: Path, cli: Run,
     table = pd.read_csv(tmp_path / "t.csv")
     assert table["steps_per_contact"].tolist() == [10.0, 20.0, 50.0, 100.0]
     assert table["e_mean"].between(0.45, 0.55).all()
+
+
+def test_a_table_without_room_is_folded_at_spaces_and_the_widest_column_first() -> None:
+    pair = "lankarani-nikravesh-1994 with cundall-strack-1979"
+    table = Table([[pair, "kt_over_kn", "0.0967 to 0.1033", 1.25e-12]], ("law", "parameter", "95 %", "chi2/dof"))
+    lines = {}
+    for width in (100, 66, 46):
+        stream = io.StringIO()
+        print_blocks([table], stream, width)
+        lines[width] = [line.rstrip() for line in stream.getvalue().splitlines()]
+        assert max(map(len, lines[width])) <= width
+    assert len(lines[100]) == 2
+    assert lines[100][1].split("  ")[0] == pair
+    words = {*pair.split(), "kt_over_kn", "0.0967", "to", "0.1033", "1.25e-12"}
+    assert words <= {word for line in lines[66] for word in line.split()}
+    # numbers keep their line as long as texts give way
+    assert any("0.0967 to 0.1033" in line for line in lines[66])
+    # where even the words have no room they are broken, and all characters are there
+    assert sorted("".join(lines[46]).replace(" ", "")) == sorted("".join(lines[100]).replace(" ", ""))

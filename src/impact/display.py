@@ -6,6 +6,7 @@ A result defines once what is shown of it, `sections`: lines of text and tables.
 from __future__ import annotations
 
 import io
+import itertools
 import json
 import locale
 import re
@@ -62,7 +63,7 @@ class Table:
     rows : of cells; a float is shown with six digits
     headings : of the columns; a table without headings has names and values
     text : columns that are aligned left, negative ones from the end; the others are numbers
-    no_wrap : columns that are not folded
+    no_wrap : columns that are folded, at spaces, only where the others have no room otherwise
     max_cell : characters of a cell
     """
 
@@ -78,7 +79,9 @@ class Table:
         from rich.text import Text
 
         rows = [list(row) for row in self.rows]
-        count = max(map(len, [self.headings, *rows]))
+        texts = [[safe_text(_cell_text(cell), self.max_cell) for cell in row] for row in rows]
+        columns = list(itertools.zip_longest(self.headings, *texts, fillvalue=""))
+        count, widths = len(columns), self._widths(columns, console.width)
         table = RichTable(box=None, pad_edge=False, header_style="bold", show_header=bool(self.headings))
         for column in range(count):
             is_text = not self.headings or column in self.text or column - count in self.text
@@ -86,13 +89,31 @@ class Table:
                 self.headings[column] if self.headings else "",
                 justify="left" if is_text else "right",
                 overflow="fold",
-                no_wrap=column in self.no_wrap,
+                width=widths[column] if widths else None,
             )
-        for row in rows:
+        for row, of_row in zip(rows, texts, strict=True):
             styles = [cell.style if isinstance(cell, Styled) else "" for cell in row]
-            texts = [safe_text(_cell_text(cell), self.max_cell) for cell in row]
-            table.add_row(*map(Text, texts, styles))
+            table.add_row(*map(Text, of_row, styles))
         console.print(table)
+
+    def _widths(self, columns: Sequence[Sequence[str]], width: int) -> list[int] | None:
+        """Choose the widths of columns that fold no word: the widest give way first. None without room for all."""
+        from rich.cells import cell_len
+
+        most = [max(map(cell_len, texts)) for texts in columns]
+        for no_wrap in (self.no_wrap, ()):
+            words = [
+                max((cell_len(word) for text in texts for word in text.split()), default=0) for texts in columns
+            ]
+            least = [most[i] if i in no_wrap else words[i] for i in range(len(columns))]
+            # two spaces are between columns
+            widths, room = most.copy(), width - 2 * (len(columns) - 1)
+            if sum(least) > room:
+                continue
+            while sum(widths) > room:
+                widths[max((i for i in range(len(widths)) if widths[i] > least[i]), key=widths.__getitem__)] -= 1
+            return widths
+        return None
 
     def html(self) -> str:
         """The table in HTML; texts are left-aligned.
