@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 
 # width of a table of a command that is not printed on a terminal, and of a result as text
 PIPE_WIDTH, TEXT_WIDTH = 160, 100
-# characters of a cell, and of a line, which may be a command that is copied
-MAX_CELL, MAX_LINE = 200, 4000
+# characters of a word that is not broken, of a cell, and of a line, which may be a command that is copied
+MAX_WORD, MAX_CELL, MAX_LINE = 40, 200, 4000
 # files of tables, and their decimal separators
 TABLE_SUFFIXES = (".csv", ".tex", ".parquet")
 DECIMALS = {"point": ".", "comma": ","}
@@ -97,15 +97,16 @@ class Table:
         console.print(table)
 
     def _widths(self, columns: Sequence[Sequence[str]], width: int) -> list[int] | None:
-        """Choose the widths of columns that fold no word: the widest give way first. None without room for all."""
+        """Choose the widths of columns that fold at spaces, the widest first. None without room for words."""
         from rich.cells import cell_len
 
         most = [max(map(cell_len, texts)) for texts in columns]
-        for no_wrap in (self.no_wrap, ()):
-            words = [
-                max((cell_len(word) for text in texts for word in text.split()), default=0) for texts in columns
-            ]
-            least = [most[i] if i in no_wrap else words[i] for i in range(len(columns))]
+        words = [max((cell_len(word) for text in texts for word in text.split()), default=0) for texts in columns]
+        # headings keep their line, for which addresses may be broken
+        headings = [cell_len(texts[0]) if self.headings else 0 for texts in columns]
+        kept = [max(heading, min(word, MAX_WORD)) for heading, word in zip(headings, words, strict=True)]
+        whole = [most[i] if i in self.no_wrap else kept[i] for i in range(len(columns))]
+        for least in (whole, kept, words):
             # two spaces are between columns
             widths, room = most.copy(), width - 2 * (len(columns) - 1)
             if sum(least) > room:
