@@ -60,6 +60,7 @@ def test_a_wall_is_nearly_plane() -> None:
     assert wall.radius >= 50.0 * ball.radius
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", ["gif", "png"])
 def test_the_command_writes_an_animation_of_a_history(
     single: impact.Impact, forked: ForkServer, tmp_path: Path, suffix: str

@@ -166,6 +166,7 @@ def test_the_best_config_has_the_law_that_fits_best_at_a_bound_too(tmp_path: Pat
     assert impact.sweep(tmp_path / "best.toml")["model"].item() == first["model"].item() == "tsuji-1992"
 
 
+@pytest.mark.slow
 def test_measured_restitutions_beyond_0_and_1_are_fitted_as_they_are() -> None:
     """Leaving them out would bias the mean."""
     values = [1.0004, 0.95, 0.97, -0.001, 0.02]
@@ -219,6 +220,7 @@ def test_excess_without_specimens_says_that_points_repeat(cli: Run, tmp_path: Pa
     assert "20 of 20 points repeat the inputs of another" in done.stdout
 
 
+@pytest.mark.slow
 def test_a_rejected_law_and_its_largest_residuals_are_named(cli: Run, tmp_path: Path) -> None:
     config = write_specimens(tmp_path)
     (tmp_path / "beads.csv").write_text("e_out, sigma\n0.5, 0.01\n0.51, 0.01\n0.49, 0.01\n0.7, 0.01\n", "utf-8")
@@ -305,6 +307,7 @@ def test_the_bytes_of_a_result_do_not_depend_on_the_number_of_processes(cli: Run
     assert (tmp_path / "a.h5").read_bytes() == (tmp_path / "b.h5").read_bytes()
 
 
+@pytest.mark.slow
 def test_a_rerun_repeats_a_calibration_and_names_what_changed(cli: Run, tmp_path: Path) -> None:
     impact.calibrate(LINEAR, output=tmp_path / "a.h5")
     done = cli("rerun", "a.h5", cwd=tmp_path)

@@ -69,6 +69,7 @@ def test_without_a_varied_input_the_values_are_over_their_number() -> None:
     np.testing.assert_allclose(lengths, 2.0 * fit["measured"].values.std(ddof=1), rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_the_table_of_a_picture_has_curves_residuals_and_measured_values(
     cli: Run, drops: xr.Dataset, tmp_path: Path
 ) -> None:
@@ -121,6 +122,7 @@ def test_a_report_shows_the_picture(drops: xr.Dataset) -> None:
     assert page.count("<img") == 1
 
 
+@pytest.mark.slow
 def test_commands_that_take_a_sweep_refuse_a_calibration_in_one_line(
     cli: Run, drops: xr.Dataset, tmp_path: Path
 ) -> None:

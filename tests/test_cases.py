@@ -112,6 +112,7 @@ def case_result(cases: dict[str, list[Any]]) -> xr.Dataset:
     return sweep_in_memory(plan_of(cases))
 
 
+@pytest.mark.slow
 def test_a_file_of_either_layout_holds_the_cases(tmp_path: Path, cases: dict[str, list[Any]]) -> None:
     plan = plan_of(cases)
     for layout in LAYOUTS:
@@ -264,6 +265,7 @@ def test_a_model_without_collapse_is_integrated_along_its_own_axes_only() -> Non
     assert [trajectories.count for trajectories in plan.maps] == [len(VALUES) * len(SPEEDS)] * 2
 
 
+@pytest.mark.slow
 def test_files_summaries_and_commands_count_the_same_points(tmp_path: Path, cli: Any) -> None:
     plan = axes_of_parameters(["kelvin-voigt", "ismail-stronge-2008", "johnson-1985"])
     assert plan.layout == "full"

@@ -101,6 +101,7 @@ def run_pytest(project: Path, entry_points: Path, *options: str) -> Completed:
     return run(words, project, PYTHONPATH=python_path, COLUMNS="200")
 
 
+@pytest.mark.slow
 def test_the_fixture_compares_with_baselines_and_writes_them(project: Path, entry_points: Path) -> None:
     python_path = os.pathsep.join([str(ROOT / "src"), str(entry_points)])
     done = run([sys.executable, "-c", TWO_RUNS], project, PYTHONPATH=python_path, COLUMNS="200")
@@ -278,6 +279,7 @@ def test_no_script_of_the_action_contains_an_input() -> None:
         assert "${{" not in step.get("run", "")
 
 
+@pytest.mark.slow
 def test_the_action_installs_and_compares(tmp_path: Path) -> None:
     (tmp_path / "contact.toml").write_text(CONTACT, encoding="utf-8")
     for name, overrides in (("new.h5", ["sweep.K=6.1e9"]), ("baseline.h5", [])):

@@ -65,6 +65,7 @@ def test_the_command_and_python_give_the_same_result(cli: Run, small: Path, tmp_
     xr.testing.assert_identical(ours, impact.sweep(small, overrides=["sweep.m2=3.0"]))
 
 
+@pytest.mark.slow
 def test_a_finished_sweep_is_not_repeated_and_another_needs_overwrite(
     cli: Run, small: Path, tmp_path: Path
 ) -> None:
@@ -158,6 +159,7 @@ def test_several_kinds_in_one_call_and_the_numbers_behind_them(cli: Run, stored:
     assert [line.split(":")[0] for line in drawn.stderr.splitlines()] == ["a-restitution.svg", "a-error.svg"]
 
 
+@pytest.mark.slow
 def test_a_report_is_one_page(cli: Run, stored: Path, tmp_path: Path) -> None:
     # tests/test_report_page.py has the rest
     written = cli("report", stored, "-o", "page.html", cwd=tmp_path)
@@ -504,6 +506,7 @@ def test_info(cli: Run, stored: Path) -> None:
     assert printed["attributes"]["config"].startswith("#:schema")
 
 
+@pytest.mark.slow
 def test_the_schema_is_printed_or_written(cli: Run, tmp_path: Path) -> None:
     schema = impact.schema()
     assert json.loads(cli("schema").stdout) == schema
@@ -584,6 +587,7 @@ def test_no_control_byte_reaches_the_terminal(cli: Run, tmp_path: Path) -> None:
     assert (tmp_path / "results.png").exists()
 
 
+@pytest.mark.slow
 def test_hostile_names_in_a_file_are_escaped(cli: Run, tmp_path: Path) -> None:
     name = "\x1b[31mP\x07\u202e"
     balls = {"e": [0.5, 1.0], "v1": 1.0, "m1": 1.0, "m2": 1.0, "material": [name, "steel"]}
@@ -601,6 +605,7 @@ def test_hostile_names_in_a_file_are_escaped(cli: Run, tmp_path: Path) -> None:
     assert (done.returncode, "\x1b" in done.stderr) == (2, False)
 
 
+@pytest.mark.slow
 def test_a_history_is_a_table_or_a_result_as_its_name_says(cli: Run, tmp_path: Path) -> None:
     for name in ("h.h5", "h.csv"):
         done = cli("run", "--at", "e=0.5", "--times", "50", "--history", name, cwd=tmp_path)
@@ -805,6 +810,7 @@ def test_the_catalogue_keeps_the_restitution_on_a_narrow_terminal(
     assert re.search(r"^tsuji-1992 +0\.\d{4}", "\n".join(lines), re.MULTILINE)
 
 
+@pytest.mark.slow
 def test_a_shell_completes_models_keys_axes_and_outputs(forked: ForkServer, stored: Path) -> None:
     def completed(*words: str | Path) -> list[str]:
         index = str(len(words) - 1)
@@ -889,6 +895,7 @@ def test_a_file_of_another_kind_is_named(
     assert (result.returncode, result.stdout, result.stderr) == (2, "", f"{line}\n")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("value", "nearest"),
     [

@@ -881,6 +881,7 @@ def test_the_line_of_a_single_point_has_no_coordinates() -> None:
     assert "v1_reference: 1 of 1 differ, worst 1 = 1e+09 x tolerance\n" in f"{impact.compare(moved, point)}\n"
 
 
+@pytest.mark.slow
 def test_the_printed_command_of_a_part_of_a_result_has_the_values_of_that_part(
     forked: ForkServer, figure6: xr.Dataset, wide: xr.Dataset, tmp_path: Path
 ) -> None:

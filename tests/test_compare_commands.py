@@ -160,6 +160,7 @@ def test_equal_in_five_formats(forked: ForkServer, folder: Path) -> None:
     assert _github(outputs["github"]) == [("notice", "base.h5", headline)]
 
 
+@pytest.mark.slow
 def test_different_in_five_formats(forked: ForkServer, folder: Path) -> None:
     outputs = {}
     for name in FORMATS:
@@ -257,6 +258,7 @@ def test_an_unreadable_file_is_reported_in_every_format(
             assert _github(done.stdout) == [("error", pair[1], line)]
 
 
+@pytest.mark.slow
 def test_a_usage_error_is_one_line_and_exit_code_2(forked: ForkServer, folder: Path) -> None:
     prefix = "impact compare: Invalid value for '--tol': "
     for words, message in (
@@ -276,6 +278,7 @@ def test_a_usage_error_is_one_line_and_exit_code_2(forked: ForkServer, folder: P
     assert forked("compare", "different.h5", cwd=folder).returncode == 2
 
 
+@pytest.mark.slow
 def test_tolerances_from_the_command_line(forked: ForkServer, folder: Path) -> None:
     for words, code in (
         (["--tol", "1.7e-7"], 0),
@@ -526,6 +529,7 @@ def test_bless_accepts_failed_points_only_with_allow_failed(forked: ForkServer, 
     assert forked("compare", "new.h5", "base.h5", cwd=tmp_path).returncode == 0
 
 
+@pytest.mark.slow
 def test_a_refused_bless_changes_no_file(forked: ForkServer, folder: Path, tmp_path: Path) -> None:
     baseline = tmp_path / "baseline.h5"
     shutil.copy(folder / "base.h5", baseline)

@@ -793,6 +793,7 @@ def test_the_schema_names_every_key_with_its_unit() -> None:
     assert {*catalogue(), "all", "family:hysteresis"} <= set(models)
 
 
+@pytest.mark.slow
 def test_pint_is_imported_only_for_a_unit() -> None:
     code = (
         "import sys; from pathlib import Path; from impact.config.load import read_config\n"

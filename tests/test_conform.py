@@ -354,6 +354,7 @@ def test_a_number_of_any_size_is_judged(key: str, value: float) -> None:
     assert "energy" in names
 
 
+@pytest.mark.slow
 def test_no_process_is_left(tmp_path: Path) -> None:
     """Neither of the adapter nor of what it started."""
     text = "import subprocess\nchild = subprocess.Popen(['sleep', '600'])\n"
@@ -420,6 +421,7 @@ def test_a_wrong_command_is_refused_in_one_line(words: tuple[str, ...], cli: Run
     assert BAD_COMMANDS[words] in done.stderr
 
 
+@pytest.mark.slow
 def test_an_engine_that_is_not_installed_is_named_with_how_to_get_it(cli: Run) -> None:
     done = cli("conform", "--list", "--json")
     listed = {row["engine"]: row["version"] for row in json.loads(done.stdout)["engines"]}

@@ -8,6 +8,8 @@ from importlib import metadata
 from importlib.util import find_spec
 from pathlib import Path
 
+import pytest
+
 import impact
 
 from .conftest import Run
@@ -26,6 +28,7 @@ def test_versions_are_those_of_the_packages(cli: Run) -> None:
     }
 
 
+@pytest.mark.slow
 def test_a_code_on_the_path_is_found_with_its_version(cli: Run, tmp_path: Path) -> None:
     program = tmp_path / "lmp"
     program.write_text(

@@ -106,6 +106,7 @@ def assert_constant_along_unnamed_axes(lazy: xr.Dataset, full: xr.Dataset) -> No
                 np.testing.assert_array_equal(values.transpose(*first.dims), first, f"{key}: {name} along {dim}")
 
 
+@pytest.mark.slow
 @settings(max_examples=10)
 @given(configs(), st.data())
 def test_any_part_of_a_lazy_result_has_the_bits_of_the_full_one(
@@ -202,6 +203,7 @@ def test_a_factored_file_of_a_plugin_is_read_without_the_plugin(tmp_path: Path) 
     np.testing.assert_allclose(K, 1e4 * 3.0 * np.array([1.0, 2.0, 4.0]) ** -0.5, rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_expand_writes_the_whole_result_or_a_part_of_it(cli: Run, tmp_path: Path) -> None:
     output = tmp_path / "expanded.h5"
     for layout in LAYOUTS:

@@ -51,6 +51,7 @@ def source(*materials: str, **values: float) -> dict[str, object]:
     }
 
 
+@pytest.mark.slow
 def test_materials_of_the_user_replace_that_of_table_1() -> None:
     """Each ball keeps the default until it has its own; a material of both replaces those of each."""
     at, key = {"material1": "glass", "material2": "steel"}, "lammps-coeff-restitution-hertz"
@@ -118,6 +119,7 @@ def test_the_default_law_of_the_newest_release_is_the_first_of_the_list(name: st
     assert first_law(code, list(code.laws), code.newest) == default_law(name)
 
 
+@pytest.mark.slow
 def test_a_config_that_is_not_valid_is_not_exported_with_another_law() -> None:
     viscoelastic = "lammps-viscoelastic-hertz"
     config = source("soft", "soft") | {"models": viscoelastic}
@@ -632,6 +634,7 @@ def test_verify_runs_the_script_that_is_exported(tmp_path: Path) -> None:
     assert export.verification.measured == (lines,) * 4
 
 
+@pytest.mark.slow
 def test_the_tolerance_on_beta_is_four_indentations_over_the_effective_radius(tmp_path: Path) -> None:
     """The normal of two balls turns, which adds a part of the speed to the slip; that of a wall does not."""
     program = write_program(tmp_path / "lmp", RELEASE + 'echo "beta = 0.5"; echo "e_out = 0.6"')

@@ -101,6 +101,7 @@ def test_a_sweep_killed_at_a_random_time_is_resumed(sweeps: SweepServer, count: 
     report.check()
 
 
+@pytest.mark.slow
 def test_a_resumed_sweep_removes_all_temporary_files(sweeps: SweepServer) -> None:
     for words in (("link",), ("unlink", f"{RESULT}.part"), ("unlink", f"{WORK}/plan.json"), ("rmdir",)):
         folder = sweeps.run_killed_at(sweeps.find_operation(*words))
@@ -108,6 +109,7 @@ def test_a_resumed_sweep_removes_all_temporary_files(sweeps: SweepServer) -> Non
         assert sorted(path.name for path in folder.iterdir()) == [CONFIG, RESULT], words
 
 
+@pytest.mark.slow
 def test_a_result_is_replaced_only_by_a_complete_result(sweeps: SweepServer) -> None:
     old = sweeps.folder()
     assert sweeps(cwd=old).returncode == 0

@@ -111,6 +111,7 @@ def test_symmetries_and_conservation(
     assert np.nanmax(residual, initial=0.0, where=np.isfinite(residual)) < 1e-6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mu", [1e-7, 1e-5])
 def test_without_friction_the_slip_stays(mu: float) -> None:
     balls = (0.3, 0.02, 0.4, 2.0, 1.5, 10.0), (0.7, 0.03, 0.4, -1.0, 0.0, -30.0)

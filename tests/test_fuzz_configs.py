@@ -18,11 +18,10 @@ from fuzz_configs import Outcomes, fuzz, judge, write_files
 @pytest.mark.parametrize(
     ("count", "n_fits"),
     [
-        (10, 1),
         pytest.param(300, 6, marks=pytest.mark.slow),
         pytest.param(1000, 20, marks=pytest.mark.long),
     ],
-    ids=["10", "300", "1000"],
+    ids=["300", "1000"],
 )
 def test_every_mutated_config_ends_as_documented(
     tmp_path: Path, forked: ForkServer, count: int, n_fits: int
@@ -34,7 +33,7 @@ def test_every_mutated_config_ends_as_documented(
         -count // 100
     )
     # mutations that only ever break a config would test nothing but the first check
-    assert outcomes.counts["planned"] + outcomes.counts["planned and timed"] > count / 6
+    assert outcomes.counts["planned"] + outcomes.counts["planned and timed"] > count / 5
     assert outcomes.counts["refused: config"] > count / 5
 
 

@@ -389,6 +389,7 @@ def test_texts_do_not_overlap(many: xr.Dataset, kind: str, count: int, width: fl
     check_layout(figure)
 
 
+@pytest.mark.slow
 def test_text_from_a_file_is_text(over_speed: xr.Dataset, tmp_path: Path) -> None:
     changed = over_speed.assign_attrs(title="$\\frac{1}{0}$ \x1b[31m \u202e " + "W" * 90)
     changed["title"] = ("model", ["$\\frac{1}{0}$", "_" + "W" * 70, "[red] $x^{$"])

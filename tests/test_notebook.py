@@ -139,6 +139,7 @@ def test_controls_draw_what_they_select() -> None:
     assert [name for name, control in controls.items() if control.disabled] == ["e", "m2"]
 
 
+@pytest.mark.slow
 def test_controls_explain_what_cannot_be_drawn() -> None:
     controls, picture, message = controls_of(impact.explore(impact.sweep(TWO_AXES)))
     before = bytes(picture.value)
@@ -203,6 +204,7 @@ def test_controls_begin_with_what_is_given(tmp_path: Path) -> None:
             impact.explore(result, **choice)
 
 
+@pytest.mark.slow
 def test_inputs_that_vary_together_keep_to_the_grid() -> None:
     sweep = {**ALONG_E, "m1": [1.0, 2.0], "m2": [1.0, 3.0], "zip": [["m1", "m2"]], "v1": [1.0, 2.0]}
     box = impact.explore(impact.sweep({"models": ["hertz", "hunt-crossley-1975"], "sweep": sweep}))
@@ -224,6 +226,7 @@ def test_inputs_that_vary_together_keep_to_the_grid() -> None:
     assert "e keeps to the grid: the result: contains no config" in controls_text(impact.explore(unnamed))
 
 
+@pytest.mark.slow
 def test_changes_that_arrive_together_are_drawn_once() -> None:
     async def change_all() -> None:
         for value in (1.25, 1.5, 1.75):
@@ -251,6 +254,7 @@ DROPS = ROOT / "docs" / "calibrate" / "drops.toml"
 COARSE = ['models="anagnostopoulos-1988"', "solver.rtol=1e-4"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("dataset", "kind", "axes"),
     [
@@ -275,6 +279,7 @@ def test_a_history_has_no_controls() -> None:
         impact.explore(history)
 
 
+@pytest.mark.slow
 def test_a_sweep_shows_its_progress_on_request(
     capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -59,6 +59,7 @@ LAWS = {
 
 
 # a small angle sticks and slides, a large one slides throughout
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("friction", "angle"), [*((friction, 10.0) for friction in LAWS), ("lammps-mindlin", 60.0)]
 )
@@ -94,6 +95,7 @@ def test_the_history_has_the_mirrored_slip_of_a_mirrored_impact() -> None:
     np.testing.assert_array_equal(left["F"].values, right["F"].values)
 
 
+@pytest.mark.slow
 def test_a_run_is_the_point_of_the_sweep_of_its_pair() -> None:
     source = config(angle=[0.2, ANGLE], mu=[0.1, 0.3])
     result = impact.sweep(source)
@@ -162,6 +164,7 @@ def test_a_mistake_is_an_error_of_one_line(cli: Run, tmp_path: Path, words: tupl
 # ---- solve
 
 
+@pytest.mark.slow
 def test_solve_finds_the_mu_that_slides_with_a_given_beta() -> None:
     # Hertz, e = 1, slides throughout: beta = 2/G0 - 1, G0 = (2/7) tan(angle)/mu
     found = impact.solve("hertz", "mu", {"beta": -0.5}, friction="coulomb-1785", source=CONFIG)

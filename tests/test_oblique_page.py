@@ -69,6 +69,7 @@ def test_how_many_trajectories_a_sweep_over_angle_mu_and_spin_has(friction: str,
     assert "one normal trajectory, and at most 4,250 tangential ones, with `coulomb-1785` a single one" in PAGE
 
 
+@pytest.mark.slow
 def test_what_the_page_says_of_the_balls_of_kharaz() -> None:
     result = impact.sweep(ROOT / "configs" / "oblique.toml").squeeze("model")
     angle, e_t = result["angle"].values, result["e_t"]
@@ -93,6 +94,7 @@ def test_what_the_page_says_of_the_balls_of_kharaz() -> None:
     assert round(off("coulomb-1785", 4) + 0.745, 3) == 0.714
 
 
+@pytest.mark.slow
 def test_what_the_page_says_of_mindlins_springs() -> None:
     result = impact.sweep(FOLDER / "psi.toml").squeeze("model")
     kappa = 1.4 / 1.7
@@ -114,6 +116,7 @@ def test_what_the_page_says_of_mindlins_springs() -> None:
     assert largest[0] == largest[3]
 
 
+@pytest.mark.slow
 def test_what_the_page_says_of_the_slow_limit() -> None:
     zeta, mu, slips = 0.3 / math.sqrt(5.0), 0.3, np.array([0.97, 1.03, 1.1]) * 0.3
     e = math.exp(-math.pi * zeta / math.sqrt(1.0 - zeta * zeta))

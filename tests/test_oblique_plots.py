@@ -179,6 +179,7 @@ def test_the_spins_of_both_balls_are_drawn_where_both_turn(beads: xr.Dataset) ->
         curves_of(without_radius, "spin")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "width"),
     [
@@ -212,6 +213,7 @@ def test_conditions_of_84_mm_have_three_lines(config: str) -> None:
     assert {"$m_2$", "∞"} <= set(re.split(r"[\s,=]+", conditions.get_text()))
 
 
+@pytest.mark.slow
 def test_more_conditions_have_smaller_letters_and_at_most_three_lines(beads: xr.Dataset) -> None:
     plot_data = curves_of(beads, "beta")
     figures = [
@@ -230,6 +232,7 @@ def test_more_conditions_have_smaller_letters_and_at_most_three_lines(beads: xr.
     assert most.get_text().split().count("e") == 60
 
 
+@pytest.mark.slow
 def test_friction_laws_are_selected_as_models_are(
     beads: xr.Dataset, central: xr.Dataset, cli: Run, tmp_path: Path
 ) -> None:
@@ -267,6 +270,7 @@ def test_a_value_is_selected_with_its_unit(beads: xr.Dataset) -> None:
     assert panel.x_name == "mu"
 
 
+@pytest.mark.slow
 def test_more_pairs_than_can_be_told_apart_are_drawn_on_request(beads: xr.Dataset) -> None:
     models = ["hertz", "tsuji-1992", "gonthier-2004", "flores-2011", "hunt-crossley-1975"]
     many = sweep(models=models, frictions=[COULOMB, MINDLIN], friction={MINDLIN: {"xt": 0.0}})
@@ -300,6 +304,7 @@ def test_slips_are_those_of_maw_barber_and_fawcett() -> None:
     check_layout(draw(data, Look(width="84mm")))
 
 
+@pytest.mark.slow
 def test_the_area_of_a_friction_loop_is_the_energy_lost(beads: xr.Dataset, cli: Run, tmp_path: Path) -> None:
     two = [COULOMB, FORCE]
     data = curves_of(beads, "friction-loop", sel={"angle": "15 deg", "mu": 0.3}, frictions=two)

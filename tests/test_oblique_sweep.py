@@ -204,6 +204,7 @@ EXTENSIONS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("layout", "extension"),
     [

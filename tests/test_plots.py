@@ -365,6 +365,7 @@ def test_a_legend_leaves_room_for_the_panel(many: xr.Dataset, count: int, width:
         assert names_of(figure)[1:] == keys
 
 
+@pytest.mark.slow
 def test_a_legend_without_room_names_the_number_of_missing_entries(many: xr.Dataset) -> None:
     figure = impact.plot(many, kind="restitution", width="single", height=3.5)
     check_layout(figure)
@@ -555,6 +556,7 @@ def test_a_file_of_another_format_is_not_written(
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(shutil.which("xelatex") is None, reason="no xelatex")
 def test_a_pgf_file_is_a_picture_that_latex_typesets(coarse: xr.Dataset, tmp_path: Path) -> None:
     save_figure(impact.plot(coarse, width="84mm"), tmp_path / "results.pgf")
@@ -665,6 +667,7 @@ def test_a_wrong_option_is_an_error_of_one_line(
         impact.plot(coarse, **options)  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_a_height_without_room_for_panels_names_the_least_height(coarse: xr.Dataset) -> None:
     with pytest.raises(UsageError, match=r"height: got 60mm, expected at least \d+mm at this width") as error:
         impact.plot(coarse, kind="history", sel={"e": 0.5}, width="84mm", height="60mm")

@@ -511,6 +511,7 @@ def test_the_replay_of_a_failed_point_fails_in_the_same_way(forked: ForkServer, 
     assert "model_error" in done.stdout or "raised an error" in done.stdout
 
 
+@pytest.mark.slow
 def test_garbage_is_collected_while_a_command_runs(folder: Path) -> None:
     (folder / "my_model.py").write_text(
         "import gc\nassert gc.isenabled()\n" + PLUGIN.format(chi=CHI), encoding="utf-8"

@@ -8,6 +8,8 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+import pytest
+
 from .conftest import CONTACT, ROOT
 
 # modules that the standard library has on Unix only
@@ -50,6 +52,7 @@ def test_no_module_of_the_package_or_the_quick_tests_imports_modules_of_posix() 
     assert not found
 
 
+@pytest.mark.slow
 def test_the_package_works_without_the_functions_of_posix(tmp_path: Path) -> None:
     (tmp_path / "contact.toml").write_text(CONTACT, encoding="utf-8")
     code = (

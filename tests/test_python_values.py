@@ -202,6 +202,7 @@ def test_a_target_is_a_number_of_any_library(target: object) -> None:
     assert impact.recommend(impact.sweep(BASE), target={"e_out": target})[0].model == "tsuji-1992"
 
 
+@pytest.mark.slow
 def test_a_selected_value_is_a_number_of_any_library(result: xr.Dataset) -> None:
     titles = [
         impact.plot(result, kind="loop", models=["tsuji-1992"], sel={"e": half}).axes[0].get_title()
@@ -368,6 +369,7 @@ def test_a_width_may_be_a_quantity(result: xr.Dataset) -> None:
     assert widths == pytest.approx([84 / 25.4] * 3, rel=1e-15)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("half", [np.array([0.5]), pd.Series([0.5]), xr.DataArray([0.5], dims="e"), [0.5]])
 def test_an_array_of_one_element_is_a_value(half: object, result: xr.Dataset) -> None:
     assert impact.run(at={"e": half}).point["e"] == 0.5

@@ -47,6 +47,7 @@ def test_the_toml_and_the_commands_of_daily_use(cli: Run, tmp_path: Path) -> Non
     assert written <= {path.name for path in tmp_path.iterdir()}
 
 
+@pytest.mark.slow
 def test_the_python(tmp_path: Path) -> None:
     (tmp_path / "configs").symlink_to(ROOT / "configs")
     # each block alone, in one process, which imports the package once

@@ -328,6 +328,7 @@ def test_a_missing_number_is_null(cli: Run, tmp_path: Path) -> None:
     assert lines[-1].split() == ["exact-hysteresis", "0%", "–", "–", "4", "–", "nowhere"]
 
 
+@pytest.mark.slow
 def test_a_long_ranking_is_shortened_in_the_table_only(cli: Run, tmp_path: Path) -> None:
     result = swept("hertz", m2=1.0, e=[0.5, 1.0])
     many = result.isel(model=[0] * 42).assign_coords(model=[f"model-{number}" for number in range(42)])
@@ -343,6 +344,7 @@ def test_a_long_ranking_is_shortened_in_the_table_only(cli: Run, tmp_path: Path)
         assert lines[-1].startswith(last)
 
 
+@pytest.mark.slow
 def test_strings_of_a_file_are_escaped_on_the_terminal(cli: Run, tmp_path: Path) -> None:
     name = "\x1b[31mP\x07\u202e[red]"
     sweep = {"e": [0.5, 0.9], "v1": 1.0, "m1": 1.0, "m2": 1.0, "material": [name, "steel"]}

@@ -220,6 +220,7 @@ BEYOND_DATA += (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("key", FIT_VALUES)
 def test_reader_and_schema_agree_on_a_calibration(key: str) -> None:
     @settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))

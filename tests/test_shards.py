@@ -153,6 +153,7 @@ resource.setrlimit(resource.RLIMIT_NOFILE, (40, 40))
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a limit of open files")
 def test_more_shards_than_the_limit_of_open_files_are_merged(
     forked: ForkServer, folder: Path, whole: bytes
@@ -217,6 +218,7 @@ def test_an_invalid_shard_record_is_refused(cli: Run, folder: Path, text: str) -
     assert_refused(cli("merge", shard, cwd=folder), message)
 
 
+@pytest.mark.slow
 def test_repeated_blocks_are_counted_and_differing_ones_are_refused(cli: Run, folder: Path, whole: bytes) -> None:
     folders = run_shards(folder, "1/2", "2/2", "1/3")
     completed = cli("merge", *folders, folders[0], cwd=folder)

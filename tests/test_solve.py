@@ -50,6 +50,7 @@ def test_a_root_agrees_with_the_closed_form_of_the_linear_dashpot() -> None:
     assert linear_restitution(zeta) == pytest.approx(0.6, abs=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("model", "e"),
     [("chrono-smc-hertz", 0.561), ("yade-betan-pulling", 0.628), ("yade-betan", 0.591)],
@@ -96,6 +97,7 @@ def test_both_roots_beside_a_minimum_between_two_values_of_the_scan_are_found(
     assert result.attainable == (0.638943, 1.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("wanted", "roots"),
     [
@@ -121,6 +123,7 @@ def law_of(damping: Callable[[Array], Array]) -> impact.ForceModel:
     )
 
 
+@pytest.mark.slow
 def test_the_ends_of_an_interval_that_gives_the_target_are_the_roots() -> None:
     law = law_of(lambda p: 0.4 * np.maximum(np.abs(p - 1.5) - 0.6213, 0.0))
     result = impact.solve("damped", "p", {"e_out": 1.0}, plugins=[law])

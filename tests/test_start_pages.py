@@ -31,6 +31,7 @@ def test_the_commands_of_five_minutes_run_in_their_order(cli: Run, tmp_path: Pat
     assert {path.name for path in tmp_path.iterdir()} >= {"first.h5", "first.png", "first.html"}
 
 
+@pytest.mark.slow
 def test_the_python_of_five_minutes(tmp_path: Path) -> None:
     (code,) = code_blocks(START, "python")
     words = [sys.executable, "-W", "error", "-c", code]

@@ -86,6 +86,7 @@ def test_a_dry_run_prints_counts_size_and_time_and_writes_nothing(cli: Run, bloc
     assert estimate["seconds"] > 0.0
 
 
+@pytest.mark.slow
 def test_a_dry_run_estimates_transferred_bytes_and_the_useful_number_of_workers(cli: Run, blocks: Path) -> None:
     # two blocks of each model
     overrides = ["solver.collapse=false", 'solver.core="numpy"', "sweep.e.linspace=[0,1,17000]"]
@@ -114,6 +115,7 @@ def test_a_dry_run_estimates_transferred_bytes_and_the_useful_number_of_workers(
     assert estimate["seconds"] == seconds[1] == max(seconds.values())
 
 
+@pytest.mark.slow
 def test_a_dry_run_reports_where_trajectories_are_not_deduplicated(cli: Run, blocks: Path) -> None:
     words = ("sweep", "--dry-run", "--set", 'solver.core="numpy"')
     every_point = cli(*words, blocks, "--set", "solver.collapse=false", cwd=blocks.parent).stdout
@@ -155,6 +157,7 @@ def test_too_many_points_are_refused_before_memory_or_a_file_is_used(forked: For
 # ---- progress
 
 
+@pytest.mark.slow
 def test_progress_lines_without_a_terminal(forked: ForkServer, blocks: Path) -> None:
     completed = forked("sweep", blocks, cwd=blocks.parent, code=SHOW_PROGRESS_AT_ONCE)
     lines = [line for line in completed.stderr.splitlines() if line.startswith(("trajectories ", "points "))]

@@ -194,6 +194,7 @@ def test_the_rayleigh_time_is_the_smaller_one_and_belongs_to_laws_with_moduli(cl
         assert "T_R" not in str(other)
 
 
+@pytest.mark.slow
 def test_the_page_prints_what_the_commands_print(cli: Run) -> None:
     examples = examples_of("docs/timestep.md")
     assert examples
@@ -317,6 +318,7 @@ def test_the_value_that_is_printed_is_enough(model: str, at: dict[str, float], d
 SAP = ("--model", "kelvin-voigt-no-tension", "--scheme", "drake-sap", "--at", "n=1", "--at", "K=1e6")
 
 
+@pytest.mark.slow
 def test_the_relaxation_time_of_drakes_sap_is_found_with_its_stiffness(cli: Run) -> None:
     """From that time on every phase is within the tolerance at the step, and a tenth below it is not."""
     words = ("timestep", *SAP, "--at", "e=0.7", "--dt", "2 ms", "--tol", "5%", "--for")
@@ -343,6 +345,7 @@ def test_the_relaxation_time_of_drakes_sap_is_found_with_its_stiffness(cli: Run)
     assert "every phase is within 5 % from relaxation_time = 0.01391 s with K = 154.5 N/m: contact of" in text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "message"),
     [
