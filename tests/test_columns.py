@@ -483,6 +483,21 @@ def test_the_natural_range_is_about_the_size_in_units_of_the_contact() -> None:
     assert sizes[0] / sizes[1] == pytest.approx(100.0)
 
 
+def test_the_natural_range_of_a_slip_speed_of_friction_is_about_the_speed_of_the_impact() -> None:
+    from impact.engine.plugins import read_plugins
+    from impact.inverse.calibrate import natural_bounds
+
+    law = {
+        "models": "hertz",
+        "frictions": "drake-regularized",
+        "friction": {"drake-regularized": {"v_s": {"fit": True}}},
+    }
+    balls = {**SWEEP, "v1": 1e-3, "angle": 0.7, "mu": 0.3, "R1": 0.01, "R2": math.inf}
+    config = read_config({**law, "sweep": balls, "data": {"columns": {"beta": [-0.5]}}}, purpose="calibrate")
+    ((lower, upper),) = natural_bounds(config, read_plugins([])).values()
+    assert math.sqrt(lower * upper) == pytest.approx(1e-3)
+
+
 @pytest.mark.slow
 def test_a_fit_over_the_natural_range_finds_what_bounds_of_the_user_find(folder: Path) -> None:
     source = {"sweep": {**SWEEP, "m1": "2.7 g"}, "models": "kuwabara-kono-1987"}

@@ -394,6 +394,17 @@ def test_a_picture_of_differences_names_variables_as_axes_do(wide: xr.Dataset) -
     }
 
 
+def test_a_picture_of_the_differences_replaces_an_old_one(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    picture = tmp_path / "differences.svg"
+    picture.write_text("old")
+    paths = [str(folder / name) for name in ("different.h5", "base.h5")]
+    assert app(["compare", *paths, "--plot", str(picture)], standalone_mode=False) == 1
+    assert picture.read_bytes().startswith(b"<?xml")
+    assert capsys.readouterr().err == f"{picture}: where the differences lie\n"
+
+
 @pytest.mark.slow
 def test_every_kind_of_verdict_has_a_picture(
     forked: ForkServer, folder: Path, wide: xr.Dataset, tmp_path: Path

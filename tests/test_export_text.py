@@ -223,6 +223,24 @@ def test_chrono_says_what_its_settings_enter_for_the_laws_that_have_them_only() 
     assert named == about
 
 
+def test_chrono_multiplies_a_given_damping_by_the_effective_mass_as_its_header_says() -> None:
+    key = "kelvin-voigt-no-tension"
+    linear = impact.export("chrono", key, source=config(K=1e7, n=1), at={f"{key}.C": 300.0})
+    assert linear.parameters["Gn"] == pytest.approx(300.0 / M, rel=1e-14)
+    assert "the system multiplies Gn by m, with m = m1 m2/(m1 + m2)" in linear.header
+    key = "kuwabara-kono-1987"
+    hertz = impact.export("chrono", key, source=config(K=1e9), at={f"{key}.A": 1e-5})
+    factors = "Kn by R* sqrt(delta), Gn by R* sqrt(delta) m"
+    assert f"the system multiplies {factors}, with m = m1 m2/(m1 + m2)" in hertz.header
+
+
+def test_chrono_says_in_which_of_its_systems_a_contact_pulls() -> None:
+    pulls, pushes = "the force may become attractive before separation", "the force is never negative"
+    for key, text in (("tsuji-1992", pulls), ("chrono-smc-hertz", pushes)):
+        header = impact.export("chrono", key, source=config("soft", "hard")).header
+        assert [line.startswith(text) for line in header if line.startswith((pulls, pushes))] == [True], key
+
+
 def test_the_header_lists_the_defaults_of_table_1_that_enter() -> None:
     header = impact.export("chrono", "chrono-smc-hertz", at={"e": 0.5, "K": 1e9, "m1": 3.0}).header
     assert "defaults of Table 1 of the paper: v1 = 1 m/s, m2 = 1 kg" in header

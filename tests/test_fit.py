@@ -268,6 +268,18 @@ def test_a_robust_loss_of_two_values_has_the_standard_error_of_their_mean() -> N
     np.testing.assert_allclose(np.sqrt(result.covariance), 0.01, rtol=1e-6)
 
 
+def test_the_interval_of_a_huber_loss_beside_an_outlier_is_that_of_the_closed_form() -> None:
+    """The outlier pulls with the force of one standard deviation, however far it is from the other 19 values."""
+    y = np.full(20, 0.7)
+    y[3] += 0.5
+    result = fit("constant", [0.0], [2.0], y, 0.01, loss="huber")
+    # the other residuals are 1/19 of the deviation, and of the curvatures 19 of 20 are 1
+    half = stats.t.ppf(0.975, 19) * 0.01 * np.sqrt((1.0 + 1.0 / 19.0) / 19.0 / (19.0 / 20.0) / 19.0)
+    assert result.estimate[0] == pytest.approx(0.7 + 0.01 / 19.0, abs=1e-9)
+    assert result.lower[0] == pytest.approx(result.estimate[0] - half, abs=1e-8)
+    assert result.upper[0] == pytest.approx(result.estimate[0] + half, abs=1e-8)
+
+
 @pytest.mark.parametrize(
     ("values", "is_limit", "status"),
     [

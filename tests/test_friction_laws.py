@@ -249,6 +249,13 @@ def test_liggghts_takes_the_stiffness_and_the_damping_of_its_contact_force() -> 
     assert (off[TANGENTIAL_STIFFNESS], off[TANGENTIAL_DAMPING]) == (1.0, 0.0)
 
 
+def test_liggghts_reduction_for_linear_contacts_adds_no_values_to_those_of_hertz() -> None:
+    oblique = oblique_of(impacts_of(), parameters={"tangential_reduce": [0.0, 1.0]})
+    values = friction_values(Pair(find("liggghts-hertz"), find_friction("liggghts-history")), oblique)
+    assert values[TANGENTIAL_STIFFNESS].size == 1
+    assert values[TANGENTIAL_STIFFNESS].item() == values_of("liggghts-history")[TANGENTIAL_STIFFNESS]
+
+
 def test_yades_damping_is_a_ratio_of_the_critical_one() -> None:
     k = values_of("yade-mindlin")[TANGENTIAL_STIFFNESS] / SOLID
     assert values_of("yade-mindlin")[TANGENTIAL_DAMPING] == pytest.approx(SOLID * 2 * B * math.sqrt(k), rel=1e-14)

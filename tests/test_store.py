@@ -372,6 +372,12 @@ def test_a_write_to_a_full_disk_leaves_no_file(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_result_that_does_not_fit_on_the_disk_is_not_stored(figure6: xr.Dataset, tmp_path: Path) -> None:
+    with full_disk(), pytest.raises(StoreError, match="not written: File too large"):
+        impact.save(figure6, tmp_path / "results.h5")
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_file_that_is_no_result_of_this_version_is_refused(stored: Path, tmp_path: Path) -> None:
     other = tmp_path / "other.h5"
     with h5py.File(other, "w") as file:

@@ -204,6 +204,14 @@ def test_a_held_spring_forgets_the_past() -> None:
     np.testing.assert_allclose(slips, expected, rtol=1e-8)
 
 
+def test_a_spring_that_is_held_to_the_end_of_a_fading_force_determines_the_last_slip() -> None:
+    """k_t x^(1/2) g = mu d(K x^(3/2))/dt gives g1 = -(3/2) mu (K/k_t) v0, although 0 = 0 at the end."""
+    form = spring(0.5, 1.5, (0.0, 0.0), "spring")
+    result = simulate("hertz", form, [1.05, 1.1], k=1.0, c=1.0, mu=0.3, m_t=0.3)
+    assert result.status.tolist() == [1, 1]
+    np.testing.assert_allclose(result.slip, -1.5 * 0.3, rtol=1e-6)
+
+
 def test_smooth_regularized_friction() -> None:
     def smooth(y: Any) -> Any:
         y = np.minimum(y, 1.0)

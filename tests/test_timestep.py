@@ -175,7 +175,7 @@ def test_a_step_that_is_too_long_is_no_restitution_and_ends_with_exit_code_3(cli
     assert result["needed"]["steps_per_contact"] == 74
 
 
-def test_the_rayleigh_time_is_the_smaller_one_and_belongs_to_laws_with_moduli(cli: Run) -> None:
+def test_the_rayleigh_time_is_the_smaller_one_and_belongs_to_laws_with_moduli() -> None:
     radii, glass = {"R1": 2.5e-3, "R2": 5e-3}, {"material": "glass", "e": 0.5}
     E, nu, rho = (impact.materials()["glass"][name] for name in ("E", "nu", "rho"))
     expected = math.pi * 2.5e-3 * math.sqrt(rho * 2 * (1 + nu) / E) / (0.1631 * nu + 0.8766)
