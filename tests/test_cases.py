@@ -158,6 +158,7 @@ def test_a_part_of_the_cases_is_repeated_under_their_numbers(
     assert impact.compare(repeated, part).equal
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("layout", LAYOUTS)
 def test_cases_are_appended_and_keep_their_numbers(tmp_path: Path, layout: str) -> None:
     def config(**cases: Any) -> dict[str, Any]:

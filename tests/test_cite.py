@@ -50,6 +50,7 @@ def test_a_doi_stands_in_the_entry_of_its_paper() -> None:
     assert "doi" not in second
 
 
+@pytest.mark.slow
 def test_a_result_cites_all_of_its_laws(tmp_path: Path, cli: Run) -> None:
     config = {
         "models": ["tsuji-1992", "hertz"],

@@ -571,6 +571,7 @@ def test_a_plug_in_named_by_a_file_is_not_imported(cli: Run, small: Path, tmp_pa
     assert not (tmp_path / "marker").exists()
 
 
+@pytest.mark.slow
 def test_no_control_byte_reaches_the_terminal(cli: Run, tmp_path: Path) -> None:
     name = "a\x1b[31m\u202e[red][x].toml"
     title = r'"\u001b[31m \u202e [red] [/x] $\\frac{1$"'

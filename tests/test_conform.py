@@ -432,6 +432,7 @@ def test_an_engine_that_is_not_installed_is_named_with_how_to_get_it(cli: Run) -
         assert ENGINES[name].program.install in done.stderr
 
 
+@pytest.mark.slow
 def test_a_board_is_stored_and_compared(cli: Run, tmp_path: Path) -> None:
     def release(version: str, engine: Engine) -> Engine:
         return lambda c: engine(c) | {"engine": "mine", "version": version}

@@ -656,6 +656,7 @@ def test_the_tolerance_on_beta_is_four_indentations_over_the_effective_radius(tm
     assert wall.beta_uncertainty == wall.uncertainty == 1e-9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("code", "run"), [("lammps", r"^run +(\d+)$"), ("mujoco", r"^mujoco.mj_step\(model, data, (\d+)\)$")]
 )
@@ -800,6 +801,7 @@ def test_a_program_that_reports_no_release_is_one_line(cli: Run, tmp_path: Path,
     assert installed_version(replace(code, program=replace(code.program, name=str(lmp)))) is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("code", "e"), [("mujoco", 0.9), ("liggghts", 0.5)])
 def test_the_step_that_is_recommended_is_small_enough_as_it_is_printed(cli: Run, code: str, e: float) -> None:
     """It has three digits, rounded down; rounded to the nearest, both would be too long."""
@@ -816,6 +818,7 @@ EXAMPLES = examples_of("docs/export.md")
 QUICK_EXAMPLES = ("export --to lammps", "export --to mujoco")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("command", "printed"),
     [

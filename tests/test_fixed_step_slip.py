@@ -218,6 +218,7 @@ def test_timestep_has_the_restitution_of_the_cone() -> None:
     assert row.e_mean > 1.1 * result.e_continuous
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("friction", "values"),
     [

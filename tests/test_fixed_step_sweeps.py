@@ -123,6 +123,7 @@ def test_contact_time_is_a_whole_number_of_steps() -> None:
     np.testing.assert_allclose(result["contact_time"], result["steps"] * result["dt"], rtol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("how", "step"),
     [
@@ -419,6 +420,7 @@ def test_the_picture_over_dt_at_one_phase_has_no_band() -> None:
     assert (guide.case, curve.x, curve.least) == ("e = 0.5", (2e-6, 5e-6), ())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("width", ["single", "double"])
 def test_the_texts_of_the_picture_do_not_overlap(coarse: xr.Dataset, width: str) -> None:
     figure = impact.plot(coarse, kind="timestep", width=width)
@@ -429,6 +431,7 @@ def test_the_texts_of_the_picture_do_not_overlap(coarse: xr.Dataset, width: str)
     check_layout(near)
 
 
+@pytest.mark.slow
 def test_the_numbers_of_the_picture_have_the_range(coarse: xr.Dataset, tmp_path: Path, cli: Run) -> None:
     impact.save(coarse, tmp_path / "r.h5")
     done = cli("plot", "r.h5", "--kind", "timestep", "--data", "wide.csv", "-o", "r.svg", cwd=tmp_path)

@@ -158,6 +158,7 @@ def test_the_third_regime_forgets_the_past(e: float, k_t: float, c_t: float, g0:
     assert outcome.g == pytest.approx(-0.1 / k_t * outcome.e_out, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_time_steps_of_codes_tend_to_the_same_slip() -> None:
     random = np.random.default_rng(39)
     for _ in range(25):

@@ -154,17 +154,13 @@ ALONG_E = {"e": [0.2, 0.5, 0.8], "v1": 1.0, "m1": 1.0, "m2": [1.0, 2.0], "K": 1e
 MATERIALS = {"material1": ["steel", "aluminium"], "material2": "steel"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("config", "name", "value"),
     [
-        pytest.param({"sweep": ALONG_E}, "m2", 1.25, marks=pytest.mark.slow),
+        ({"sweep": ALONG_E}, "m2", 1.25),
         ({"sweep": {**ALONG_E, "v1": {"geomspace": [0.01, 10.0, 4]}}}, "v1", 0.0234),
-        pytest.param(
-            {"sweep": {name: value for name, value in {**ALONG_E, **MATERIALS}.items() if name != "K"}},
-            "m2",
-            1.25,
-            marks=pytest.mark.slow,
-        ),
+        ({"sweep": {name: value for name, value in {**ALONG_E, **MATERIALS}.items() if name != "K"}}, "m2", 1.25),
         ({"sweep": ALONG_E, "model": {"tsuji-1992": {"K": [1e5, 1e6]}}}, "tsuji-1992.K", 345678.0),
     ],
 )
@@ -188,6 +184,7 @@ def test_a_number_off_the_grid_gives_what_a_run_gives(config: dict[str, Any], na
         assert e_out == pytest.approx(shot.values["e_out"], rel=1e-12)
 
 
+@pytest.mark.slow
 def test_controls_begin_with_what_is_given(tmp_path: Path) -> None:
     result = impact.sweep(TWO_AXES)
     impact.save(result, tmp_path / "r.h5")

@@ -113,6 +113,7 @@ def test_a_pair_that_cannot_be_combined_is_named_with_the_reason(beads: xr.Datas
         curves_of(beads, "e-t", models=[HOOKE], frictions=[FORCE])
 
 
+@pytest.mark.slow
 def test_the_guides_are_where_physics_has_them(beads: xr.Dataset) -> None:
     def guides(kind: str, dataset: xr.Dataset = beads, **choice: Any) -> dict[str, float]:
         (panel,) = curves_of(dataset, kind, **choice).panels
@@ -201,6 +202,7 @@ def test_angles_are_in_degrees_and_texts_do_not_overlap(beads: xr.Dataset, kind:
     assert len(names_of(figure)) == 6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("config", ["configs/oblique.toml", "docs/spin.toml"])
 def test_conditions_of_84_mm_have_three_lines(config: str) -> None:
     result = impact.sweep(config, overrides=['sweep.angle={ linspace = ["20 deg", "85 deg", 3] }'])

@@ -159,6 +159,7 @@ def test_both_layouts_have_the_bits_of_the_sweep(folder: Path, whole: xr.Dataset
     assert_same_bits(impact.load(folder / f"{layout}.h5"), whole)
 
 
+@pytest.mark.slow
 @EACH_LAYOUT
 def test_merged_shards_have_the_bytes_of_the_whole_sweep(folder: Path, layout: str, tmp_path: Path) -> None:
     output = tmp_path / "results.h5"
@@ -297,6 +298,7 @@ def test_pairs_that_cannot_be_combined_are_marked_and_named(folder: Path, whole:
         impact.sweep(folder / "c.toml", overrides=alone)
 
 
+@pytest.mark.slow
 @EACH_LAYOUT
 def test_compare_reports_a_changed_restitution(cli: Run, folder: Path, layout: str, tmp_path: Path) -> None:
     same = cli("compare", folder / "full.h5", folder / f"{layout}.h5")

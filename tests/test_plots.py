@@ -927,6 +927,7 @@ def test_a_value_for_one_picture_leaves_the_axes_of_others(
     assert alone.stderr.startswith("this result has no numeric axis left to draw over")
 
 
+@pytest.mark.slow
 def test_a_label_is_drawn_in_one_of_the_pictures_or_refused(
     cli: Run, coarse: xr.Dataset, coarse_file: Path, tmp_path: Path
 ) -> None:

@@ -377,6 +377,7 @@ def test_an_array_of_one_element_is_a_value(half: object, result: xr.Dataset) ->
     assert impact.solve("mujoco-solref", "dampratio", {"e_out": half}).roots
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("collect", [np.array, pd.Series, pd.Index, xr.DataArray])
 def test_models_may_be_an_array_of_keys(collect: Callable[[list[str]], Any], result: xr.Dataset) -> None:
     keys = collect(["tsuji-1992", "hertz"])
@@ -440,6 +441,7 @@ def test_a_radius_replaces_the_mass_of_the_starter_config() -> None:
     assert swept["contact_time"].item() == pytest.approx(expected["contact_time"], rel=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("inputs", "dims"),
     [

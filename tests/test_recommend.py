@@ -401,6 +401,7 @@ def test_a_result_that_cannot_be_ranked_is_refused(hertz: xr.Dataset) -> None:
     assert "do not lie along the axes" in refused(foreign)
 
 
+@pytest.mark.slow
 def test_an_error_of_the_command_is_one_line(cli: Run, tmp_path: Path) -> None:
     path = stored(tmp_path, swept("hertz", e=None))
     for words, line in (

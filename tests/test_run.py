@@ -279,6 +279,7 @@ rtol = 1e-4
 """
 
 
+@pytest.mark.slow
 def test_at_selects_a_case_by_its_number_and_a_material_by_its_property(cli: Run, tmp_path: Path) -> None:
     (tmp_path / "c.toml").write_text(CASES, encoding="utf-8")
     (tmp_path / "cases.csv").write_text("e,v1\n0.5,1.0\n0.5,2.0\n0.9,2.0\n", encoding="utf-8")

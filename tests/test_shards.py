@@ -134,6 +134,7 @@ def test_a_missing_shard_is_reported_with_the_command_that_integrates_it(cli: Ru
     assert impact.load(folder / "results.h5").identical(expected)
 
 
+@pytest.mark.slow
 def test_an_unfinished_shard_is_reported_with_the_command_that_finishes_it(
     cli: Run, folder: Path, whole: bytes
 ) -> None:

@@ -97,7 +97,6 @@ def test_both_roots_beside_a_minimum_between_two_values_of_the_scan_are_found(
     assert result.attainable == (0.638943, 1.0)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("wanted", "roots"),
     [

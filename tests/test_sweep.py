@@ -171,6 +171,7 @@ def test_progress_lines_without_a_terminal(forked: ForkServer, blocks: Path) -> 
     assert (quiet.returncode, quiet.stdout, quiet.stderr) == (0, "", "")
 
 
+@pytest.mark.slow
 def test_a_progress_bar_on_a_terminal(forked: ForkServer, blocks: Path) -> None:
     completed, printed = printed_on_terminal(
         forked, "sweep", blocks, stream="stderr", cwd=blocks.parent, code=SHOW_PROGRESS_AT_ONCE
@@ -221,6 +222,7 @@ def test_a_failed_point_is_reported_with_the_command_that_repeats_it(cli: Run, t
     assert summary["trajectories"] == 1 + values_of_e.size + 2
 
 
+@pytest.mark.slow
 def test_only_the_undamaged_result_of_the_same_sweep_is_recognized_as_finished(blocks: Path) -> None:
     output = blocks.parent / "results.h5"
     swept = impact.sweep_to_file(blocks, output)
