@@ -737,6 +737,8 @@ def test_a_code_without_a_scheme_that_measures_no_number_differs(tmp_path: Path)
     assert verification is not None
     assert not verification.agrees
     assert len(verification.measured) == 12
+    # at a step, its half and its quarter
+    assert verification.dt == tuple(verification.dt[0] / part for part in (1, 2, 4) for _ in range(4))
     assert verification.not_numbers.startswith("at the phase 0.125 of dt")
 
 
