@@ -762,12 +762,11 @@ def test_executors_exclude_each_other(cli: Run, small: Path, tmp_path: Path) -> 
         assert (done.returncode, done.stderr) == (2, f"{first}: got {second} as well, expected one of the two\n")
 
 
-@pytest.mark.parametrize(("options", "shares_memory"), [({"threads": 2}, True), ({"jobs": 2}, False)])
+@pytest.mark.parametrize(("jobs", "threads", "shares_memory"), [(1, 2, True), (2, 1, False)])
 def test_threads_integrate_in_the_process_of_the_command_and_jobs_in_others(
-    options: dict[str, int], shares_memory: bool
+    jobs: int, threads: int, shares_memory: bool
 ) -> None:
-    execution = Execution(lambda: False, quiet=True, **options)  # type: ignore[arg-type]
-    with execution.keywords() as keywords:
+    with Execution(lambda: False, quiet=True, jobs=jobs, threads=threads).keywords() as keywords:
         assert keywords["backend"].shares_memory is shares_memory
 
 
