@@ -591,6 +591,9 @@ CYCLES: dict[str, tuple[CreateFile, str]] = {
             "a node with too many children": lambda content, root, _: struct.pack_into(
                 "<H", content, root[0] + 6, 65_535
             ),
+            "a leaf with too many chunks": lambda content, _, leaves: struct.pack_into(
+                "<H", content, leaves[0][0] + 6, 65
+            ),
         }.items()
     },
     "a group is its own child": (_store_with_old_groups, "not an HDF5 file as this program writes it"),

@@ -24,6 +24,7 @@ from rich.cells import cell_len
 
 import impact
 from impact.cli import exits
+from impact.cli.execution import Execution
 from impact.errors import UsageError
 from impact.plots.data import read_points
 
@@ -760,6 +761,14 @@ def test_executors_exclude_each_other(cli: Run, small: Path, tmp_path: Path) -> 
     for first, second in itertools.combinations(executors, 2):
         done = cli("sweep", small, *first.split(), *second.split(), cwd=tmp_path)
         assert (done.returncode, done.stderr) == (2, f"{first}: got {second} as well, expected one of the two\n")
+
+
+@pytest.mark.parametrize(("jobs", "threads", "shares_memory"), [(1, 2, True), (2, 1, False)])
+def test_threads_integrate_in_the_process_of_the_command_and_jobs_in_others(
+    jobs: int, threads: int, shares_memory: bool
+) -> None:
+    with Execution(lambda: False, quiet=True, jobs=jobs, threads=threads).keywords() as keywords:
+        assert keywords["backend"].shares_memory is shares_memory
 
 
 def test_help_of_a_command_and_the_version(cli: Run) -> None:

@@ -431,6 +431,17 @@ def test_each_point_has_its_scale() -> None:
                 assert impact.compare(changed, fast, tol=tol).equal == equal
 
 
+def test_the_scale_of_a_spin_is_the_approach_with_the_slip_over_the_radius() -> None:
+    radii = {"R1": 0.03, "R2": 0.04}
+    inputs = {"v1": 2.0, "v2": -1.0, "u1": 4.0, "m1": 1.0, "m2": 1.0, "K": 1e6, "mu": 0.3} | radii
+    swept = impact.sweep({"models": "hertz", "frictions": "coulomb-1785", "sweep": inputs})
+    for ball, R in enumerate(radii.values(), 1):
+        name, scale = f"omega{ball}_post", (3.0 + 4.0) / R
+        for part, equal in ((0.999, True), (1.001, False)):
+            changed = _with(swept, name, swept[name].item() + part * 1e-6 * scale)
+            assert impact.compare(changed, swept, tol=1e-6).equal == equal
+
+
 def test_residuals_are_judged_by_their_bound(by_hand: xr.Dataset) -> None:
     for name in ("energy_residual", "closed_form_error"):
         # both below the bound, on either side of zero

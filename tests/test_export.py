@@ -364,6 +364,20 @@ def test_the_relation_of_kratos_has_the_friction_of_the_config(friction: str | N
     ]
 
 
+@pytest.mark.parametrize("friction", [None, "kratos-viscous-coulomb"])
+def test_the_export_to_kratos_says_what_its_friction_follows_from(friction: str | None) -> None:
+    config = source("soft", "soft", **({"mu": 0.3, "angle": "40 deg"} if friction else {}))
+    header = impact.export(
+        "kratos", default_law("kratos"), source=config, friction=friction, code_version="10.4.4"
+    ).header
+    for words, is_of_friction in (
+        ("the tangential stiffness follows from nu", True),
+        ("RotationOption is true", True),
+        ("no friction: replace STATIC_FRICTION", False),
+    ):
+        assert any(words in line for line in header) is (is_of_friction == bool(friction))
+
+
 def test_mujoco_gets_a_damping_ratio_and_a_constant_impedance() -> None:
     export = impact.export("mujoco", at={"e": 0.6})
     timeconst, dampratio = map(float, str(export.parameters["solref"]).split())
@@ -738,6 +752,8 @@ def test_a_code_without_a_scheme_that_measures_no_number_differs(tmp_path: Path)
     assert verification is not None
     assert not verification.agrees
     assert len(verification.measured) == 12
+    # at a step, its half and its quarter
+    assert verification.dt == tuple(verification.dt[0] / part for part in (1, 2, 4) for _ in range(4))
     assert verification.not_numbers.startswith("at the phase 0.125 of dt")
 
 

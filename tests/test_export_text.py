@@ -336,6 +336,13 @@ def test_mercurydpm_gets_twice_the_effective_mass_and_the_modulus_of_the_pair() 
     assert hertz == {"effectiveElasticModulus": pytest.approx(MODULUS, rel=1e-13), "restitution": 0.5}
 
 
+@pytest.mark.parametrize(("law", "pulls"), [("tsuji-1992", True), ("kuwabara-kono-1987", False)])
+def test_the_export_to_mercurydpm_says_whether_the_force_pulls(law: str, pulls: bool) -> None:
+    header = impact.export("mercurydpm", law, source=config("soft", "hard"), at={"e": 0.7}).header
+    assert any("the force pulls before the contact ends" in line for line in header) is pulls
+    assert any("the force is never negative" in line for line in header) is not pulls
+
+
 # ---- Modelica: ElastoGap.mo
 
 

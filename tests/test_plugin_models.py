@@ -122,6 +122,8 @@ def test_the_check_of_a_law_that_raises_gives_the_line_and_the_text(cli: Run, tm
         assert not all(finding.holds for finding in findings)
     done = cli("models", "--check", "raising.py", cwd=tmp_path)
     assert done.returncode == 1
+    # names are aligned left
+    assert re.match(r"model +clause .*\nraising +every impact ends ", done.stdout)
     assert [line for line in done.stderr.splitlines() if line.startswith("note: ")] == [
         f"note: {reason}" for reason in REASONS
     ]

@@ -282,6 +282,11 @@ def test_a_shard_counts_failed_points_and_a_merge_with_failed_points_exits_with_
     assert cli("merge", *folders, "--overwrite", "--allow-failed", cwd=folder).returncode == 0
 
 
+def test_a_merge_with_failed_points_exits_with_3(cli: Run, folder: Path) -> None:
+    folders = run_shards(folder, "1/1", overrides=["solver.max_steps=1", "sweep.e=0.5", 'models="hertz"'])
+    assert cli("merge", *folders, cwd=folder).returncode == 3
+
+
 @pytest.mark.slow
 def test_killed_shards_are_continued_and_merge_to_the_whole(tmp_path: Path) -> None:
     start_sweep(tmp_path / "whole").wait()

@@ -122,6 +122,27 @@ def law_of(damping: Callable[[Array], Array]) -> impact.ForceModel:
     )
 
 
+def test_a_root_is_right_to_more_digits_than_the_polynomial_that_finds_it() -> None:
+    """A polynomial may be wrong by 1e-10, which hides a ripple of the damping."""
+    law, target = law_of(lambda p: 0.3 * p + 3e-11 * np.cos(300.0 * (p - 0.5))), linear_restitution(0.075)
+    (root,) = impact.solve("damped", "p", {"e_out": target}, plugins=[law]).roots
+    assert root.e_out == pytest.approx(target, rel=1e-12)
+
+
+def test_with_a_fixed_step_the_least_value_lies_between_two_values_of_the_scan() -> None:
+    """These are at 1.005 and 1.02."""
+    law = law_of(lambda p: 0.5 - 20.0 * np.minimum(np.abs(p - 1.0075), 0.1) ** 2)
+    source = {
+        "models": "damped",
+        "sweep": {"v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 1e6, "n": 1.0, "steps_per_contact": 20, "phase": 0.5},
+        "solver": {"integrator": "kick-drift"},
+    }
+    result = impact.solve("damped", "p", {"e_out": 0.3}, source=source, plugins=[law])
+    least = impact.run(source, at={"damped.p": 1.0075}, plugins=[law]).values["e_out"]
+    assert result.status == "no_root"
+    assert result.attainable[0] == pytest.approx(least, abs=1e-6)
+
+
 @pytest.mark.slow
 def test_the_ends_of_an_interval_that_gives_the_target_are_the_roots() -> None:
     law = law_of(lambda p: 0.4 * np.maximum(np.abs(p - 1.5) - 0.6213, 0.0))

@@ -183,6 +183,16 @@ def test_a_progress_bar_on_a_terminal(forked: ForkServer, blocks: Path) -> None:
     assert printed.rstrip().endswith("limit)")
 
 
+def test_a_sensitivity_study_shows_its_progress_unless_it_is_quiet(forked: ForkServer, tmp_path: Path) -> None:
+    balls = "v1.uniform = [1, 2]\ne = 0.5\nm1 = 1\nm2 = 1\nK = 1e6\n"
+    text = f'models = ["hertz", "tsuji-1992"]\ndesign.n = 2\n[sweep]\n{balls}'
+    (tmp_path / "c.toml").write_text(text, encoding="utf-8")
+    for words, is_shown in (((), True), (("--quiet",), False)):
+        done = forked("sensitivity", "c.toml", *words, cwd=tmp_path, code=SHOW_PROGRESS_AT_ONCE)
+        assert done.returncode == 0
+        assert ("trajectories " in done.stderr) is is_shown
+
+
 def test_the_rate_of_a_resumed_sweep_counts_this_run_only_and_is_not_extrapolated_from_an_instant() -> None:
     now = 100.0
     bar = new_bar(lambda: now)

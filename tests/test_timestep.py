@@ -303,6 +303,8 @@ def test_the_relaxation_time_of_drakes_sap_is_named_beside_a_stiffness() -> None
         ("liggghts-hertz", {"e": 0.7, "K": 1e9}, 2e-5, "K"),
         ("liggghts-hertz", {"e": 0.8, "K": 1e9}, 2e-5, "K"),
         ("anagnostopoulos-1988", {"e": 0.8, "K": 1e6}, 1e-3, "K"),
+        # the contact time is no power of K
+        ("kuwabara-kono-1987", {"kuwabara-kono-1987.A": 1e-4, "K": 1e8}, 1e-3, "K"),
     ],
 )
 def test_the_value_that_is_printed_is_enough(model: str, at: dict[str, float], dt: float, parameter: str) -> None:
