@@ -295,7 +295,6 @@ def test_the_relaxation_time_of_drakes_sap_is_named_beside_a_stiffness() -> None
     assert "relaxation_time" not in {*other.as_dict(), *str(other).split()}
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("model", "at", "dt", "parameter"),
     [
