@@ -495,7 +495,9 @@ def main() -> None:
     folder = options.folder.resolve()
     copy = folder / "checkout"
     shutil.rmtree(copy, ignore_errors=True)
-    shutil.copytree(ROOT, copy, ignore=shutil.ignore_patterns(".*", "build", "dist", "__pycache__"))
+    shutil.copytree(
+        ROOT, copy, ignore=shutil.ignore_patterns(".git", ".*venv*", ".*_cache", "build", "dist", "__pycache__")
+    )
     os.chdir(copy)
     os.environ["HYPOTHESIS_STORAGE_DIRECTORY"] = str(folder / "hypothesis")
     for library in LIBRARIES.split():
