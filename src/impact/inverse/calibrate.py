@@ -319,7 +319,7 @@ def _completion(
     powers: Sequence[Fraction], units: Sequence[str], config: Config, model: ForceModel
 ) -> dict[str, Fraction]:
     """Find the powers of m and v0 that make a product of powers dimensionless; empty if none do."""
-    exponents = {"n": float(model.exponent or config.scalars.get("n", 1.5))}
+    exponents = {"n": float(model.exponent or config.scalars["n"])}
     mass = length = time = Fraction(0)
     for power, unit in zip(powers, units, strict=True):
         of_unit = [Fraction(float(part)).limit_denominator(MAX_DENOMINATOR) for part in dimension(unit, exponents)]
@@ -427,6 +427,11 @@ def akaike_weights(aicc: Mapping[str, float]) -> dict[str, float]:
     {'hertz': 0.5, 'tsuji-1992': 0.5, 'bilinear': 0.0}
     >>> akaike_weights({"hertz": math.nan})
     {'hertz': nan}
+
+    Weights depend on differences alone, also where the AICc are those of thousands of points:
+
+    >>> akaike_weights({"hertz": -3000.0, "tsuji-1992": -3000.0, "bilinear": 3000.0})
+    {'hertz': 0.5, 'tsuji-1992': 0.5, 'bilinear': 0.0}
     """
     smallest = min((value for value in aicc.values() if not math.isnan(value)), default=0.0)
     likelihood = {key: np.exp(-0.5 * np.nan_to_num(value - smallest, nan=np.inf)) for key, value in aicc.items()}
