@@ -298,6 +298,36 @@ def test_what_is_determined_has_no_dimension_whether_or_not_its_units_have_a_mas
     assert groups == ["(v0^(1/5) K^(2/5) A)/m^(2/5)"]
 
 
+@pytest.mark.parametrize(
+    ("sweep", "columns", "expected"),
+    [
+        ({"n": 1.0}, {}, "d/sqrt(m K)"),
+        ({}, {"n": [1.0, 1.0, 1.0]}, "d/sqrt(m K)"),
+        # no powers of the mass and the speed are right for more than one exponent
+        ({}, {"n": [1.0, 1.5, 2.0]}, "d/sqrt(K)"),
+        ({"n": {"fit": [1.0, 1.001]}}, {}, "d/sqrt(K)"),
+    ],
+)
+def test_what_is_determined_has_no_dimension_at_every_exponent_of_the_data(
+    sweep: dict[str, Any], columns: dict[str, list[float]], expected: str
+) -> None:
+    key = "modelica-elastogap"
+    config = read_config(
+        {
+            "models": key,
+            "sweep": {"v1": 1.0, "m1": 1.0, "m2": 1.0, "K": {"fit": [1e4, 1e8]}, **sweep},
+            "model": {key: {"d": {"fit": [1.0, 1e5]}}},
+            "data": {"columns": {"e_out": [0.9, 0.9, 0.9], **columns}},
+        },
+        purpose="calibrate",
+    )
+    names = ["K", f"{key}.d"]
+    bounds = Bounds(*np.transpose([config.fits[name] for name in names]))
+    problem = FitProblem(key, bounds, DataPoints(np.full(3, 0.01), np.full(3, 1e-4), "given"))
+    (fit,) = fit_all([problem], {key: lambda rows: np.repeat(rows[:, 1:] / np.sqrt(rows[:, :1]), 3, axis=1)})
+    assert determined_groups(config, find(key), names, fit) == [expected]
+
+
 @pytest.mark.slow
 def test_the_bytes_of_a_result_do_not_depend_on_the_number_of_processes(cli: Run, tmp_path: Path) -> None:
     laws = ("--set", 'models=["anagnostopoulos-1988", "hunt-crossley-1975"]', "--set", "solver.rtol=1e-6")

@@ -290,18 +290,17 @@ def test_a_law_that_is_not_combinable_has_this_status_beside_points_that_failed_
     config = """
 models = "bilinear"
 frictions = "lammps-linear-nohistory"
-sweep = {e = 0.8, v1 = 1.0, m1 = 1.0, m2 = 2.0, R1 = 0.01, R2 = 0.02, K = 1e-320, n = 1.0, angle = "30 deg", mu = 0.3}
+sweep = {e = 0.8, v1 = 1, m1 = 1, m2 = 2, R1 = 0.01, R2 = 0.02, K = 1e-320, n = 1, angle = "30 deg", mu = 0.3}
 friction.lammps-linear-nohistory.xt = [0.0, 1.0]
 output.layout = "factored"
 """
     (tmp_path / "c.toml").write_text(config, encoding="utf-8")
     impact.sweep_to_file(tmp_path / "c.toml", tmp_path / "r.h5")
-    # the bilinear law has no dashpot, which xt = 1 needs; at the first stiffness nothing else is found out
+    # the bilinear law has no dashpot, which xt = 1 needs; the first stiffness is out of range for all
     larger = impact.extend(tmp_path / "r.h5", ["sweep.K=[1e-320, 1e9]"])["friction_status"].squeeze()
-    out_of_range, not_combinable = FrictionStatus.OUT_OF_RANGE, FrictionStatus.NOT_COMBINABLE
     assert larger.transpose("K", ...).values.tolist() == [
-        [out_of_range, out_of_range],
-        [FrictionStatus.OK, not_combinable],
+        [FrictionStatus.OUT_OF_RANGE, FrictionStatus.OUT_OF_RANGE],
+        [FrictionStatus.OK, FrictionStatus.NOT_COMBINABLE],
     ]
 
 

@@ -319,14 +319,37 @@ def _completion(
     powers: Sequence[Fraction], units: Sequence[str], config: Config, model: ForceModel
 ) -> dict[str, Fraction]:
     """Find the powers of m and v0 that make a product of powers dimensionless; empty if none do."""
-    exponents = {"n": float(model.exponent or config.scalars["n"])}
-    mass = length = time = Fraction(0)
-    for power, unit in zip(powers, units, strict=True):
-        of_unit = [Fraction(float(part)).limit_denominator(MAX_DENOMINATOR) for part in dimension(unit, exponents)]
-        mass, length, time = mass + power * of_unit[0], length + power * of_unit[1], time + power * of_unit[2]
-    if length != -time:
+    assert config.data is not None
+    if model.exponent:
+        exponents: Sequence[float] = [model.exponent]
+    elif "n" in config.fits:
+        # dimensions are linear in n: what holds for two values holds for all
+        exponents = [1.0, 2.0]
+    else:
+        exponents = config.data.inputs.get("n", [float(config.scalars["n"])])
+    found = {_dimension_of_product(powers, units, n) for n in exponents}
+    mass, length, time = found.pop()
+    if found or length != -time:
         return {}
     return {name: power for name, power in (("m", -mass), ("v0", time)) if power}
+
+
+def _dimension_of_product(
+    powers: Sequence[Fraction], units: Sequence[str], n: float
+) -> tuple[Fraction, Fraction, Fraction]:
+    """Add up the powers of mass, length and time."""
+    dimensions = [dimension(unit, {"n": n}) for unit in units]
+    mass, length, time = (
+        sum(
+            (
+                power * Fraction(float(part)).limit_denominator(MAX_DENOMINATOR)
+                for power, part in zip(powers, parts, strict=True)
+            ),
+            Fraction(0),
+        )
+        for parts in zip(*dimensions, strict=True)
+    )
+    return mass, length, time
 
 
 def _reduced(rows: Array) -> Array:
