@@ -328,6 +328,19 @@ def test_what_is_determined_has_no_dimension_at_every_exponent_of_the_data(
     assert determined_groups(config, find(key), names, fit) == [expected]
 
 
+def test_what_is_determined_of_a_law_with_exponents_in_its_units_has_no_dimension() -> None:
+    """With p = 2 the unit of c, N s^p/m^(n + p), is that of K/v0²."""
+    key = "recurdyn-exponents"
+    config = {
+        "models": key,
+        "sweep": {"v1": 1.0, "m1": 1.0, "m2": 1.0, "K": {"fit": [1e4, 1e8]}, "n": 1.5},
+        "model": {key: {"c": {"fit": [1.0, 1e5]}, "damping_exponent": 2.0, "indentation_exponent": 1.5}},
+        "data": {"columns": {"e_out": [0.49, 0.5, 0.51], "sigma": [0.01, 0.01, 0.01]}},
+        "solver": {"rtol": 1e-4},
+    }
+    assert impact.calibrate(config)["determined"].values.tolist() == ["(v0^2 c)/K"]
+
+
 @pytest.mark.slow
 def test_the_bytes_of_a_result_do_not_depend_on_the_number_of_processes(cli: Run, tmp_path: Path) -> None:
     laws = ("--set", 'models=["anagnostopoulos-1988", "hunt-crossley-1975"]', "--set", "solver.rtol=1e-6")
