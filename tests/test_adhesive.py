@@ -202,6 +202,17 @@ def test_the_edinburgh_law_sticks_at_low_speed_and_releases_at_zero_indentation(
     assert dry["permanent_indentation"] / dry["peak_indentation"] == pytest.approx([(2 / 3) ** (2 / 3)], rel=1e-9)
 
 
+@pytest.mark.parametrize(("exponent", "shown"), [(0.9, "0.9"), (10.5, "10.5")])
+def test_the_exponent_of_the_adhesive_branch_is_from_1_to_10(exponent: float, shown: str) -> None:
+    config = {
+        "models": "liggghts-edinburgh",
+        "sweep": {"v1": 0.1, "m1": 1.0, "m2": 1.0, "R1": 0.02, "R2": 0.06, "K": 1e6},
+        "model": {"liggghts-edinburgh": {"k2": 2.0, "gamma": 1.0, "adhesion_exponent": exponent}},
+    }
+    with pytest.raises(impact.errors.ConfigError, match=f"got {shown}, expected a number from 1 to 10$"):
+        impact.sweep(config)
+
+
 def test_the_stiffness_of_the_edinburgh_law_depends_on_its_exponent():
     config = {
         "models": "liggghts-edinburgh",

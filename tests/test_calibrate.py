@@ -298,6 +298,49 @@ def test_what_is_determined_has_no_dimension_whether_or_not_its_units_have_a_mas
     assert groups == ["(v0^(1/5) K^(2/5) A)/m^(2/5)"]
 
 
+@pytest.mark.parametrize(
+    ("sweep", "columns", "expected"),
+    [
+        ({"n": 1.0}, {}, "d/sqrt(m K)"),
+        ({}, {"n": [1.0, 1.0, 1.0]}, "d/sqrt(m K)"),
+        # no powers of the mass and the speed are right for more than one exponent
+        ({}, {"n": [1.0, 1.5, 2.0]}, "d/sqrt(K)"),
+        ({"n": {"fit": [1.0, 1.001]}}, {}, "d/sqrt(K)"),
+    ],
+)
+def test_what_is_determined_has_no_dimension_at_every_exponent_of_the_data(
+    sweep: dict[str, Any], columns: dict[str, list[float]], expected: str
+) -> None:
+    key = "modelica-elastogap"
+    config = read_config(
+        {
+            "models": key,
+            "sweep": {"v1": 1.0, "m1": 1.0, "m2": 1.0, "K": {"fit": [1e4, 1e8]}, **sweep},
+            "model": {key: {"d": {"fit": [1.0, 1e5]}}},
+            "data": {"columns": {"e_out": [0.9, 0.9, 0.9], **columns}},
+        },
+        purpose="calibrate",
+    )
+    names = ["K", f"{key}.d"]
+    bounds = Bounds(*np.transpose([config.fits[name] for name in names]))
+    problem = FitProblem(key, bounds, DataPoints(np.full(3, 0.01), np.full(3, 1e-4), "given"))
+    (fit,) = fit_all([problem], {key: lambda rows: np.repeat(rows[:, 1:] / np.sqrt(rows[:, :1]), 3, axis=1)})
+    assert determined_groups(config, find(key), names, fit) == [expected]
+
+
+def test_what_is_determined_of_a_law_with_exponents_in_its_units_has_no_dimension() -> None:
+    """With p = 2 the unit of c, N s^p/m^(n + p), is that of K/v0²."""
+    key = "recurdyn-exponents"
+    config = {
+        "models": key,
+        "sweep": {"v1": 1.0, "m1": 1.0, "m2": 1.0, "K": {"fit": [1e4, 1e8]}, "n": 1.5},
+        "model": {key: {"c": {"fit": [1.0, 1e5]}, "damping_exponent": 2.0, "indentation_exponent": 1.5}},
+        "data": {"columns": {"e_out": [0.49, 0.5, 0.51], "sigma": [0.01, 0.01, 0.01]}},
+        "solver": {"rtol": 1e-4},
+    }
+    assert impact.calibrate(config)["determined"].values.tolist() == ["(v0^2 c)/K"]
+
+
 @pytest.mark.slow
 def test_the_bytes_of_a_result_do_not_depend_on_the_number_of_processes(cli: Run, tmp_path: Path) -> None:
     laws = ("--set", 'models=["anagnostopoulos-1988", "hunt-crossley-1975"]', "--set", "solver.rtol=1e-6")
@@ -364,6 +407,7 @@ def test_the_best_config_gives_the_predictions(cli: Run, tmp_path: Path) -> None
         "calibrate", FOLDER / "drops.toml", *words, "--best", tmp_path / "best.toml", "-o", tmp_path / "fit.h5"
     )
     assert done.returncode == 0, done.stderr
+    assert done.stderr.splitlines() == [f"{tmp_path / 'fit.h5'}: written", f"{tmp_path / 'best.toml'}: written"]
     fit, swept = impact.load(tmp_path / "fit.h5").isel(model=0), impact.sweep(tmp_path / "best.toml")
     assert swept["model"].values.tolist() == ["kuwabara-kono-1987"]
     np.testing.assert_allclose(swept["e_out"].values.ravel(), fit["predicted"], atol=1e-7)

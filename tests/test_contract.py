@@ -112,6 +112,13 @@ WRONG_LAWS = {
         ),
         "an impact alone has the bits that it has in a batch",
     ),
+    "a coefficient of one impact that depends on others": (
+        wrong_law(
+            lambda elastic, v, chi: elastic * (1.0 + chi * v),
+            coefficients={"chi": lambda e: 1.0 - e + np.where(e == 0.05, 1e-12 * np.mean(e), 0.0)},
+        ),
+        "an impact alone has the bits that it has in a batch",
+    ),
 }
 
 

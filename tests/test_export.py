@@ -138,6 +138,7 @@ def test_the_stiffness_of_lammps_hertz_is_per_root_of_the_effective_radius() -> 
     export = impact.export("lammps", default_law("lammps"), source=source(K=1e8), code_version="22Jul2025")
     assert export.parameters == {"k_n": pytest.approx(1e8 / math.sqrt(0.03), rel=1e-15), "e": 0.5}
     assert any("no friction: replace the tangential model" in remark for remark in export.header)
+    assert "k_n = K/sqrt(R*), for R* = 0.03 m; hertz/material takes E and nu" in export.header
 
 
 def test_lammps_takes_the_moduli_of_both_types_of_two_materials() -> None:

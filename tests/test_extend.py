@@ -12,6 +12,7 @@ import pytest
 import xarray as xr
 
 import impact
+from impact.contact.status import FrictionStatus
 from impact.errors import ConfigError, ResultError, UsageError
 
 from .conftest import Run, assert_same_bits
@@ -281,6 +282,26 @@ def test_points_that_failed_beforehand_do_not_affect_new_points(
     larger = impact.extend(stored_sweep(BASE, layout, *before), [more])
     assert_same_values(larger, single_sweep(BASE, [layout, *before, more], tmp_path))
     assert (larger["status"] == 1).any()
+
+
+def test_a_law_that_is_not_combinable_has_this_status_beside_points_that_failed_for_another_reason(
+    tmp_path: Path,
+) -> None:
+    config = """
+models = "bilinear"
+frictions = "lammps-linear-nohistory"
+sweep = {e = 0.8, v1 = 1, m1 = 1, m2 = 2, R1 = 0.01, R2 = 0.02, K = 1e-320, n = 1, angle = "30 deg", mu = 0.3}
+friction.lammps-linear-nohistory.xt = [0.0, 1.0]
+output.layout = "factored"
+"""
+    (tmp_path / "c.toml").write_text(config, encoding="utf-8")
+    impact.sweep_to_file(tmp_path / "c.toml", tmp_path / "r.h5")
+    # the bilinear law has no dashpot, which xt = 1 needs; the first stiffness is out of range for all
+    larger = impact.extend(tmp_path / "r.h5", ["sweep.K=[1e-320, 1e9]"])["friction_status"].squeeze()
+    assert larger.transpose("K", ...).values.tolist() == [
+        [FrictionStatus.OUT_OF_RANGE, FrictionStatus.OUT_OF_RANGE],
+        [FrictionStatus.OK, FrictionStatus.NOT_COMBINABLE],
+    ]
 
 
 def test_equal_results_are_extended_to_equal_bytes_by_the_core_that_they_have(

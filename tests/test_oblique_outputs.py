@@ -116,6 +116,17 @@ def test_coulomb_is_its_closed_form() -> None:
     assert np.abs(elastic["beta_error"].values).max() < 1e-9
 
 
+def test_a_contact_of_coulomb_that_slides_and_then_sticks_changes_once() -> None:
+    result = impact.sweep({
+        "models": "hertz",
+        "frictions": "coulomb-1785",
+        "sweep": BALL | {"u1": [0.1, 9.0]},
+        "output": {"variables": ["contact_regime", "slip_changes"]},
+    })  # fmt: skip
+    assert values(result, "contact_regime") == [3, 2]
+    assert values(result, "slip_changes") == [1, 0]
+
+
 def test_works_make_up_the_loss_and_momenta_are_kept() -> None:
     rng = np.random.default_rng(1)
     u1, omega1, omega2 = rng.uniform(-3.0, 3.0, 20), rng.uniform(-100.0, 100.0, 20), rng.uniform(-100.0, 100.0, 20)

@@ -79,6 +79,8 @@ def test_shards_in_any_order_merge_to_the_file_of_the_whole_sweep(
     completed = cli("merge", *folders, cwd=folder)
     assert completed.returncode == 0, completed.stderr
     assert content(folder) == whole
+    # the result as JSON is for --json alone
+    assert completed.stdout == ""
     assert "results.h5: 300 points from" in completed.stderr
     assert "more than one folder" not in completed.stderr
     assert all(path.is_dir() for path in folders)

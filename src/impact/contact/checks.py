@@ -85,7 +85,7 @@ def _parameter_values(model: ForceModel, parameter: Parameter, impacts: Impacts)
     # the size of the parameter that is 1 in the contact's own units
     size = 1.0 / impacts.dimensionless(model, parameter.name) if parameter.typical is None else parameter.typical
     least = parameter.least if math.isfinite(parameter.least) else min(0.0, parameter.most)
-    return np.clip(least + np.linspace(0.0, 4.0, len(impacts)) * size, parameter.least, parameter.most)
+    return np.minimum(least + np.linspace(0.0, 4.0, len(impacts)) * size, parameter.most)
 
 
 class ContractResult(list[ClauseResult], Displayed):

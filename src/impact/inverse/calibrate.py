@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import partial
@@ -21,6 +22,7 @@ from ..config.input_names import InputName
 from ..config.load import Config, parse_config, read_config
 from ..config.measurements import fitted_parameters
 from ..config.quantities import Quantity, middle_of
+from ..contact.dimensionless import exponent_names
 from ..contact.friction import Pair
 from ..contact.interpolant import InterpolatedCollisions, motion_key
 from ..contact.model import ForceModel
@@ -319,14 +321,46 @@ def _completion(
     powers: Sequence[Fraction], units: Sequence[str], config: Config, model: ForceModel
 ) -> dict[str, Fraction]:
     """Find the powers of m and v0 that make a product of powers dimensionless; empty if none do."""
-    exponents = {"n": float(model.exponent or config.scalars.get("n", 1.5))}
-    mass = length = time = Fraction(0)
-    for power, unit in zip(powers, units, strict=True):
-        of_unit = [Fraction(float(part)).limit_denominator(MAX_DENOMINATOR) for part in dimension(unit, exponents)]
-        mass, length, time = mass + power * of_unit[0], length + power * of_unit[1], time + power * of_unit[2]
-    if length != -time:
+    found = {_dimension_of_product(powers, units, exponents) for exponents in _exponents(config, model)}
+    mass, length, time = found.pop()
+    if found or length != -time:
         return {}
     return {name: power for name, power in (("m", -mass), ("v0", time)) if power}
+
+
+def _exponents(config: Config, model: ForceModel) -> Iterator[dict[str, float]]:
+    """List values of n and of parameters in exponents of units; units linear in them need two values of each."""
+    assert config.data is not None
+    ends: dict[str, Collection[float]] = {}
+    for name in exponent_names(model) | {"n"}:
+        key = name if name == "n" else f"{model.key}.{name}"
+        measured = config.data.inputs.get(key)
+        if name == "n" and model.exponent:
+            ends[name] = [model.exponent]
+        elif key in config.fits:
+            ends[name] = [1.0, 2.0]
+        else:
+            ends[name] = {min(measured), max(measured)} if measured else [float(config.scalars[key])]
+    for values in itertools.product(*ends.values()):
+        yield dict(zip(ends, values, strict=True))
+
+
+def _dimension_of_product(
+    powers: Sequence[Fraction], units: Sequence[str], exponents: Mapping[str, float]
+) -> tuple[Fraction, Fraction, Fraction]:
+    """Add up the powers of mass, length and time."""
+    dimensions = [dimension(unit, exponents) for unit in units]
+    mass, length, time = (
+        sum(
+            (
+                power * Fraction(float(part)).limit_denominator(MAX_DENOMINATOR)
+                for power, part in zip(powers, parts, strict=True)
+            ),
+            Fraction(0),
+        )
+        for parts in zip(*dimensions, strict=True)
+    )
+    return mass, length, time
 
 
 def _reduced(rows: Array) -> Array:
@@ -427,6 +461,11 @@ def akaike_weights(aicc: Mapping[str, float]) -> dict[str, float]:
     {'hertz': 0.5, 'tsuji-1992': 0.5, 'bilinear': 0.0}
     >>> akaike_weights({"hertz": math.nan})
     {'hertz': nan}
+
+    Weights depend on differences alone, also where the AICc are those of thousands of points:
+
+    >>> akaike_weights({"hertz": -3000.0, "tsuji-1992": -3000.0, "bilinear": 3000.0})
+    {'hertz': 0.5, 'tsuji-1992': 0.5, 'bilinear': 0.0}
     """
     smallest = min((value for value in aicc.values() if not math.isnan(value)), default=0.0)
     likelihood = {key: np.exp(-0.5 * np.nan_to_num(value - smallest, nan=np.inf)) for key, value in aicc.items()}

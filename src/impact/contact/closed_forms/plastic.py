@@ -48,13 +48,12 @@ def luding_restitution(size: Array | float, k2: Array, kc: Array, shallow: Array
     array([0.901388])
     """
     with np.errstate(divide="ignore"):
-        depth = np.divide(1.0, shallow)
-    yields = depth < size
-    depth = np.where(yields, depth, 0.0)
+        # the whole approach where nothing yields, and y = 0
+        depth = np.minimum(np.divide(1.0, shallow), size)
     # y from the energy beyond δ*, δ* y + k₂ y²/2, by the form of the root without cancellation
     beyond = (size - depth) * (size + depth)
     y = beyond / (depth + np.sqrt(depth * depth + k2 * beyond))
-    peak, force = np.where(yields, depth + y, size), np.where(yields, depth + k2 * y, size)
+    peak, force = depth + y, depth + k2 * y
     k = 1.0 + (k2 - 1.0) * np.minimum(peak * shallow, 1.0)
     rest = peak - force / k
     back = force * force / k - k * kc / (k + kc) * rest * rest
