@@ -400,7 +400,6 @@ def test_a_result_is_stored_and_read_again(cli: Run, tmp_path: Path) -> None:
     assert "exists" in again.stderr
 
 
-@pytest.mark.slow
 def test_the_best_config_gives_the_predictions(cli: Run, tmp_path: Path) -> None:
     words = ("--set", 'models=["kuwabara-kono-1987"]', "--set", "solver.rtol=1e-8")
     done = cli(
