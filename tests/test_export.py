@@ -639,6 +639,15 @@ def test_verify_exits_with_0_for_the_predicted_restitutions_and_with_1_for_other
     assert [row.split()[-1] for row in (first, second, third, fourth)] == ["0", "0", "1e-08", "0"]
 
 
+def test_with_friction_the_rows_have_the_tangential_restitution_as_well() -> None:
+    normal = Verification("LAMMPS", (1e-6,) * 2, (0.25, 0.75), (0.5, 0.6), (0.5, 0.6), 1e-9)
+    oblique = replace(normal, beta_measured=(0.1, 0.2), beta_predicted=(0.1, 0.3))
+    rows = [dict(row) for row in normal.records()]
+    rows[0] |= {"beta_measured": 0.1, "beta_predicted": 0.1}
+    rows[1] |= {"beta_measured": 0.2, "beta_predicted": 0.3}
+    assert oblique.as_dict()["rows"] == rows
+
+
 def test_verify_runs_the_script_that_is_exported(tmp_path: Path) -> None:
     """The program prints the number of its lines."""
     program = write_program(tmp_path / "lmp", RELEASE + 'echo "e_out = $(wc -l < "$2")"')

@@ -296,6 +296,21 @@ def test_unknown_variables_are_ignored_with_a_warning(small: Path, with_unknown_
     assert loaded.identical(impact.load(small))
 
 
+def test_an_unknown_axis_is_named_where_it_has_coordinates(small: Path, tmp_path: Path) -> None:
+    """An axis without coordinates has no values that are ignored."""
+    path = tmp_path / "axes.h5"
+    shutil.copy(small, path)
+    with h5py.File(path, "r+") as file:
+        file["with_values"] = [1.0, 2.0]
+        file.create_dataset("without_values", (2,), "f8")
+        for number, name in enumerate(("with_values", "without_values"), start=100):
+            file[name].make_scale()
+            file[name].attrs["_Netcdf4Dimid"] = number
+    seal(path)
+    with pytest.warns(UserWarning, match="ignored .*: with_values$"):
+        assert impact.load(path).identical(impact.load(small))
+
+
 QUICK_COMMANDS = (("info", FILE), ("recommend", FILE))
 SLOW_COMMANDS = tuple(command for command in COMMANDS if command not in QUICK_COMMANDS)
 

@@ -349,6 +349,21 @@ def test_no_step_crosses_a_breakpoint():
         assert struck(law, deep)["e_out"].tobytes() == expected.tobytes()
 
 
+def test_a_thin_layer_takes_its_work_from_the_peak_at_any_depth() -> None:
+    """A force of 0.1/d to a depth d, in the contact's own units, and back: x^2 = 1 - 0.2 at the peak."""
+    layer = new_law(
+        "layer",
+        lambda elastic, x, d: elastic + np.where(x < d, 0.1 / d, 0.0),
+        parameters=(Parameter("d", "1", "depth"),),
+        breakpoints=(lambda d: d,),
+    )
+    impacts = table1_impacts(n=1.0, parameters={"d": np.array([1e-4, 1e-8, 1e-10])})
+    contact = struck(layer, impacts)
+    elastic = impacts.v0 * np.sqrt(impacts.m / impacts.K)
+    np.testing.assert_allclose(contact["peak_indentation"] / elastic, np.sqrt(0.8), rtol=1e-6)
+    np.testing.assert_allclose(contact["e_out"], 1.0, rtol=1e-6)
+
+
 @pytest.mark.parametrize("key", PLASTIC)
 def test_an_impact_alone_has_the_bits_that_it_has_in_a_batch(key):
     impacts, contact = over_speed(key)

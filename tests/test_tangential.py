@@ -137,6 +137,13 @@ def test_a_slip_within_a_step_whose_ends_stick_is_found() -> None:
     np.testing.assert_allclose(beta(result, g0, mu=mu), -0.113860514635, rtol=0.0, atol=1e-9)
 
 
+def test_the_last_change_between_stick_and_slip_before_the_release_is_found() -> None:
+    """The numbers are those of the independent solver, of a spring with a limit and a dashpot beside it."""
+    result = simulate("hertz", spring(cap="spring"), 0.044, k=0.3, c=0.24, mu=0.14, m_t=0.36)
+    np.testing.assert_allclose(beta(result, 0.044, m_t=0.36, mu=0.14), 0.3790938552, rtol=0.0, atol=2e-8)
+    assert result.slip_changes.tolist() == [4]
+
+
 def test_rebound_with_more_energy_than_before_is_reported() -> None:
     inputs = {"C": 0.491935, "q": 0.25, "k": 0.617647, "mu": 0.5}
     result = simulate("hertz-power-damping", spring(0.5, memory=(1.0, 1.0)), 0.796214, **inputs)

@@ -267,6 +267,8 @@ def test_a_softer_contact_lasts_long_enough(
     assert needed.contact_time == pytest.approx(steps.steps_per_contact * 1e-3, rel=1e-5)
     assert needed.contact_time / result.contact_time == pytest.approx((value / needed.value) ** power, rel=1e-4)
     assert not needed.is_least
+    unit = {"K": "N/m", "materials.table1.E": "Pa"}[parameter]
+    assert str(needed).split(f" {parameter} = ")[1].split()[1].rstrip(":") == unit
     # e is kept where it was solved for: the damping constant falls with the root of the stiffness
     if result.solved:
         (constant,) = result.solved.values()
