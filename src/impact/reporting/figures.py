@@ -138,7 +138,7 @@ def figures_of(
     choices = list(iterate_choices(dataset, keys))
     # numbered as they stand on the page: those of friction have a section of their own
     for of_friction in (False, True):
-        others: list[tuple[int, Kind, Choice, Mapping[Hashable, int]]] = []
+        others: list[tuple[int, Kind, Choice, Mapping[Hashable, int], PlotData | None]] = []
         for kind, choice, position in choices:
             if kind.of_friction != of_friction:
                 continue
@@ -154,11 +154,11 @@ def figures_of(
                 left_out.append(f"The figure {kind.name} is left out: {'; '.join(error.problems)}")
                 continue
             others += [
-                (place_on_page, kind, drawing.choice_at(kind, choice, {**position, **index}), index)
-                for index in other_values.drawn
+                (place_on_page, kind, drawing.choice_at(kind, choice, {**position, **index}), index, known)
+                for index, known in other_values.drawn
             ]
-        for first, kind, choice, index in others:
-            more = drawing.plot_data(kind, choice)
+        for first, kind, choice, index, known in others:
+            more = known or drawing.plot_data(kind, choice)
             if more is not None:
                 caption = f"As Figure {first}, at {_changes_text(dataset, index)}."
                 figures.append(drawing.figure(len(figures) + 1, kind, choice, caption, more))
@@ -170,7 +170,7 @@ class _OtherValues:
     """What a figure is at other values of the axes that it does not draw: sentences, and those to draw too."""
 
     sentences: list[str]
-    drawn: list[Mapping[Hashable, int]]  # indices of the axes that differ
+    drawn: list[tuple[Mapping[Hashable, int], PlotData | None]]  # indices of the axes that differ, and known data
 
     @classmethod
     def of(cls, drawing: _Drawing, kind: Kind, choice: Choice, position: Mapping[Hashable, int]) -> _OtherValues:
@@ -189,23 +189,29 @@ class _OtherValues:
                 count[max(count, key=lambda dim: count[dim])] -= 1
             places = itertools.product(*(_spread(sizes[dim], count[dim], position[dim]) for dim in dims))
             compared = [dict(zip(dims, place, strict=True)) for place in places]
-        tables = {
-            tuple(index[dim] for dim in dims): _numbers(
-                drawing.plot_data(kind, drawing.choice_at(kind, choice, {**position, **index}))
+        known = {
+            tuple(index[dim] for dim in dims): drawing.plot_data(
+                kind, drawing.choice_at(kind, choice, {**position, **index})
             )
             for index in compared
         }
+        tables = {index: _numbers(data) for index, data in known.items()}
         differ = []
         for axis, dim in enumerate(dims):
             base = position[dim]
             pairs = ((table, tables[*index[:axis], base, *index[axis + 1 :]]) for index, table in tables.items())
             if not all(_are_equal(*pair) for pair in pairs):
                 differ.append(dim)
-        return cls(*_described(drawing, dims, differ, len(tables), position))
+        sentences, drawn = _described(drawing, kind, dims, differ, len(tables), position)
+        drawn_places = [tuple({**position, **index}[dim] for dim in dims) for index in drawn]
+        return cls(
+            sentences, [(index, known.get(place)) for index, place in zip(drawn, drawn_places, strict=True)]
+        )
 
 
 def _described(
     drawing: _Drawing,
+    kind: Kind,
     dims: Sequence[Hashable],
     differ: Sequence[Hashable],
     compared_count: int,
@@ -218,7 +224,7 @@ def _described(
         among = f" of {compared_count:,} of {combinations:,} combinations" if compared_count < combinations else ""
         verb = "do" if len(equal) > 1 else "does"
         sentences.append(f"{_and(equal)} {verb} not matter (differences{among} below {MAX_DIFFERENCE:.1%}).")
-    drawn = _drawn_too(drawing, differ, position)
+    drawn = _drawn_too(drawing, kind, differ, position)
     combinations = math.prod(sizes[dim] for dim in differ) - 1 - len(drawn)
     parts = []
     for dim in differ:
@@ -231,21 +237,20 @@ def _described(
 
 
 def _drawn_too(
-    drawing: _Drawing, differ: Sequence[Hashable], position: Mapping[Hashable, int]
+    drawing: _Drawing, kind: Kind, differ: Sequence[Hashable], position: Mapping[Hashable, int]
 ) -> list[Mapping[Hashable, int]]:
     """Choose the indices at which a figure is drawn too: all combinations if few, else along one axis at a time.
 
-    Samples are not drawn one by one.
+    A motion is drawn at the ends of each axis, where it is compared. Samples are not drawn one by one.
     """
     sizes, dims = drawing.dataset.sizes, [dim for dim in differ if dim != SAMPLE]
-    if math.prod(sizes[dim] for dim in dims) - 1 <= MAX_MORE:
+    count = 2 if kind.source == "history" else MAX_VALUES
+    if kind.source != "history" and math.prod(sizes[dim] for dim in dims) - 1 <= MAX_MORE:
         places = itertools.product(*(range(sizes[dim]) for dim in dims))
         indices = [dict(zip(dims, place, strict=True)) for place in places]
     else:
         # the last value of each axis first, which differs most
-        columns = [
-            [{dim: place} for place in reversed(_spread(sizes[dim], MAX_VALUES, position[dim]))] for dim in dims
-        ]
+        columns = [[{dim: place} for place in reversed(_spread(sizes[dim], count, position[dim]))] for dim in dims]
         indices = [index for row in itertools.zip_longest(*columns) for index in row if index is not None]
     changes = [{dim: place for dim, place in index.items() if place != position[dim]} for index in indices]
     drawn = [index for index in changes if index and drawing.has_answer({**position, **index})][:MAX_MORE]
