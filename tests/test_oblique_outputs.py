@@ -18,12 +18,14 @@ SPRING = "cundall-strack-1979"
 def oblique(**sweep: Any) -> xr.Dataset:
     """The impact of two balls by Coulomb's friction and a spring, some inputs replaced; None removes one."""
     inputs = {name: value for name, value in (BALL | sweep).items() if value is not None}
-    return impact.sweep({
-        "models": sweep.pop("models", "tsuji-1992"),
-        "frictions": ["coulomb-1785", SPRING],
-        "sweep": {name: value for name, value in inputs.items() if name != "models"},
-        "friction": {SPRING: {"k_t": 3e3}},
-    })  # fmt: skip
+    return impact.sweep(
+        {
+            "models": sweep.pop("models", "tsuji-1992"),
+            "frictions": ["coulomb-1785", SPRING],
+            "sweep": {name: value for name, value in inputs.items() if name != "models"},
+            "friction": {SPRING: {"k_t": 3e3}},
+        }
+    )
 
 
 def values(result: xr.Dataset, name: str) -> list[float]:
@@ -117,12 +119,14 @@ def test_coulomb_is_its_closed_form() -> None:
 
 
 def test_a_contact_of_coulomb_that_slides_and_then_sticks_changes_once() -> None:
-    result = impact.sweep({
-        "models": "hertz",
-        "frictions": "coulomb-1785",
-        "sweep": BALL | {"u1": [0.1, 9.0]},
-        "output": {"variables": ["contact_regime", "slip_changes"]},
-    })  # fmt: skip
+    result = impact.sweep(
+        {
+            "models": "hertz",
+            "frictions": "coulomb-1785",
+            "sweep": BALL | {"u1": [0.1, 9.0]},
+            "output": {"variables": ["contact_regime", "slip_changes"]},
+        }
+    )
     assert values(result, "contact_regime") == [3, 2]
     assert values(result, "slip_changes") == [1, 0]
 
