@@ -344,7 +344,7 @@ def drawn_elements(svg: bytes) -> Counter[tuple[str, ...]]:
     )
 
 
-@pytest.mark.parametrize("name", ["wide", "frictions"])
+@pytest.mark.parametrize("name", ["wide", "oblique"])
 def test_the_commands_draw_the_figures_again(cli: Run, tmp_path: Path, name: str, wide: xr.Dataset) -> None:
     path = tmp_path / "my results.h5"
     if name == "wide":
