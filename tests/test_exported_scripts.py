@@ -50,7 +50,7 @@ EXPORTED = {
 }
 
 
-# what a server is told to do
+# the code of a fork: it runs a script
 RUN = """import __main__, runpy
 runpy.run_path({file!r}, __main__.names, "__main__")
 raise SystemExit
@@ -61,7 +61,7 @@ raise SystemExit
 def scripts_in_forks() -> Iterator[None]:
     """Let scripts in Python run in forks of a process that has imported what they import, which takes seconds.
 
-    In `test_a_script_runs_in_an_empty_folder` they begin anew.
+    In `test_a_script_runs_in_an_empty_folder` each starts its own interpreter.
     """
     with ExitStack() as stack, pytest.MonkeyPatch.context() as patch:
 

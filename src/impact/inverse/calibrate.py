@@ -321,9 +321,9 @@ def _completion(
     powers: Sequence[Fraction], units: Sequence[str], config: Config, model: ForceModel
 ) -> dict[str, Fraction]:
     """Find the powers of m and v0 that make a product of powers dimensionless; empty if none do."""
-    found = {_dimension_of_product(powers, units, exponents) for exponents in _exponents(config, model)}
-    mass, length, time = found.pop()
-    if found or length != -time:
+    dimensions = {_dimension_of_product(powers, units, exponents) for exponents in _exponents(config, model)}
+    mass, length, time = dimensions.pop()
+    if dimensions or length != -time:
         return {}
     return {name: power for name, power in (("m", -mass), ("v0", time)) if power}
 

@@ -231,7 +231,7 @@ def _described(
         left = sizes[dim] - 1 - sum(index.keys() == {dim} for index in drawn)
         combinations -= left
         parts += [f"{left:,} value{'s' * (left > 1)} of {dim}"] if left else []
-    parts += [f"{combinations:,} combinations of {_and(differ)}"] if combinations else []
+    parts += [f"{combinations:,} combination{'s' * (combinations > 1)} of {_and(differ)}"] if combinations else []
     sentences += [f"Not drawn: {_and(parts)}."] if parts else []
     return sentences, drawn
 
