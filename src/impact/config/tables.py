@@ -7,6 +7,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import field
 from fnmatch import fnmatchcase
+from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar, cast, get_args
 
@@ -409,15 +410,19 @@ def law_quantities(law: ForceModel | FrictionLaw) -> dict[str, Quantity]:
     }
 
 
-def parameter_table(law: ForceModel | FrictionLaw) -> type[Table]:
-    """Create the type of [model.KEY] or [friction.KEY]; keys are aliases, as not every name can name a field."""
+def _parameter_table(law: ForceModel | FrictionLaw) -> ParameterTable:
     defaults = {parameter.name: parameter.default for parameter in law.parameters}
-    fields: dict[str, Any] = {}
-    for index, (name, quantity) in enumerate(law_quantities(law).items()):
-        kind = Annotated[Any, _words(quantity)] if quantity.words else Annotated[Numbers | None, quantity]
-        fields[f"field_{index}"] = (Annotated[kind, Field(alias=name)], defaults.get(name))
     # a contact force and a friction law may have one key
     name = law.key if isinstance(law, ForceModel) else f"friction_{law.key}"
+    return name, tuple((key, quantity, defaults.get(key)) for key, quantity in law_quantities(law).items())
+
+
+def _table_type(name: str, parameters: Iterable[tuple[str, Quantity, float | None]]) -> type[Table]:
+    """Create the type of [model.KEY] or [friction.KEY]; keys are aliases, as not every name can name a field."""
+    fields: dict[str, Any] = {}
+    for index, (key, quantity, default) in enumerate(parameters):
+        kind = Annotated[Any, _words(quantity)] if quantity.words else Annotated[Numbers | None, quantity]
+        fields[f"field_{index}"] = (Annotated[kind, Field(alias=key)], default)
     return create_model(name, __base__=Table, **fields)
 
 
@@ -477,6 +482,15 @@ class Document(Table):
     friction: Any = None
 
 
+# tables of the parameters of laws, and what the keys that choose the laws, `models` and `frictions`, contain
+LAW_TABLES = {
+    "model": 'models by name, "all", "family:NAME" or a pattern; after "!" those left out',
+    "friction": "friction laws, as models: each model is paired with each of them",
+}
+# the name of a table of parameters, and of each parameter the key, quantity and default
+ParameterTable = tuple[str, tuple[tuple[str, Quantity, float | None], ...]]
+
+
 def laws_of(table: str, models: Mapping[str, ForceModel]) -> Mapping[str, ForceModel | FrictionLaw]:
     """The laws whose parameters the table [model] or [friction] of a config may have, by key."""
     return frictions() if table == "friction" else models
@@ -486,27 +500,39 @@ def document_type(
     models: Mapping[str, ForceModel], with_tables: Mapping[str, Iterable[str]] | None = None
 ) -> type[Document]:
     """Build the type of a whole config, in which some laws, by default all, have a table of parameters."""
+    laws_of_tables = [(name, laws_of(name, models)) for name in LAW_TABLES]
+    tables = (
+        tuple(
+            (key, _parameter_table(laws[key]))
+            for key in (with_tables[name] if with_tables else laws)
+            if key in laws
+        )
+        for name, laws in laws_of_tables
+    )
+    return _document_type(tuple(_law_names(laws) for _, laws in laws_of_tables), tuple(tables))
+
+
+# a point of a result has the config of its sweep, and so have the points of a page of figures
+@lru_cache(maxsize=32)
+def _document_type(
+    names: tuple[tuple[str, ...], ...], tables: tuple[tuple[tuple[str, ParameterTable], ...], ...]
+) -> type[Document]:
+    """Build it from the words that choose laws, and the tables of parameters by key, for each of LAW_TABLES."""
     for table in (Sweep, MaterialTable, Data, Design):
         # built once; the type of each config then contains it
         table.model_rebuild()
     fields: dict[str, Any] = {}
-    descriptions = {
-        "model": 'models by name, "all", "family:NAME" or a pattern; after "!" those left out',
-        "friction": "friction laws, as models: each model is paired with each of them",
-    }
-    for name, description in descriptions.items():
-        laws = laws_of(name, models)
-        keys = laws if with_tables is None else [key for key in with_tables[name] if key in laws]
+    for (name, description), words, parameters_of in zip(LAW_TABLES.items(), names, tables, strict=True):
         columns: dict[str, Any] = {
-            f"field_{index}": (Annotated[parameter_table(laws[key]), Field(alias=key)], None)
-            for index, key in enumerate(keys)
+            f"field_{index}": (Annotated[_table_type(*parameters), Field(alias=key)], None)
+            for index, (key, parameters) in enumerate(parameters_of)
         }
         meaning = f"Parameters of {'friction laws' if name == 'friction' else 'models'}, by key."
-        parameters = create_model(name, __base__=Table, __doc__=meaning, **columns)
-        selection = PlainValidator(_select_laws, json_schema_input_type=_law_names(laws))
+        parameters_type = create_model(name, __base__=Table, __doc__=meaning, **columns)
+        selection = PlainValidator(_select_laws, json_schema_input_type=_selection_type(words))
         default = ... if name == "model" else ()
         fields[f"{name}s"] = Annotated[Any, selection, Field(description=description)], default
-        fields[name] = parameters, Field(default_factory=parameters)
+        fields[name] = parameters_type, Field(default_factory=parameters_type)
     return create_model("config", __base__=Document, **fields)
 
 
@@ -551,10 +577,14 @@ def schema(output: str | Path | None = None, *, overwrite: bool = False) -> dict
     return content
 
 
-def _law_names(laws: Mapping[str, ForceModel | FrictionLaw]) -> Any:
-    """Create the type of names of laws: keys, "all", families, patterns, and after "!" those left out."""
+def _law_names(laws: Mapping[str, ForceModel | FrictionLaw]) -> tuple[str, ...]:
+    """List the words that choose laws: keys, "all" and families."""
     families = {f"family:{law.family}" for law in laws.values() if isinstance(law, ForceModel) and not law.same_as}
-    words = (*laws, "all", *sorted(families))
+    return (*laws, "all", *sorted(families))
+
+
+def _selection_type(words: tuple[str, ...]) -> Any:
+    """Create the type of a choice of laws: words, patterns, and after "!" those left out."""
     # a pattern contains *, ? or [; no key begins with "!", and "family:" takes no pattern
     pattern = r"(?!!|family:).*[*?\[]"
     name: Any = Literal[words] | Annotated[str, Field(pattern=f"^{pattern}")]

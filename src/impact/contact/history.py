@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,9 +23,9 @@ from .impacts import Impacts
 from .model import ForceModel
 from .rigid import ObliqueImpacts
 from .simulate import integrate_phases
-from .slip_motion import LEAST_S, SLIP_ROW, TIME_ROW, SlipPhase
+from .slip_motion import LEAST_S, SLIP_ROW, TIME_ROW
 from .status import Status
-from .tangential import record_friction, simulate_friction
+from .tangential import RecordedSlip, record_friction, simulate_friction
 from .velocity_coordinates import is_strong
 
 # points at which a step is sampled, and Gauss points by which it is integrated
@@ -150,13 +150,13 @@ def integrate_slip(
         values = {**dimensionless_values(model, impacts), **friction_values(pair, oblique)}
     values = {name: np.broadcast_to(value, 1) for name, value in values.items()}
     recorded = record_friction(pair, float(impacts.n[0]), values, rtol=rtol, max_steps=max_steps)
-    steps = [(part.phase, step) for part in recorded for step in part.steps]
-    grid = times if times is not None or not steps else _slip_times([step for _, step in steps])
+    steps = tuple(step for part in recorded for step in part.steps)
+    grid = times if times is not None or not steps else _slip_times(recorded)
     history = integrate_history(model, impacts, rtol=rtol, max_steps=max_steps, times=grid)
     if history is None:
         return None, None
     if steps:
-        return history, _slip_history(history, pair, oblique, steps)
+        return history, _slip_history(history, pair, oblique, recorded)
     status = np.full(1, Status.OK, np.int8)
     result = simulate_friction(pair, impacts.n, values, status, rtol=rtol, max_steps=max_steps)
     # without slip or friction nothing is integrated
@@ -164,33 +164,36 @@ def integrate_slip(
     return history, _coulomb_history(history, oblique, bool(values[LIMIT_POSITIVE][0]), impulse)
 
 
-def _slip_times(steps: Sequence[Step]) -> Array:
+def _slip_times(recorded: Sequence[RecordedSlip]) -> Array:
     """Sample the times of joint steps in the contact's own unit."""
-    samples = zip(steps, _fractions(tuple(steps)), strict=True)
-    times: Array = np.array([step.at(theta)[TIME_ROW, 0] for step, within in samples for theta in within])
-    return np.maximum.accumulate(times)
+    steps = [step for part in recorded for step in part.steps]
+    numbers, fractions = _fractions(steps)
+    return np.maximum.accumulate(Step.each(steps, numbers).at(fractions)[TIME_ROW])
 
 
 def _slip_history(
-    history: History, pair: Pair, oblique: ObliqueImpacts, steps: Sequence[tuple[SlipPhase, Step]]
+    history: History, pair: Pair, oblique: ObliqueImpacts, recorded: Sequence[RecordedSlip]
 ) -> SlipHistory:
     """Find slip and friction of an impact over the times of its history, from the steps of the joint motion."""
     impacts, g0 = oblique.impacts, oblique.slip.item()
     unit_t = (impacts.length / impacts.v0).item()
-    times = history.t / unit_t
-    fractions = _fractions_at(tuple(step for _, step in steps), times, TIME_ROW)
-    rows: list[tuple[float, float, float]] = []
-    with np.errstate(all="ignore"):
-        for (phase, step), within in zip(steps, fractions, strict=True):
-            mode = phase.columns(step.params).mode.item()
-            for theta in within:
-                y = step.at(theta)
-                # at first contact smooth time stands still
-                y[0] = np.where(np.abs(y[0]) < LEAST_S, LEAST_S, y[0])
-                k = phase.rates(y[:TIME_ROW], step.params)
-                slip = y[SLIP_ROW].item()
-                rows.append((slip, -(k[SLIP_ROW] / k[TIME_ROW]).item(), mode if mode else 0.0))
-    slip, force, mode = np.array(rows).T
+    numbers, fractions = _fractions_at(
+        [step for part in recorded for step in part.steps], history.t / unit_t, TIME_ROW
+    )
+    rows: list[Array] = []
+    first = 0
+    for part in recorded:
+        within = (numbers >= first) & (numbers < first + len(part.steps))
+        samples = Step.each(part.steps, numbers[within] - first)
+        y = samples.at(fractions[within])
+        # at first contact smooth time stands still
+        y[0] = np.where(np.abs(y[0]) < LEAST_S, LEAST_S, y[0])
+        with np.errstate(all="ignore"):
+            k = part.phase.rates(y[:TIME_ROW], samples.params)
+            mode = part.phase.columns(samples.params).mode
+            rows.append(np.array([y[SLIP_ROW], -k[SLIP_ROW] / k[TIME_ROW], np.where(mode, mode, 0.0)]))
+        first += len(part.steps)
+    slip, force, mode = np.concatenate(rows, axis=1)
     if pair.friction.kind == "regularized":
         mode = np.sign(slip)
     return SlipHistory(g0 * slip, oblique.m_t.item() * g0 / unit_t * force, (np.sign(g0) * mode).astype(np.int8))
@@ -230,43 +233,47 @@ def _phase(
     law: motion.MotionLaw, problem: Problem, steps: tuple[Step, ...], params: Params, times: Array | None
 ) -> _Phase:
     """Sample the interpolant of a phase, and integrate force and power over it by Gauss points."""
+
+    def sample(step: Step, fractions: Array) -> tuple[Array, Array]:
+        y = step.at(fractions)
+        return y, problem.rates(y[:2], tuple(np.broadcast_to(column, fractions.shape) for column in params))
+
+    numbers, fractions = _fractions(steps) if times is None else _fractions_at(steps, times)
+    y, rates = sample(Step.each(steps, numbers), fractions)
     nodes, weights = np.polynomial.legendre.leggauss(GAUSS_POINTS)
-    rows: list[Array] = []
-    impulse, work = [], []
-    fractions = _fractions(steps) if times is None else _fractions_at(steps, times)
-    for step, within in zip(steps, fractions, strict=True):
-        for theta in within:
-            y = step.at(theta)
-            rates = problem.rates(y[:2], params)
-            rows.append(np.array([y[2], motion.indentation(law, y[0]), law.velocity(y, params), rates[4]]))
-        for node, weight in zip(nodes, weights, strict=True):
-            rates = problem.rates(step.at(step.end * 0.5 * (1.0 + node))[:2], params)
-            share = 0.5 * weight * (step.end * step.length)[0]
-            impulse.append(share * (rates[4] * rates[2])[0])
-            work.append(share * rates[3][0])
-    t, x, v, force = np.array(rows).reshape(-1, 4).T
-    return _Phase(t, x, v, force, math.fsum(impulse), math.fsum(work))
+    samples = Step.each(steps, np.repeat(np.arange(len(steps)), GAUSS_POINTS))
+    _, inside = sample(samples, samples.end * 0.5 * (1.0 + np.tile(nodes, len(steps))))
+    share = 0.5 * np.tile(weights, len(steps)) * (samples.end * samples.length)
+    return _Phase(
+        t=y[2],
+        x=motion.indentation(law, y[0]),
+        v=law.velocity(y, params),
+        F=rates[4],
+        impulse=math.fsum(share * (inside[4] * inside[2])),
+        work=math.fsum(share * inside[3]),
+    )
 
 
-def _fractions(steps: tuple[Step, ...]) -> list[Array]:
-    """Make uniform fractions of each step, and the end of the last step."""
-    inner = np.arange(SAMPLES_PER_STEP) / SAMPLES_PER_STEP
-    return [step.end * (inner if step is not steps[-1] else np.append(inner, 1.0)) for step in steps]
+def _fractions(steps: Sequence[Step]) -> tuple[NDArray[np.intp], Array]:
+    """Make uniform fractions of each step, and the end of the last step; returns their steps' numbers, too."""
+    numbers = np.append(np.repeat(np.arange(len(steps)), SAMPLES_PER_STEP), len(steps) - 1)
+    inner = np.tile(np.arange(SAMPLES_PER_STEP) / SAMPLES_PER_STEP, len(steps))
+    ends = np.array([step.end[0] for step in steps])
+    return numbers, ends[numbers] * np.append(inner, 1.0)
 
 
-def _fractions_at(steps: tuple[Step, ...], times: Array, time_row: int = 2) -> list[Array]:
-    """Compute the fractions of each step at which the interpolated time equals one of the increasing times."""
-    ends = np.array([step.at(step.end)[time_row, 0] for step in steps])
-    step_of_time = np.minimum(np.searchsorted(ends, times), len(steps) - 1)
-    # the row of the time of all steps at once, one column for each time
-    start = np.array([step.start[time_row, 0] for step in steps])[step_of_time]
-    length = np.array([step.length[0] for step in steps])[step_of_time]
-    stages = np.array([step.stages[:, time_row, 0] for step in steps])[step_of_time].T
-    low, high = np.zeros(len(times)), np.array([step.end[0] for step in steps])[step_of_time]
-    time_of = Step(start, length, stages, high).at
+def _fractions_at(steps: Sequence[Step], times: Array, time_row: int = 2) -> tuple[NDArray[np.intp], Array]:
+    """Compute where the interpolated time equals increasing times: the numbers of steps, and the fractions."""
+    whole = Step.each(steps, np.arange(len(steps)))
+    ends = whole.at(whole.end)[time_row]
+    numbers = np.minimum(np.searchsorted(ends, times), len(steps) - 1)
+    # the row of the time alone
+    samples = Step.each(steps, numbers)
+    time_of = replace(samples, start=samples.start[time_row], stages=samples.stages[:, time_row]).at
+    low, high = np.zeros(len(times)), samples.end
     # the time grows with the fraction: bisect to the last bit
     for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
         is_early = time_of(middle) < times
         low, high = np.where(is_early, middle, low), np.where(is_early, high, middle)
-    return np.split(high, np.searchsorted(step_of_time, np.arange(1, len(steps))))
+    return numbers, high

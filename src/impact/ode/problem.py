@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Protocol
@@ -113,6 +113,16 @@ class Step:
             target[: len(stage)] = stage[: len(start)]
         params = tuple(np.array(column) for column in params)
         return cls(start.copy(), length, rows, np.ones(1), params)
+
+    @classmethod
+    def each(cls, steps: Sequence[Step], numbers: NDArray[np.intp]) -> Step:
+        """Choose steps of a single trajectory by their numbers (n,), to interpolate them at once."""
+        start, length, stages, end = (
+            np.concatenate([getattr(step, name) for step in steps], axis=-1)[..., numbers]
+            for name in ("start", "length", "stages", "end")
+        )
+        columns = zip(*(step.params for step in steps), strict=True)
+        return cls(start, length, stages, end, tuple(np.concatenate(column)[numbers] for column in columns))
 
     def at(self, theta: float | Array) -> Array:
         """Interpolate the integrated rows (rows, n) at a fraction of the step, with order four."""
