@@ -497,11 +497,11 @@ def test_a_figure_without_stored_values_is_left_out() -> None:
     assert "The figure final-velocities is left out: this result has no v1_post" in text
 
 
-def test_a_result_without_status_or_in_another_order_has_a_page(wide: xr.Dataset) -> None:
-    bare = build(wide.drop_vars(["status", "in_domain"]))
+def test_a_result_without_status_or_in_another_order_has_a_page(pages: dict[str, str], wide: xr.Dataset) -> None:
+    bare = build(wide.drop_vars(["status", "in_domain"]).transpose())
     assert "The models are not ranked: this result has no status" in bare
     assert "The result does not contain the status of the points." in bare
-    assert figures(bare) == figures(build(wide.transpose()))
+    assert figures(bare) == figures(pages["wide"])
 
 
 def test_a_time_history_is_refused() -> None:
