@@ -416,7 +416,9 @@ def main() -> None:
     args = parser.parse_args()
     if not args.oblique_only:
         central_rates(args)
-    count, loop, rounds = max(args.impacts // 60, 1), max(args.loop // 3, 1), max(args.rounds // 3, 1)
+    # whole blocks, as nearly all of a long sweep are
+    blocks = max(args.impacts // (60 * RANGE_TRAJECTORIES), 1)
+    count, loop, rounds = blocks * RANGE_TRAJECTORIES, max(args.loop // 3, 1), max(args.rounds // 3, 1)
     title = f"oblique: {count:,} impacts, loop: {loop}, {rounds} rounds, {os.cpu_count()} cores"
     head = ("pair", "engine", "rtol", "error of beta", "trajectories/s", "per normal", "min", "max")
     rates = Table(*head, "per loop", "min", "max", box=None)

@@ -513,12 +513,14 @@ class SlipPhase:
     def rates_of_margins(self, y: Array, k: Array, params: Params) -> Array:
         """Compute the rates of the margins by central difference quotients, see `Switch`."""
         small = RATE_OF_SLIP_STEP * np.clip(np.abs(y[0]), MIN_REACH, 1.0)
-        behind, ahead = (y[:N_COMPONENTS] + step * k[:N_COMPONENTS] for step in (-small, small))
-        rise = self.margins(ahead, self.rates(ahead, params), params)[0]
-        rise = rise - self.margins(behind, self.rates(behind, params), params)[0]
+        y, step = y[:N_COMPONENTS], small * k[:N_COMPONENTS]
+        # behind and ahead at once: there are few trajectories here, and each call has its cost
+        beside = np.concatenate([y - step, y + step], axis=1)
+        params = tuple(np.concatenate([column, column]) for column in params)
+        behind, ahead = np.split(self.margins(beside, self.rates(beside, params), params)[0], 2, axis=1)
         # at first contact and at the release the formulas are smooth on one side only
-        is_smooth = (y[0] > 2.0 * small) & ~self._crosses(ahead, params) & ~self._crosses(behind, params)
-        return np.where(is_smooth, rise / (2.0 * small), np.nan)
+        crosses = self._crosses(beside, params).reshape(2, -1).any(axis=0)
+        return np.where((y[0] > 2.0 * small) & ~crosses, (ahead - behind) / (2.0 * small), np.nan)
 
     def change(self, which: NDArray[np.intp], y: Array, k: Array, params: Params) -> tuple[Array, Params]:
         """Change the modes and signs of trajectories where margins vanish, see `Switch`."""

@@ -74,13 +74,17 @@ def _locate(
     margins, before = all_margins[:, positions], state.margins[0][:, positions]
     h, h_next = state.h[positions], trial.h_next[positions]
     changes = np.abs(margins - before) > LARGE_CHANGE * np.maximum(np.abs(margins), np.abs(before))
-    for rates, y, k in ((all_rates, trial.y, trial.k), (state.margins[1], state.y, state.k)):
-        # kept, since the end of a step is the start of the next one
-        at = positions[(changes & np.isnan(rates[:, positions])).any(axis=0)]
-        if at.size:
-            params = tuple(column[at] for column in state.params)
-            exact = switch.rates_of_margins(y[:, at], k[:, at], params)
-            rates[:, at] = np.where(np.isnan(rates[:, at]), exact, rates[:, at])
+    # kept, since the end of a step is the start of the next one
+    kept = (all_rates, state.margins[1])
+    end, start = (positions[(changes & np.isnan(rates[:, positions])).any(axis=0)] for rates in kept)
+    at = np.concatenate([end, start])
+    if at.size:
+        params = tuple(column[at] for column in state.params)
+        y = np.concatenate([trial.y[:, end], state.y[:, start]], axis=1)
+        k = np.concatenate([trial.k[:, end], state.k[:, start]], axis=1)
+        exact = switch.rates_of_margins(y, k, params)
+        for rates, where, values in zip(kept, (end, start), np.split(exact, [end.size], axis=1), strict=True):
+            rates[:, where] = np.where(np.isnan(rates[:, where]), values, rates[:, where])
     slopes, slopes_before = all_rates[:, positions], state.margins[1][:, positions]
     secant, unknown = (margins - before) / h, np.isnan(slopes)
     slopes = np.where(unknown, secant, slopes)
