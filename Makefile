@@ -34,7 +34,7 @@ test: $(VENV)/dev  ## run the tests
 	$(BIN)/python -m pytest -n auto --dist worksteal
 
 test-faults: $(VENV)/dev  ## run the fault-injection tests and the slow tests, and print their summaries
-	$(BIN)/python -m pytest -n auto --dist worksteal -m 'faults or slow' -rP --durations=40 tests
+	$(BIN)/python -m pytest -n auto --dist worksteal -m '(faults or slow) and not long' -rP --durations=40 tests
 
 test-long: $(VENV)/dev  ## kill sweeps at every file operation, compare thousands of slips with the slow reference, fit friction
 	$(BIN)/python -m pytest -n auto --dist worksteal -m long tests

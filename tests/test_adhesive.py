@@ -31,6 +31,7 @@ def sticking_speed(impacts: Impacts) -> float:
     return float(np.sqrt(14.18 / impacts.m[0]) * (GAMMA**5 * R**4 / E**2) ** (1 / 6))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("key", "parameters", "speeds"),
     [

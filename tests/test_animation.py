@@ -76,6 +76,7 @@ def test_the_command_writes_an_animation_of_a_history(
         assert getattr(picture, "n_frames", 1) == (4 if suffix == "gif" else 1)
 
 
+@pytest.mark.slow
 def test_only_an_animation_is_a_gif(single: impact.Impact, cli: Run, tmp_path: Path) -> None:
     assert single.history is not None
     impact.save(single.history, tmp_path / "h.h5")

@@ -41,14 +41,9 @@ def test_a_config_says_what_its_baseline_was_swept_from(path: Path) -> None:
     assert tomllib.loads(config_of(path).read_text(encoding="utf-8")) == stored
 
 
-# all models, and all friction laws, take longer than all others; `make regress` repeats these baselines too
-SLOW = {"every_model", "frictions"}
-
-
-@pytest.mark.parametrize(
-    "path",
-    [pytest.param(p, id=p.stem, marks=[pytest.mark.slow] * (p.stem in SLOW)) for p in BASELINES],
-)
+# `make regress` repeats them, too, with the compiled core in CI
+@pytest.mark.slow
+@pytest.mark.parametrize("path", BASELINES, ids=lambda path: path.stem)
 def test_a_rerun_of_a_baseline_is_equal(path: Path) -> None:
     verdict = impact.rerun(path)
     assert verdict.equal, str(verdict)

@@ -62,6 +62,7 @@ def check_flips(path: Path, content: bytes, positions: Iterator[tuple[int, int]]
     impact.load(path)
 
 
+@pytest.mark.slow
 def test_each_of_many_random_flips_is_detected(good: Path, tmp_path: Path) -> None:
     content = good.read_bytes()
     check_flips(tmp_path / "flip.h5", content, flips(len(content), FLIPS, 1))

@@ -211,6 +211,7 @@ def test_a_calibration_with_specimens_is_repeated_from_its_file(cli: Run, tmp_pa
     assert cli("rerun", "fit.h5", cwd=tmp_path).returncode == 0
 
 
+@pytest.mark.slow
 def test_excess_without_specimens_says_that_points_repeat(cli: Run, tmp_path: Path) -> None:
     config = write_specimens(tmp_path)
     text = (tmp_path / "beads.csv").read_text(encoding="utf-8").replace(", specimen", "")
@@ -237,6 +238,7 @@ def test_a_rejected_law_and_its_largest_residuals_are_named(cli: Run, tmp_path: 
     assert 0.5 < float(re.search(r" e +([0-9.]+)", robust)[1]) < 0.51  # type: ignore[index]
 
 
+@pytest.mark.slow
 def test_the_table_has_the_numbers_of_the_result(cli: Run, tmp_path: Path) -> None:
     fit = impact.calibrate(write_specimens(tmp_path)).isel(model=0, parameter=0)
     row = next(line for line in cli("calibrate", tmp_path / "fit.toml").stdout.splitlines() if "anagno" in line)

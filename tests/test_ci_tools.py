@@ -230,6 +230,7 @@ def test_a_baseline_is_rewritten_only_if_it_differs(project: Path, entry_points:
     assert baseline.read_bytes() == b"no result"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("reason", ["", "tests/test_contact.py::test_config"])
 def test_the_option_needs_a_reason(project: Path, entry_points: Path, reason: str) -> None:
     done = run_pytest(project, entry_points, "--impact-bless", reason)

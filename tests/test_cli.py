@@ -115,6 +115,7 @@ def test_an_output_never_replaces_its_source(cli: Run, small: Path, tmp_path: Pa
     assert small.read_text(encoding="utf-8") == SMALL
 
 
+@pytest.mark.slow
 def test_failed_points_are_printed_and_change_the_exit_code(cli: Run, small: Path, tmp_path: Path) -> None:
     text = SMALL.replace("e = [0.0, 0.5, 1.0]", "alpha = [0.1, 2.0]")
     small.write_text(text, encoding="utf-8")
@@ -364,6 +365,7 @@ COMMANDS_AND_CODES = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("words", "code"), COMMANDS_AND_CODES)
 def test_a_full_standard_error_does_not_change_the_exit_code(
     forked: ForkServer, tmp_path: Path, words: list[str], code: int
@@ -472,6 +474,7 @@ def test_a_model_is_described_in_full(cli: Run) -> None:
             assert " ".join(text.split()) in " ".join(words)
 
 
+@pytest.mark.slow
 def test_common_materials_are_listed_with_units_and_sources(cli: Run) -> None:
     headings, *rows = cli("materials").stdout.splitlines()
     assert headings.split("  ")[0] == "material"

@@ -79,7 +79,7 @@ def test_a_scheduler_by_address_or_file_and_a_local_cluster_give_the_same_file(
         assert sorted(path.name for path in running.folder.iterdir()) == ["c.toml", "results.h5"]
 
 
-@pytest.mark.parametrize("count", [1, 4, 8])
+@pytest.mark.parametrize("count", [4, *(pytest.param(count, marks=pytest.mark.long) for count in (1, 8))])
 def test_a_killed_worker_changes_nothing(
     cluster: DaskCluster, tmp_path: Path, expected: bytes, count: int
 ) -> None:
@@ -90,7 +90,7 @@ def test_a_killed_worker_changes_nothing(
     assert running.content == expected
 
 
-@pytest.mark.parametrize("count", [1, 7])
+@pytest.mark.parametrize("count", [7, pytest.param(1, marks=pytest.mark.long)])
 def test_new_workers_continue_after_all_were_killed(
     cluster: DaskCluster, tmp_path: Path, expected: bytes, count: int
 ) -> None:
@@ -103,7 +103,7 @@ def test_new_workers_continue_after_all_were_killed(
     assert running.content == expected
 
 
-@pytest.mark.parametrize("count", [1, 7])
+@pytest.mark.parametrize("count", [1, pytest.param(7, marks=pytest.mark.long)])
 def test_a_sweep_is_resumed_without_its_killed_scheduler(
     cluster: DaskCluster, tmp_path: Path, expected: bytes, count: int
 ) -> None:

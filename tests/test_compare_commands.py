@@ -139,6 +139,7 @@ def _is_clean(done: CompletedCommand) -> bool:
 # five formats
 
 
+@pytest.mark.slow
 def test_equal_in_five_formats(forked: ForkServer, folder: Path) -> None:
     outputs = {}
     for name in FORMATS:
@@ -200,6 +201,7 @@ def test_different_in_five_formats(forked: ForkServer, folder: Path) -> None:
     assert _github(outputs["github"]) == [("error", "base.h5", f"{headline}\n{missing}\n{WORST}\n{replay}")]
 
 
+@pytest.mark.slow
 def test_github_gets_one_annotation_with_the_worst_three(
     forked: ForkServer, figure6: xr.Dataset, folder: Path, tmp_path: Path
 ) -> None:
@@ -224,15 +226,9 @@ def test_github_gets_one_annotation_with_the_worst_three(
     assert "and 2 more" in lines
 
 
-# each kind of file in a format, and each format with a file; the other pairs are slow
-@pytest.mark.parametrize(
-    ("name", "format"),
-    [
-        pytest.param(name, format, marks=[] if format == "json" or name == "damaged" else pytest.mark.slow)
-        for name in UNREADABLE
-        for format in FORMATS
-    ],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("format", FORMATS)
+@pytest.mark.parametrize("name", UNREADABLE)
 def test_an_unreadable_file_is_reported_in_every_format(
     forked: ForkServer, folder: Path, name: str, format: str
 ) -> None:
@@ -603,6 +599,7 @@ def test_bless_from_python(folder: Path, tmp_path: Path) -> None:
 # rerun
 
 
+@pytest.mark.slow
 def test_a_rerun_of_an_unchanged_result_is_equal(
     forked: ForkServer, folder: Path, many_axes: xr.Dataset, tmp_path: Path
 ) -> None:
@@ -623,6 +620,7 @@ def test_a_rerun_of_an_unchanged_result_is_equal(
     assert impact.load(tmp_path / "set.h5").attrs["rtol"] == 1e-4
 
 
+@pytest.mark.slow
 def test_a_rerun_finds_changed_numbers(forked: ForkServer, folder: Path) -> None:
     done = forked("rerun", "different.h5", cwd=folder)
     assert done.returncode == 1

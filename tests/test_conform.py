@@ -320,6 +320,7 @@ BAD_PROGRAMS = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", BAD_PROGRAMS)
 def test_a_program_that_does_not_speak_the_protocol_is_refused_in_one_line(
     text: str, cli: Run, tmp_path: Path

@@ -123,6 +123,7 @@ WRONG_LAWS = {
 
 
 # a force that raises is reported with its line
+@pytest.mark.slow
 @pytest.mark.filterwarnings(r"ignore:test_contract\.py.* IndexError:UserWarning")
 @pytest.mark.parametrize(("model", "clause"), WRONG_LAWS.values(), ids=WRONG_LAWS)
 def test_a_law_that_violates_a_clause_is_reported(model, clause):

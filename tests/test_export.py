@@ -151,6 +151,7 @@ def test_lammps_takes_the_moduli_of_both_types_of_two_materials() -> None:
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("key", "expected"),
     [
@@ -186,6 +187,7 @@ def test_liggghts_hooke_remarks_on_its_characteristic_velocity_and_on_attraction
     assert "limitForce on: the force is never negative" in limited
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("moduli", "expected"),
     [
@@ -221,6 +223,7 @@ def test_yade_gets_twice_the_spring_and_dashpot_of_the_contact_for_each_ball() -
 WALL = {"m2": math.inf, "R2": math.inf}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [code.name for code in CODES.values() if code.template])
 def test_a_script_with_a_wall_has_one_ball(name: str) -> None:
     """Each template has a wall, nothing that is infinite is written, and a wall is at rest."""
@@ -552,6 +555,7 @@ def test_a_release_with_text_that_would_be_code_is_refused(name: str) -> None:
             impact.export(name, at={"e": 0.6}, code_version=version)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CODES)
 def test_of_the_texts_of_a_caller_only_the_release_is_written(name: str) -> None:
     """Neither the title of a config, nor the name of a material; in the lines and in the script."""
@@ -693,6 +697,7 @@ def test_a_script_runs_until_two_contact_times_after_the_first_contact(code: str
         assert 3 + 2 * steps_per_contact <= int(steps) <= 3 + 3 * steps_per_contact
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("phase", "value"), list(enumerate(["nan", "inf", "-nan", "nan"])))
 def test_a_restitution_that_is_no_number_differs_at_any_phase(
     tmp_path: Path, predicted: tuple[float, ...], phase: int, value: str
@@ -706,6 +711,7 @@ def test_a_restitution_that_is_no_number_differs_at_any_phase(
     assert f"at the phase {(phase + 0.5) / 4} of dt" in verification.not_numbers
 
 
+@pytest.mark.slow
 def test_verify_exits_with_1_and_names_the_phase_of_a_restitution_that_is_no_number(
     cli: Run, tmp_path: Path, predicted: tuple[float, ...]
 ) -> None:
@@ -720,6 +726,7 @@ def test_verify_exits_with_1_and_names_the_phase_of_a_restitution_that_is_no_num
     assert (data["agrees"], data["rows"][1]["measured"]) == (False, None)
 
 
+@pytest.mark.slow
 def test_with_friction_only_two_balls_may_differ_by_the_turn_of_their_normal(tmp_path: Path) -> None:
     law, friction = "lammps-coeff-restitution-hooke", "lammps-linear-history"
     at = {"mu": 0.3, "angle": "40 deg", "v1": 1.0, "e": 0.8, "R1": 0.05, "K": 1e9, f"friction.{friction}.k_t": 1e9}
@@ -767,6 +774,7 @@ def test_a_code_without_a_scheme_that_measures_no_number_differs(tmp_path: Path)
     assert verification.not_numbers.startswith("at the phase 0.125 of dt")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("run", "message"),
     [
@@ -793,6 +801,7 @@ def test_a_script_that_fails_is_one_line(cli: Run, tmp_path: Path, run: str, mes
     assert done.memory < 500 * 2**20
 
 
+@pytest.mark.slow
 def test_a_script_that_does_not_end_is_stopped(tmp_path: Path) -> None:
     """With what a wrapper has started."""
     command = ["/bin/sh", "-c", "sleep 60 & echo $! > pid; wait"]
@@ -840,20 +849,8 @@ def test_the_step_that_is_recommended_is_small_enough_as_it_is_printed(cli: Run,
 EXAMPLES = examples_of("docs/export.md")
 
 
-# each takes a second
-QUICK_EXAMPLES = ("export --to lammps", "export --to mujoco")
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("command", "printed"),
-    [
-        pytest.param(
-            *example, id=example[0], marks=() if example[0].startswith(QUICK_EXAMPLES) else pytest.mark.slow
-        )
-        for example in EXAMPLES
-    ],
-)
+@pytest.mark.parametrize(("command", "printed"), [pytest.param(*example, id=example[0]) for example in EXAMPLES])
 def test_the_page_prints_what_the_commands_print(cli: Run, command: str, printed: str) -> None:
     done = cli(*shlex.split(command))
     assert_same_output(done.stdout + done.stderr, printed)
@@ -873,6 +870,7 @@ def test_the_page_has_an_example_of_each_code() -> None:
 OBLIQUE = {"mu": 0.3, "angle": "40 deg", "v1": 1.0, "e": 0.8, "m1": 1.0, "m2": math.inf, "R1": 0.05}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("friction", "parameters", "expected"),
     [
@@ -910,6 +908,7 @@ def test_the_tangential_stiffness_of_two_materials_is_a_number_in_lammps() -> No
     assert export.parameters["k_t"] == pytest.approx(8.0 * shear, rel=1e-14)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("key", "friction", "parameters", "expected"),
     [

@@ -84,6 +84,7 @@ def test_a_law_that_was_not_fitted_is_refused_with_those_that_were(cli: Run, fit
     assert impact.export("yade", source=fit, at={"v1": 1.0}, code_version="2012.01").model == "yade-en-pulling"
 
 
+@pytest.mark.slow
 def test_every_command_of_one_impact_takes_a_calibration(cli: Run, fit: Path) -> None:
     shot = impact.run(fit, at={"v1": 1.5})
     assert (shot.model.key, shot.point["v1"]) == ("kuwabara-kono-1987", 1.5)
@@ -121,6 +122,7 @@ def test_a_law_without_an_estimate_is_refused(fit: Path) -> None:
         impact.export("lammps", source=lost, code_version="22Jul2025")
 
 
+@pytest.mark.slow
 def test_laws_without_an_aicc_have_no_weight_and_none_is_named(tmp_path: Path) -> None:
     """Three points are too few for the correction of AICc with a parameter and the scale of the noise."""
     few = {"columns": {name: values[:3] for name, values in DROPS["data"]["columns"].items()}, "noise": "scale"}

@@ -105,15 +105,9 @@ EXTENSIONS = {
 }
 
 
-# each extension is quick in one layout
-@pytest.mark.parametrize(
-    ("extension", "layout"),
-    [
-        pytest.param(name, layout, marks=() if (index + shift) % 2 else pytest.mark.slow)
-        for shift, layout in enumerate((FULL, FACTORED))
-        for index, name in enumerate(EXTENSIONS)
-    ],
-)
+@pytest.mark.slow
+@BOTH_LAYOUTS
+@pytest.mark.parametrize("extension", EXTENSIONS)
 def test_an_extended_result_equals_a_single_sweep(
     stored_sweep: StoredSweep, tmp_path: Path, layout: str, extension: str
 ) -> None:
@@ -147,6 +141,7 @@ def test_the_command_prints_how_many_trajectories_are_new(cli: Run, stored_sweep
         assert dict(impact.load(path).sizes) == {"model": 2, "e": 3, "v1": 2}
 
 
+@pytest.mark.slow
 @BOTH_LAYOUTS
 def test_axes_that_vary_together_are_extended_together(
     stored_sweep: StoredSweep, tmp_path: Path, layout: str
@@ -177,6 +172,7 @@ def test_materials_are_extended_and_chosen_whatever_their_names(stored_sweep: St
     assert point["contact_time"] == larger["contact_time"].sel(model="kelvin-voigt", e=0.6, m1=2.0)[1].item()
 
 
+@pytest.mark.slow
 def test_an_extension_replaces_the_result_and_can_be_extended_again(
     stored_sweep: StoredSweep, tmp_path: Path
 ) -> None:
@@ -263,15 +259,14 @@ def test_a_part_of_a_result_and_a_history_are_not_extended(stored_sweep: StoredS
         impact.extend(tmp_path / "no.h5", ["sweep.m2=[3.0]"])
 
 
+@pytest.mark.slow
 @BOTH_LAYOUTS
 @pytest.mark.parametrize(
     ("before", "more"),
     [
         (["sweep.v1=-1.0"], "sweep.v1=[-1.0, 1.0]"),
-        pytest.param(["sweep.K=1e-300", "sweep.v1=1.0"], "sweep.K=[1e-300, 1e9]", marks=pytest.mark.slow),
-        pytest.param(
-            ["sweep.v1=1.0", "sweep.m2=inf", "sweep.m1=inf"], "sweep.m2=[inf, 1.0]", marks=pytest.mark.slow
-        ),
+        (["sweep.K=1e-300", "sweep.v1=1.0"], "sweep.K=[1e-300, 1e9]"),
+        (["sweep.v1=1.0", "sweep.m2=inf", "sweep.m1=inf"], "sweep.m2=[inf, 1.0]"),
     ],
     ids=["speed", "stiffness", "mass"],
 )

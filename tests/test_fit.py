@@ -173,6 +173,7 @@ def test_as_many_points_as_parameters_are_too_few() -> None:
     assert np.isnan(result.aicc)
 
 
+@pytest.mark.slow
 def test_a_fit_does_not_depend_on_the_others() -> None:
     random = np.random.default_rng(10)
     problems = [

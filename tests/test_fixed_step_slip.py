@@ -101,6 +101,7 @@ def test_kratos_delivered_these_velocities(
     assert delivered == pytest.approx(expected, rel=1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::impact.ImpactWarning")
 @pytest.mark.parametrize(("friction", "model", "values", "expected"), BY_LAMMPS)
 def test_lammps_delivered_these_velocities(

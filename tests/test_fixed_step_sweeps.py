@@ -95,6 +95,7 @@ def test_a_sweep_gives_what_timestep_predicts(model: str) -> None:
         np.testing.assert_allclose(e.max("phase"), [row.e_largest for row in rows], rtol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", [scheme for scheme in SCHEMES if scheme != "mujoco-cone"])
 def test_small_steps_give_every_variable_of_the_continuous_law(scheme: str) -> None:
     law = {"kick-drift": LINEAR, "drake-tamsi": "exact-hysteresis"}.get(scheme, f"{LINEAR}-no-tension")

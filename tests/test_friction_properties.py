@@ -151,6 +151,7 @@ KHARAZ = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 def test_the_measurements_of_kharaz_gorham_and_salman() -> None:
     """Where the ball slides, all laws agree with the experiment; a spring does so from 30 degrees on."""
     springs = ("lammps-mindlin", "lammps-mindlin-force", "lammps-mindlin-rescale", "lammps-mindlin-rescale-force")

@@ -87,6 +87,7 @@ def wrong_counts(result: TangentialResult, row: int, outcome: Outcome, friction:
     return wrong + (["slip_changes"] if result.slip_changes[row] != outcome.slip_changes else [])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("key", COMBINATIONS)
 def test_random_cases(key: str) -> None:
     # of two models, which are others for each law

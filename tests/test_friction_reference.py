@@ -125,6 +125,7 @@ def test_pulling_empties_the_spring_at_zero_force(positive: bool, expected: floa
     assert beta(to_force, 1.0) == pytest.approx(-math.cos(w * t_zero), abs=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kappa", [0.7, 4.0])
 @pytest.mark.parametrize("memory", [(0, 0), (1, 1), (0, 1), (1, 2)])
 @pytest.mark.parametrize("normal", [ELASTIC, HERTZ])

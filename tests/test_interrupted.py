@@ -75,6 +75,7 @@ def check_refused(sweeps: SweepServer, folder: Path, *words: str | int, message:
 # ---- a path in the way of the work folder or of the result
 
 
+@pytest.mark.slow
 def test_a_leftover_work_folder_is_not_changed_without_a_flag(sweeps: SweepServer) -> None:
     folder = sweeps.run_killed_at(sweeps.find_operation("create", f"{WORK}/block.part"))
     for flag in ("--resume", "--overwrite"):
@@ -113,6 +114,7 @@ def is_link_to_nothing(path: Path) -> None:
     path.symlink_to("nowhere")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("make", [is_fifo, is_link, is_link_to_a_folder, is_link_to_nothing, is_text])
 def test_a_path_that_is_not_a_work_folder_is_not_changed(
     sweeps: SweepServer, make: Callable[[Path], None]
@@ -131,6 +133,7 @@ def test_a_folder_with_other_files_is_not_changed(sweeps: SweepServer) -> None:
         check_refused(sweeps, folder, *words, message=WORK)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("make", "name"),
     [
@@ -157,6 +160,7 @@ def test_an_unexpected_file_in_a_work_folder_is_replaced_or_reported_in_one_line
         assert completed.returncode or digest(folder / RESULT) == sweeps.expected_digest(folder)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("make", [is_folder, is_fifo, is_link, is_link_to_nothing, is_text])
 def test_a_path_that_is_not_a_result_is_not_changed(sweeps: SweepServer, make: Callable[[Path], None]) -> None:
     folder = sweeps.folder()
@@ -277,6 +281,7 @@ def test_a_block_with_a_flipped_bit_is_integrated_again(sweeps: SweepServer, cou
     report.check()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "lost_blocks"),
     [
@@ -311,13 +316,14 @@ def start_stopped(
     return running
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "words"),
     [
         (CONFIG_TEXT, ("write", f"{WORK}/block.part")),
         (CONFIG_TEXT, ("write", f"{RESULT}.part")),
-        pytest.param(CONFIG_TEXT, ("rename", f"{WORK}/block.part"), marks=pytest.mark.slow),
-        pytest.param(FACTORED_CONFIG, ("write", f"{RESULT}.part"), marks=pytest.mark.slow),
+        (CONFIG_TEXT, ("rename", f"{WORK}/block.part")),
+        (FACTORED_CONFIG, ("write", f"{RESULT}.part")),
     ],
 )
 def test_the_second_sweep_on_an_output_ends_at_once(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -356,24 +355,20 @@ def test_a_result_that_cannot_be_drawn_is_an_error_of_one_line(figure6: xr.Datas
     )
 
 
-def slow(*values: object) -> Any:
-    """A variant that only the slow tests run."""
-    return pytest.param(*values, marks=pytest.mark.slow)
-
-
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "count", "width"),
     [
         ("map", 1, 7.1),
         ("map", 3, 3.3),
         ("validity", 7, 3.3),
-        slow("swapped", 12, 3.3),
-        slow("map", 1, 3.3),
-        slow("map", 3, 7.1),
-        slow("force", 7, 3.3),
-        slow("force", 7, 7.1),
-        slow("swapped", 12, 7.1),
-        slow("validity", 7, 7.1),
+        ("swapped", 12, 3.3),
+        ("map", 1, 3.3),
+        ("map", 3, 7.1),
+        ("force", 7, 3.3),
+        ("force", 7, 7.1),
+        ("swapped", 12, 7.1),
+        ("validity", 7, 7.1),
     ],
 )
 def test_texts_do_not_overlap(many: xr.Dataset, kind: str, count: int, width: float) -> None:
@@ -431,7 +426,8 @@ def test_only_the_last_row_and_the_first_column_have_tick_labels(many: xr.Datase
     assert named == [(False, True), *[(False, False)] * 2, (True, False), (True, True), *[(True, False)] * 2]
 
 
-@pytest.mark.parametrize("form", ["svg", pytest.param("pdf", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("form", ["svg", "pdf"])
 def test_a_map_of_many_points_is_stored_as_an_image(many: xr.Dataset, tmp_path: Path, form: str) -> None:
     plane = many[["e_error"]].isel(model=[0], m2=0)
     fine = plane.interp(e=np.linspace(0.1, 1.0, 210), v1=np.linspace(0.1, 10.0, 100))

@@ -219,6 +219,7 @@ def swept(tmp_path_factory: pytest.TempPathFactory) -> dict[str, xr.Dataset]:
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("layout", "output", "target"),
     [
@@ -253,6 +254,7 @@ def test_pairs_are_ranked_by_their_distance_from_the_target(
         assert bool(law.parameters) == (law.friction == "lammps-mindlin")
 
 
+@pytest.mark.slow
 def test_the_ranking_by_e_error_has_no_word_of_friction(swept: dict[str, xr.Dataset], cli: Run) -> None:
     path = swept["factored"].encoding["source"]
     default = cli("recommend", path, "--json").stdout

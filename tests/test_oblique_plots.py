@@ -181,14 +181,8 @@ def test_the_spins_of_both_balls_are_drawn_where_both_turn(beads: xr.Dataset) ->
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("kind", "width"),
-    [
-        pytest.param(kind, width, marks=() if (index + shift) % 2 else pytest.mark.slow)
-        for shift, width in enumerate(("84mm", "double"))
-        for index, kind in enumerate(SHOWN)
-    ],
-)
+@pytest.mark.parametrize("kind", SHOWN)
+@pytest.mark.parametrize("width", ["84mm", "double"])
 def test_angles_are_in_degrees_and_texts_do_not_overlap(beads: xr.Dataset, kind: str, width: str) -> None:
     figure = draw(curves_of(beads, kind), Look(width=width))
     check_layout(figure)

@@ -154,6 +154,7 @@ def test_a_law_that_depends_on_the_speed_has_a_trajectory_for_each_angle_of_a_re
 # ---- the same bits, in any way
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("layout", LAYOUTS)
 def test_both_layouts_have_the_bits_of_the_sweep(folder: Path, whole: xr.Dataset, layout: str) -> None:
     assert_same_bits(impact.load(folder / f"{layout}.h5"), whole)
@@ -206,15 +207,8 @@ EXTENSIONS = {
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("layout", "extension"),
-    [
-        # each extension is quick in one layout
-        pytest.param(layout, name, marks=() if (index + shift) % 2 else pytest.mark.slow)
-        for shift, layout in enumerate(LAYOUTS)
-        for index, name in enumerate(EXTENSIONS)
-    ],
-)
+@pytest.mark.parametrize("extension", EXTENSIONS)
+@pytest.mark.parametrize("layout", LAYOUTS)
 def test_an_extended_result_has_the_bits_of_the_whole_sweep(
     folder: Path, whole: xr.Dataset, layout: str, extension: str, tmp_path: Path
 ) -> None:
@@ -312,6 +306,7 @@ def test_compare_reports_a_changed_restitution(cli: Run, folder: Path, layout: s
     assert f"model=tsuji-1992, friction={SPRING}, angle=" in done.stdout
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::impact.ImpactWarning")
 @pytest.mark.parametrize("extreme", [1e-170, 1e160])
 def test_speeds_at_an_angle_are_checked_as_closing_speeds_are(extreme: float) -> None:

@@ -440,6 +440,7 @@ OVERDAMPED = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("formulas", "separating", "creeping"), OVERDAMPED.values(), ids=OVERDAMPED)
 def test_overdamped_user_laws_are_reported_as_not_separated(formulas, separating, creeping):
     texts = {"title": "", "year": 2026, "equation": "", "reference": ""}

@@ -58,6 +58,7 @@ def test_a_figure_marks_the_points_of_the_paper(figure: str) -> None:
         assert marks[name] == pytest.approx(point, rel=1e-7, abs=1e-12), name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("figure", MARKS)
 @pytest.mark.parametrize("width", [3.5, 7.1])
 def test_labels_of_marks_overlap_no_text_and_no_curve(figure: str, width: float) -> None:

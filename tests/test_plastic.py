@@ -373,6 +373,7 @@ def test_an_impact_alone_has_the_bits_that_it_has_in_a_batch(key):
             assert alone[name].tobytes() == contact[name][index : index + 1].tobytes()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("key", PLASTIC)
 def test_contact_time_and_work_of_a_phase_in_parts(key):
     impacts = with_parameters(find(key), table1_impacts(find(key).exponent or 1.5, v1=3.0), 0.3)

@@ -37,6 +37,7 @@ LIMIT, SMALL = "peak indentation above 10% of the smaller radius", "Hertz theory
 NO_IMPACT = "none of 4 points is an impact: v1 <= v2, the balls do not approach"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "notes"),
     [
@@ -94,6 +95,7 @@ def test_plausible_values_of_an_axis_give_no_note(tmp_path: Path) -> None:
     assert sweep_with_notes(text, tmp_path / "results.h5")[0] == []
 
 
+@pytest.mark.slow
 def test_an_implausible_modulus_of_an_axis_gives_a_note(tmp_path: Path) -> None:
     text = SWEEP.replace('E = "210 GPa"', 'E = ["70 GPa", 210]')
     notes, _ = sweep_with_notes(text, tmp_path / "results.h5", "sweep.e=0.5", "models=hertz")

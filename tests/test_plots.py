@@ -312,7 +312,8 @@ def test_an_axis_label_has_one_prefix_of_its_unit(coarse: xr.Dataset) -> None:
 
 
 # a width of 3.5 in is hardly more than 84 mm
-@pytest.mark.parametrize("width", ["84mm", 7.1, pytest.param("single", marks=pytest.mark.slow)], ids=str)
+@pytest.mark.slow
+@pytest.mark.parametrize("width", ["84mm", 7.1, "single"], ids=str)
 @pytest.mark.parametrize("kind", CURVES)
 def test_texts_do_not_overlap(plot_data_by_kind: dict[str, CurveData], kind: str, width: float | str) -> None:
     figure = draw(plot_data_by_kind[kind], Look(width))
@@ -342,17 +343,9 @@ def test_labels_of_bands_are_apart_and_inside_their_panel(
     assert min(wide.x0, narrow.x0) > panel.x1
 
 
-@pytest.mark.parametrize(
-    ("count", "width"),
-    [
-        # few and many entries, each in one width; the others are slow
-        pytest.param(
-            count, width, marks=() if (count, width) in ((1, "double"), (27, "single")) else pytest.mark.slow
-        )
-        for count in (1, 12, 27)
-        for width in WIDTHS
-    ],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize("count", [1, 12, 27])
 def test_a_legend_leaves_room_for_the_panel(many: xr.Dataset, count: int, width: str) -> None:
     figure = impact.plot(many, kind="restitution", models=many["model"].values[:count].tolist(), width=width)
     check_layout(figure)
@@ -374,6 +367,7 @@ def test_a_legend_without_room_names_the_number_of_missing_entries(many: xr.Data
     assert legend_share(figure) <= 0.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("count", "name"), [(3, "Hunt and Crossley (1975)"), (8, "hunt-crossley-1975")])
 def test_a_legend_takes_at_most_a_fifth_of_the_height_unless_names_are_chosen(
     many: xr.Dataset, count: int, name: str
@@ -389,6 +383,7 @@ def test_a_legend_takes_at_most_a_fifth_of_the_height_unless_names_are_chosen(
     assert names_of(impact.plot(many, **options))[2] == "Hunt and Crossley (1975)"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [(3.0, 3.5), (10.0, 8.0), (4.0, 6.0)])
 def test_a_figure_can_be_resized(plot_data_by_kind: dict[str, CurveData], size: tuple[float, float]) -> None:
     for kind in ("restitution", "history" if size[1] > 4.0 else "loop"):
@@ -397,6 +392,7 @@ def test_a_figure_can_be_resized(plot_data_by_kind: dict[str, CurveData], size: 
         check_layout(figure)
 
 
+@pytest.mark.slow
 def test_models_of_a_plot_differ_in_colour_and_marker(many: xr.Dataset) -> None:
     def looks(models: list[str]) -> list[tuple[object, ...]]:
         lines = impact.plot(many, kind="restitution", models=models).axes[0].lines
@@ -511,9 +507,8 @@ def test_an_unknown_name_or_value_is_an_error_with_the_known_ones(
 
 
 # PDF and EPS embed fonts, which takes seconds
-@pytest.mark.parametrize(
-    "form", ["png", "svg", *(pytest.param(form, marks=pytest.mark.slow) for form in ("pdf", "eps"))]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("form", ["png", "svg", "pdf", "eps"])
 def test_plots_are_files_of_their_format(coarse: xr.Dataset, tmp_path: Path, form: str) -> None:
     figure = impact.plot(coarse, kind="restitution", width="single")
     save_figure(figure, tmp_path / f"plot.{form}")
@@ -567,6 +562,7 @@ def test_a_pgf_file_is_a_picture_that_latex_typesets(coarse: xr.Dataset, tmp_pat
     assert (done.returncode, "Output written on paper.pdf (1 page" in done.stdout) == (0, True), done.stdout[-500:]
 
 
+@pytest.mark.slow
 def test_text_from_a_file_is_text(coarse: xr.Dataset, tmp_path: Path) -> None:
     odd = coarse.assign_attrs(title="$\\frac{1$ \x1b[31m \u202e $x$ " + "W" * 90)
     odd["title"] = ("model", ["$x^{$", "a_b$ $\\oops$", "[red]" + "W" * 60])
@@ -799,6 +795,7 @@ def test_wrong_points_are_an_error_of_one_line(
 # the command
 
 
+@pytest.mark.slow
 def test_the_table_of_a_plot_has_a_column_for_each_curve(cli: Run, coarse_file: Path, tmp_path: Path) -> None:
     words = ("plot", coarse_file, "--model", "gharib-hurmuzlu-2012", "--model", "lankarani-nikravesh-1990")
     cli(*words, "-o", "a.svg", "--data", "a.csv", cwd=tmp_path)
@@ -952,6 +949,7 @@ def test_a_label_is_drawn_in_one_of_the_pictures_or_refused(
     assert sorted(path.name for path in tmp_path.iterdir()) == ["b-error.svg", "b-restitution.svg"]
 
 
+@pytest.mark.slow
 def test_the_command_draws_what_python_draws(cli: Run, coarse_file: Path, tmp_path: Path) -> None:
     (tmp_path / "mine.mplstyle").write_text("font.size: 8\n", encoding="utf-8")
     (tmp_path / "data.csv").write_text("e, e_out\n0.5, 0.5\n", encoding="utf-8")

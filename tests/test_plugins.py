@@ -480,7 +480,8 @@ AMBIGUOUS = (
 )
 
 
-@pytest.mark.parametrize("words", [(), ("--threads", "2"), pytest.param(("--jobs", "2"), marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("words", [(), ("--threads", "2"), ("--jobs", "2")])
 def test_an_error_in_a_formula_is_printed_once_with_file_and_line(
     forked: ForkServer, folder: Path, words: list[str]
 ) -> None:

@@ -81,6 +81,7 @@ def test_another_type_is_named(source: object) -> None:
         impact.plot(source)  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("call", "message"),
     [
@@ -195,6 +196,7 @@ def test_public_functions_are_pickled_by_their_name() -> None:
         assert pickle.loads(pickle.dumps(getattr(impact, name))) is getattr(impact, name)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("target", [0.5, "50 %", np.float32(0.5), 0.5 * unit.dimensionless, xr.DataArray(0.5)])
 def test_a_target_is_a_number_of_any_library(target: object) -> None:
     (root,) = impact.solve("gharib-hurmuzlu-2012", "e", {"e_out": target}).roots
@@ -239,6 +241,7 @@ def test_a_ranking_is_a_sequence(result: xr.Dataset) -> None:
     assert [row.model for row in ranking[:1]] == [ranking.models[0].model]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "make",
     [

@@ -341,6 +341,7 @@ IGNORED = "e = 0.6 is not an input of mujoco-solref, which delivers 0.135335; im
 LINEAR_LAW = "anagnostopoulos-1988"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("law", "sweep", "at", "notes"),
     [

@@ -261,6 +261,7 @@ def test_a_shard_of_another_sweep_is_not_continued_but_can_be_overwritten(cli: R
     assert (completed.returncode, completed.stderr) == (0, "")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", ["3", "0/4", "5/4", "1/0", "-1/2", "1/2/3", "a/b", ""])
 def test_an_invalid_number_of_a_shard_is_refused(cli: Run, folder: Path, text: str) -> None:
     expected = "expected K/N with K from 1 to N, such as 3/16"

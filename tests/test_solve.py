@@ -79,6 +79,7 @@ def test_several_roots_are_all_found() -> None:
     assert np.subtract(1.0, values) == pytest.approx([abs(1.0 - values[0]), -abs(1.0 - values[0])], abs=1e-8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("wanted", "roots"),
     [
@@ -97,12 +98,13 @@ def test_both_roots_beside_a_minimum_between_two_values_of_the_scan_are_found(
     assert result.attainable == (0.638943, 1.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("wanted", "roots"),
     [
         (573.0, [361.680, 387.604]),
-        pytest.param(600.0, [201.263755, 538.515748], marks=pytest.mark.slow),
-        pytest.param(572.8, [], marks=pytest.mark.slow),
+        (600.0, [201.263755, 538.515748]),
+        (572.8, []),
     ],
 )
 def test_the_least_peak_force_of_a_dashpot_is_right_to_six_digits(wanted: float, roots: list[float]) -> None:

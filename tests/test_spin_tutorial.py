@@ -22,6 +22,7 @@ def test_the_page_shows_the_config() -> None:
     assert shown.strip() in CONFIG.read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_the_table_is_what_the_program_gives() -> None:
     result = impact.sweep(CONFIG).squeeze("model").sel(angle=np.pi / 4, method="nearest")
     rows = []
@@ -43,6 +44,7 @@ def test_the_table_is_what_the_program_gives() -> None:
     assert table == rows
 
 
+@pytest.mark.slow
 def test_rigid_friction_has_the_least_e_t_of_a_contact_that_sticks() -> None:
     result = impact.sweep(CONFIG).sel(friction="coulomb-1785", omega1=0.0)
     assert "1/(1 + 0.56) = 0.641" in PAGE

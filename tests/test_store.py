@@ -564,6 +564,7 @@ def test_more_axes_than_a_file_can_have_are_refused(cli: Run, tmp_path: Path, la
     assert "got 40 axes, expected at most 31" in line
 
 
+@pytest.mark.slow
 def test_longer_labels_than_a_file_can_have_are_refused(cli: Run, tmp_path: Path) -> None:
     # each label takes as many bytes as the longest
     names = ["x" * 400_000, *(f"y{number}" for number in range(19))]

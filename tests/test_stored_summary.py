@@ -80,6 +80,7 @@ def test_info_prints_the_summary_in_the_file(large: Path, tmp_path: Path) -> Non
         assert "summary" not in changed.attrs
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("large", ["evaluated"], indirect=True)
 @pytest.mark.parametrize(
     "select",

@@ -269,6 +269,7 @@ def random_inputs(key: str, count: int, seed: int) -> tuple[Any, dict[str, Any]]
     return np.tan(np.radians(uniform(3.0, 85.0, count))), inputs
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("key", "form"), LAWS)
 def test_works_balance(key: str, form: TangentialForm) -> None:
     g0, inputs = random_inputs(key, 100, 2)
@@ -302,6 +303,7 @@ def test_the_energy_left_in_a_spring_that_sticks_to_the_end_is_finite(memory: fl
         np.testing.assert_allclose(left, 0.0, rtol=0.0, atol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("key", "form"), LAWS)
 def test_values_do_not_depend_on_the_batch(key: str, form: TangentialForm) -> None:
     g0, inputs = random_inputs(key, 40, 3)

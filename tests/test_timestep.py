@@ -175,6 +175,7 @@ def test_a_step_that_is_too_long_is_no_restitution_and_ends_with_exit_code_3(cli
     assert result["needed"]["steps_per_contact"] == 74
 
 
+@pytest.mark.slow
 def test_the_rayleigh_time_is_the_smaller_one_and_belongs_to_laws_with_moduli() -> None:
     radii, glass = {"R1": 2.5e-3, "R2": 5e-3}, {"material": "glass", "e": 0.5}
     E, nu, rho = (impact.materials()["glass"][name] for name in ("E", "nu", "rho"))
@@ -247,6 +248,7 @@ def test_without_an_e_nothing_is_solved_for() -> None:
         impact.timestep("hertz", at={"e": 0.7})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("model", "at", "parameter", "power"),
     [
@@ -275,6 +277,7 @@ def test_a_softer_contact_lasts_long_enough(
         assert f"with C = {number(constant * (needed.value / value) ** 0.5, 4)} N s/m" in str(needed)
 
 
+@pytest.mark.slow
 def test_the_relaxation_time_of_drakes_sap_is_named_beside_a_stiffness() -> None:
     """Drake takes C/K in place of C; other schemes have no such parameter."""
     result = impact.timestep(
@@ -297,6 +300,7 @@ def test_the_relaxation_time_of_drakes_sap_is_named_beside_a_stiffness() -> None
     assert "relaxation_time" not in {*other.as_dict(), *str(other).split()}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("model", "at", "dt", "parameter"),
     [
@@ -368,6 +372,7 @@ def test_a_relaxation_time_needs_an_e_to_keep_and_the_scheme_of_sap(
     assert_refused(done, message)
 
 
+@pytest.mark.slow
 def test_a_parameter_that_does_not_set_the_time_scale_is_refused(cli: Run) -> None:
     words = ("timestep", "--model", "mujoco-solref", "--at", "dampratio=0.1", "--dt", "2ms")
     for parameter, tol, message in (

@@ -27,13 +27,10 @@ PAGES = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("command", "printed"),
-    [
-        pytest.param(*example, id=f"{page}: {example[0]}", marks=() if "uncertainty" in page else pytest.mark.slow)
-        for page in PAGES
-        for example in examples_of(page)
-    ],
+    [pytest.param(*example, id=f"{page}: {example[0]}") for page in PAGES for example in examples_of(page)],
 )
 def test_a_page_prints_what_its_commands_print(cli: Run, tmp_path: Path, command: str, printed: str) -> None:
     """Numbers may differ in the last digit that is printed; errors of the solver are below 1e-9."""

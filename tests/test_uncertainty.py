@@ -61,6 +61,7 @@ def closed_form(of: str) -> tuple[np.ndarray, np.ndarray]:
     return v / d, v * np.prod(1.0 + v) / (1.0 + v) / d
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("of", POWERS)
 def test_indices_are_those_of_the_closed_forms(of: str) -> None:
     study = impact.sensitivity(hertz(), of=of).isel(model=0)
@@ -113,6 +114,7 @@ def by_quadrature() -> tuple[np.ndarray, np.ndarray]:
     return alone / variance, 1.0 - alone[::-1] / variance
 
 
+@pytest.mark.slow
 def test_indices_of_inputs_that_act_together_are_those_of_a_quadrature() -> None:
     c, v1 = ({"uniform": list(ends)} for ends in SIMBODY_ENDS.values())
     config = {
@@ -385,6 +387,7 @@ def test_a_wrong_design_is_one_line_with_its_place(change: str, message: str, tm
     assert message in line
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("design", ["{}", "{ m = 4 }", '{ method = "lhs" }'])
 def test_a_design_without_a_number_of_samples_is_one_line(design: str, cli: Run, tmp_path: Path) -> None:
     (tmp_path / "c.toml").write_text(TEXT.replace("[design]\nn = 64\n", f"design = {design}\n"))
@@ -473,6 +476,7 @@ def test_without_another_axis_the_picture_is_the_distribution_function(samples: 
     np.testing.assert_allclose(axes.lines[0].get_ydata(), (np.arange(64) + 0.5) / 64)
 
 
+@pytest.mark.slow
 def test_a_study_is_stored_drawn_and_reported(cli: Run, tmp_path: Path) -> None:
     (tmp_path / "c.toml").write_text(TEXT)
     study = impact.sensitivity(
@@ -493,6 +497,7 @@ def test_a_study_is_stored_drawn_and_reported(cli: Run, tmp_path: Path) -> None:
     assert "64 samples (sobol, seed 0)" in cli("info", "s.h5", cwd=tmp_path).stdout
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "words",
     ["recommend s.h5", "rerun s.h5", "extend s.h5 --set sweep.m1=1", "run s.h5", "compare s.h5 s.h5",
