@@ -43,14 +43,7 @@ test-fast: $(VENV)/dev  ## test the compiled core; installs the extra "fast"
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[fast]'
 	$(BIN)/python -m pytest -n auto --dist worksteal tests/test_compiled_core.py tests/test_deduplicate.py tests/test_catalogue.py
 
-# Some of the codes are on PyPI; on Debian `apt-get install liggghts yade` adds two. Each wheel is installed
-# separately, so that a missing one does not prevent the others, and outside $(VENV), whose versions could change
-peers: $(VENV)/dev
-	test -x $(PEERS)/bin/python || $(PYTHON) -m venv $(PEERS)
-	@$(BIN)/python -c 'import tomllib; print(*tomllib.load(open("pyproject.toml", "rb"))["project"]["optional-dependencies"]["peers"], sep="\n")' | \
-	while read -r wheel; do \
-		$(PEERS)/bin/python -m pip install --quiet --disable-pip-version-check "$$wheel" < /dev/null || echo "not installed: $$wheel"; \
-	done
+peers: $(PEERS)/peers
 
 # a third of the time these tests wait for other programs to start
 test-peers: peers  ## compare entries of codes with LAMMPS, LIGGGHTS, YADE, MuJoCo, Drake, Simbody, OpenSees, Kratos, PyBullet, EXUDYN and Newton
@@ -105,6 +98,18 @@ $(VENV)/dev: pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
 	@touch $@
+
+# Some of the codes are on PyPI; on Debian `apt-get install liggghts yade` adds two. Each wheel is installed
+# separately, so that a missing one does not prevent the others, and outside $(VENV), whose versions could change
+$(PEERS)/peers: pyproject.toml | $(VENV)/dev
+	test -x $(PEERS)/bin/python || $(PYTHON) -m venv $(PEERS)
+	@$(BIN)/python -c 'import tomllib; print(*tomllib.load(open("pyproject.toml", "rb"))["project"]["optional-dependencies"]["peers"], sep="\n")' | { \
+		missing=0; \
+		while read -r wheel; do \
+			$(PEERS)/bin/python -m pip install --quiet --disable-pip-version-check "$$wheel" < /dev/null || { echo "not installed: $$wheel"; missing=1; }; \
+		done; \
+		test $$missing = 1 || touch $@; \
+	}
 
 $(SITE)/site: pyproject.toml
 	test -x $(SITE)/bin/python || $(PYTHON) -m venv $(SITE)
