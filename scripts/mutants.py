@@ -1,4 +1,4 @@
-"""Change the code in one place at a time, and report which quick tests notice.
+"""Change the code in one place at a time, and report which tests notice, by default the quick ones.
 
 A random sample of mutants is drawn: a comparison, an operator or a condition is inverted, a number is changed,
 two arguments are exchanged, a statement is removed. Modules for numba, annotations, decorators and texts stay as
@@ -9,13 +9,14 @@ one fails or the time limit is over. Which tests execute which lines is recorded
 state of the code, with coverage.py (`pip install coverage`), also in forked commands.
 
     python scripts/mutants.py [--count 200] [--seed 0] [--packages inverse cli] [--tests tests/test_solve.py ...]
-                              [--limit 60] [--only INDEX ...] [--folder build/mutants]
+                              [--limit 60] [--only INDEX ...] [--slow] [--folder build/mutants]
 
 Everything runs in a copy of the checkout in the folder, in one process at a time, which is forked from one that
 has the libraries. FOLDER/mutants.md has a table and a list, FOLDER/mutants.json the same as data, both also
 after an interruption. A mutant is killed (by a test that passes without it), stopped (a test did not end in
 time), not covered, or it survived; one that survived may mean the same as the code. `--only` repeats some of the
-same sample, such as those that survived after tests were added.
+same sample, such as those that survived after tests were added; with `--slow` the slow tests judge, too, which
+takes hours for all files.
 """
 
 from __future__ import annotations
@@ -57,6 +58,8 @@ RECORD_S = 120.0  # for a file of tests; the later tests of a slow file are not 
 START_S = 0.05  # of a test in addition to its recorded cost
 GRACE_S = 60.0  # beyond the limit, for the last test that began within it
 SERVERS = {"forked", "cli", "sweeps"}  # fixtures that start another interpreter
+# of the marks of tests, what `make test` and `make test-faults` run
+SLOW_TOO = ["-m", "not long and not peers"]
 OUTCOMES = ("killed", "stopped", "survived", "not covered")
 
 OPPOSITES: dict[Any, Any] = {
@@ -284,8 +287,8 @@ class Recorder:
             self.seconds[report.nodeid] = report.duration
 
 
-def record(copy: Path, test_file: str, to: Path) -> None:
-    """In a child: run the quick tests of a file; write their costs, and which of them execute which lines."""
+def record(copy: Path, test_file: str, chosen: list[str], to: Path) -> None:
+    """In a child: run the chosen tests of a file; write their costs, and which of them execute which lines."""
     import coverage
 
     folder, source = to.with_suffix(""), copy / "src" / "impact"
@@ -295,7 +298,7 @@ def record(copy: Path, test_file: str, to: Path) -> None:
     os.environ["PYTHONPATH"] = os.pathsep.join([str(folder), os.environ["PYTHONPATH"]])
     measured = coverage.Coverage(data_file=None, config_file=False, include=[f"{source}/*"])
     recorder = Recorder(measured, source, folder)
-    pytest.main([test_file, "-p", "no:cacheprovider"], plugins=[recorder])
+    pytest.main([test_file, *chosen, "-p", "no:cacheprovider"], plugins=[recorder])
     measured.stop()
     data = measured.get_data()
     executed: dict[str, dict[int, set[str]]] = defaultdict(lambda: defaultdict(set))
@@ -427,6 +430,7 @@ class Judge:
             "no:cacheprovider",
             "--tb=no",
             "-rf",
+            *SLOW_TOO,
             *tests,
         ]
         try:
@@ -490,6 +494,7 @@ def main() -> None:
     parser.add_argument("--tests", nargs="+", metavar="FILE", help="by default all")
     parser.add_argument("--limit", type=float, default=60.0, help="seconds for the tests of a mutant")
     parser.add_argument("--only", type=int, nargs="+", metavar="INDEX", help="some mutants of the sample")
+    parser.add_argument("--slow", action="store_true", help="run the slow tests, too")
     parser.add_argument("--folder", type=Path, default=ROOT / "build" / "mutants")
     options = parser.parse_args()
     folder = options.folder.resolve()
@@ -506,14 +511,16 @@ def main() -> None:
     code = hashlib.sha256()
     for file in (*sorted(Path("src").rglob("*.py")), Path("tests/conftest.py"), Path("tests/fork_server.py")):
         code.update(file.read_bytes())
-    records = []
+    records, chosen = [], SLOW_TOO if options.slow else []
     files = [Path(file) for file in options.tests or sorted(Path("tests").glob("test_*.py"))]
     for file in files:
-        key = hashlib.sha256(code.digest() + file.read_bytes()).hexdigest()[:16]
+        key = hashlib.sha256(code.digest() + file.read_bytes() + "".join(chosen).encode()).hexdigest()[:16]
         to = folder / f"{file.stem}-{key}.json"
         if not to.exists():
             begin = time.monotonic()
-            in_child(functools.partial(record, copy, str(file), to), to.with_suffix(".log"), 600.0, copy / "src")
+            in_child(
+                functools.partial(record, copy, str(file), chosen, to), to.with_suffix(".log"), 600.0, copy / "src"
+            )
             print(f"{file}: recorded in {time.monotonic() - begin:.0f} s", flush=True)
         if to.exists():
             records.append(json.loads(to.read_bytes()))
@@ -524,7 +531,7 @@ def main() -> None:
     sys.path.insert(0, str(copy / "src"))
     os.environ["PYTHONPATH"] = os.pathsep.join([str(copy / "src"), os.environ.get("PYTHONPATH", "")])
     doctests = {mutant.path for mutant in judged.values()}
-    pytest.main([*map(str, files), *doctests, "-p", "no:cacheprovider"], plugins=[plugin])
+    pytest.main([*map(str, files), *doctests, *chosen, "-p", "no:cacheprovider"], plugins=[plugin])
 
 
 if __name__ == "__main__":

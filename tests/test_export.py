@@ -555,6 +555,29 @@ def test_a_release_with_text_that_would_be_code_is_refused(name: str) -> None:
             impact.export(name, at={"e": 0.6}, code_version=version)
 
 
+def test_kratos_gets_the_moduli_of_both_balls() -> None:
+    at = {"e": 0.6, "material1": "steel", "material2": "brass"}
+    materials = [line for line in impact.export("kratos", at=at).lines if line.startswith("material")]
+    assert materials == [
+        'material1 = {"YOUNG_MODULUS": 210000000000.0, "POISSON_RATIO": 0.3}',
+        'material2 = {"YOUNG_MODULUS": 100000000000.0, "POISSON_RATIO": 0.34}',
+    ]
+
+
+def test_the_oldest_release_of_liggghts_whose_laws_were_read_is_3_0_0() -> None:
+    assert impact.export("liggghts", at={"e": 0.6}, code_version="3.0.0").version == "3.0.0"
+    with pytest.raises(impact.UsageError, match=r"got 2\.9\.9, expected 3\.0\.0 or later"):
+        impact.export("liggghts", at={"e": 0.6}, code_version="2.9.9")
+
+
+@pytest.mark.parametrize(("R1", "R2"), [(0.005, 0.05), (0.05, 0.005)])
+def test_lammps_searches_for_neighbours_within_a_tenth_of_the_smaller_radius(R1: float, R2: float) -> None:
+    script = impact.export("lammps", at={"e": 0.6, "R1": R1, "R2": R2}, script=True).script
+    assert script is not None
+    (skin,) = re.findall(r"^neighbor +(\S+) bin$", script, re.MULTILINE)
+    assert float(skin) == pytest.approx(5e-4, rel=1e-12)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", CODES)
 def test_of_the_texts_of_a_caller_only_the_release_is_written(name: str) -> None:
