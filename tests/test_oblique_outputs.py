@@ -56,6 +56,15 @@ def test_without_a_slip_there_is_no_impulse_and_no_tangential_restitution() -> N
     assert values(result, "e_t") == [1.0, 1.0]
 
 
+def test_the_rebound_angle_and_the_ratio_of_impulses_are_those_of_the_velocities_at_any_speed() -> None:
+    result = oblique(v1=[0.5, 4.0], v2=0.0, u1=1.0)
+    apart = result["v2_post"] - result["v1_post"]
+    angle = np.arctan2(result["u1_post"] - result["u2_post"], apart)
+    np.testing.assert_allclose(result["rebound_angle"].values, angle.values, rtol=1e-12)
+    ratio = (1.0 - result["u1_post"]) / (result["v1"] - result["v1_post"])
+    np.testing.assert_allclose(result["impulse_ratio"].values, ratio.transpose(*angle.dims).values, rtol=1e-9)
+
+
 def test_a_spin_alone_has_no_restitution_of_the_centres() -> None:
     result = oblique(omega1=30.0)
     assert np.isnan(values(result, "e_t")).all()
