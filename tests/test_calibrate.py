@@ -402,6 +402,13 @@ def test_a_result_is_stored_and_read_again(cli: Run, tmp_path: Path) -> None:
     assert "exists" in again.stderr
 
 
+def test_a_law_of_the_best_config_that_is_not_fitted_is_refused_before_the_fit(tmp_path: Path) -> None:
+    fit, best = tmp_path / "fit.h5", tmp_path / "best.toml"
+    with pytest.raises(impact.UsageError, match="hertz"):
+        impact.calibrate(FOLDER / "drops.toml", output=fit, best=best, model="hertz")
+    assert not fit.exists()
+
+
 def test_the_best_config_gives_the_predictions(cli: Run, tmp_path: Path) -> None:
     words = ("--set", 'models=["kuwabara-kono-1987"]', "--set", "solver.rtol=1e-8")
     done = cli(
