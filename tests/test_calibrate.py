@@ -18,6 +18,7 @@ from impact.contact.models import find
 from impact.errors import UsageError
 from impact.inverse.calibrate import determined_groups
 from impact.inverse.fit import Bounds, DataPoints, FitProblem, fit_all
+from impact.results.calibration import fit_rows
 
 from .conftest import ROOT, Run
 
@@ -400,6 +401,13 @@ def test_a_result_is_stored_and_read_again(cli: Run, tmp_path: Path) -> None:
     again = cli("calibrate", FOLDER / "hdpe.toml", *ONE_LAW, "-o", tmp_path / "a.h5")
     assert again.returncode == 2
     assert "exists" in again.stderr
+
+
+def test_the_table_of_a_fit_names_parameters_without_their_law_and_has_two_digits_of_p(drops: xr.Dataset) -> None:
+    (key, name, *_, p_value, _, _, _, _), *_ = fit_rows(drops)
+    assert (key, name) == ("kuwabara-kono-1987", "A")
+    assert float(p_value) == pytest.approx(drops["p_value"].values[0], rel=0.05)
+    assert len(p_value.lstrip("0.").partition("e")[0].replace(".", "")) <= 2
 
 
 def test_a_law_of_the_best_config_that_is_not_fitted_is_refused_before_the_fit(tmp_path: Path) -> None:

@@ -201,6 +201,17 @@ def test_chrono_takes_both_materials_or_a_modulus_that_gives_the_stiffness() -> 
     assert one["YoungModulus"] == pytest.approx(2.0 * 0.91 * 0.75e9 / math.sqrt(0.03), rel=1e-14)
 
 
+@pytest.mark.parametrize("key", CODES["chrono"].laws)
+def test_chrono_takes_coefficients_for_two_laws_and_properties_of_the_material_for_the_others(key: str) -> None:
+    at = {"chrono-smc-flores.vc": 1.0} if key == "chrono-smc-flores" else {}
+    parameters = impact.export("chrono", key, at={"e": 0.6, **at}).parameters
+    has_coefficients = key in ("kelvin-voigt-no-tension", "kuwabara-kono-1987")
+    assert ({"Kn", "Gn"} <= parameters.keys(), "YoungModulus" in parameters) == (
+        has_coefficients,
+        not has_coefficients,
+    )
+
+
 @pytest.mark.slow
 def test_chrono_says_what_its_settings_enter_for_the_laws_that_have_them_only() -> None:
     hooke, plain = {"chrono-smc-hooke", "liggghts-hooke"}, "chrono-smc-plaincoulomb"
