@@ -32,6 +32,9 @@ from impact.results.xarray_backend import write_sealed
 from .conftest import CHI, PLUGIN, ROOT, WIDE, full_disk
 from .fork_server import CompletedCommand, ForkServer, abandoned_pipe, printed_on_terminal
 
+# hundreds of commands, or sweeps step by step: `make test-faults` runs them
+pytestmark = pytest.mark.slow
+
 FORMATS = ("table", "json", "junit", "markdown", "github")
 KEY = "lankarani-nikravesh-1990"
 WORST = f"v1_post: 2 of 303 differ, worst 1.6e-07 = 160 x tolerance at model={KEY}, e=0.05"
@@ -139,7 +142,6 @@ def _is_clean(done: CompletedCommand) -> bool:
 # five formats
 
 
-@pytest.mark.slow
 def test_equal_in_five_formats(forked: ForkServer, folder: Path) -> None:
     outputs = {}
     for name in FORMATS:
@@ -161,7 +163,6 @@ def test_equal_in_five_formats(forked: ForkServer, folder: Path) -> None:
     assert _github(outputs["github"]) == [("notice", "base.h5", headline)]
 
 
-@pytest.mark.slow
 def test_different_in_five_formats(forked: ForkServer, folder: Path) -> None:
     outputs = {}
     for name in FORMATS:
@@ -201,7 +202,6 @@ def test_different_in_five_formats(forked: ForkServer, folder: Path) -> None:
     assert _github(outputs["github"]) == [("error", "base.h5", f"{headline}\n{missing}\n{WORST}\n{replay}")]
 
 
-@pytest.mark.slow
 def test_github_gets_one_annotation_with_the_worst_three(
     forked: ForkServer, figure6: xr.Dataset, folder: Path, tmp_path: Path
 ) -> None:
@@ -226,7 +226,6 @@ def test_github_gets_one_annotation_with_the_worst_three(
     assert "and 2 more" in lines
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("format", FORMATS)
 @pytest.mark.parametrize("name", UNREADABLE)
 def test_an_unreadable_file_is_reported_in_every_format(
@@ -254,7 +253,6 @@ def test_an_unreadable_file_is_reported_in_every_format(
             assert _github(done.stdout) == [("error", pair[1], line)]
 
 
-@pytest.mark.slow
 def test_a_usage_error_is_one_line_and_exit_code_2(forked: ForkServer, folder: Path) -> None:
     prefix = "impact compare: Invalid value for '--tol': "
     for words, message in (
@@ -274,7 +272,6 @@ def test_a_usage_error_is_one_line_and_exit_code_2(forked: ForkServer, folder: P
     assert forked("compare", "different.h5", cwd=folder).returncode == 2
 
 
-@pytest.mark.slow
 def test_tolerances_from_the_command_line(forked: ForkServer, folder: Path) -> None:
     for words, code in (
         (["--tol", "1.7e-7"], 0),
@@ -309,7 +306,6 @@ def test_subset_and_nothing_in_common(forked: ForkServer, folder: Path) -> None:
 MALICIOUS = "\x1b[31m\u202e\u200b[red]|`a`` ````$\\frac{1$\x07<b>&\"'%0A::,=\nx\x9b"
 
 
-@pytest.mark.slow
 def test_malicious_strings_are_escaped_in_every_format(forked: ForkServer, tmp_path: Path) -> None:
     steel = {"E": 2e11, "nu": 0.3, "rho": 7850}
     config = {
@@ -401,7 +397,6 @@ def test_a_picture_of_the_differences_replaces_an_old_one(
     assert capsys.readouterr().err == f"{picture}: where the differences lie\n"
 
 
-@pytest.mark.slow
 def test_every_kind_of_verdict_has_a_picture(
     forked: ForkServer, folder: Path, wide: xr.Dataset, tmp_path: Path
 ) -> None:
@@ -536,7 +531,6 @@ def test_bless_accepts_failed_points_only_with_allow_failed(forked: ForkServer, 
     assert forked("compare", "new.h5", "base.h5", cwd=tmp_path).returncode == 0
 
 
-@pytest.mark.slow
 def test_a_refused_bless_changes_no_file(forked: ForkServer, folder: Path, tmp_path: Path) -> None:
     baseline = tmp_path / "baseline.h5"
     shutil.copy(folder / "base.h5", baseline)
@@ -599,7 +593,6 @@ def test_bless_from_python(folder: Path, tmp_path: Path) -> None:
 # rerun
 
 
-@pytest.mark.slow
 def test_a_rerun_of_an_unchanged_result_is_equal(
     forked: ForkServer, folder: Path, many_axes: xr.Dataset, tmp_path: Path
 ) -> None:
@@ -620,7 +613,6 @@ def test_a_rerun_of_an_unchanged_result_is_equal(
     assert impact.load(tmp_path / "set.h5").attrs["rtol"] == 1e-4
 
 
-@pytest.mark.slow
 def test_a_rerun_finds_changed_numbers(forked: ForkServer, folder: Path) -> None:
     done = forked("rerun", "different.h5", cwd=folder)
     assert done.returncode == 1
@@ -659,7 +651,6 @@ def test_a_rerun_uses_the_models_and_the_rtol_of_the_file(tmp_path: Path) -> Non
     assert impact.rerun(tmp_path / "other.h5", tol=1e-4).equal
 
 
-@pytest.mark.slow
 def test_a_rerun_repeats_the_points_of_the_file(
     forked: ForkServer, figure6: xr.Dataset, many_axes: xr.Dataset, tmp_path: Path
 ) -> None:
@@ -722,7 +713,6 @@ def test_a_rerun_needs_the_plug_in_of_the_result(forked: ForkServer, plugin: Pat
     assert impact.rerun(tmp_path / "results.h5", plugins=[plugin]).equal
 
 
-@pytest.mark.slow
 def test_a_rerun_with_a_changed_plug_in_has_a_note(forked: ForkServer, plugin: Path, tmp_path: Path) -> None:
     point = ("--model", "mine-2026", "--at", "e=0.8")
     original_hash = sha256(plugin.read_bytes()).hexdigest()
@@ -799,7 +789,7 @@ PARTLY_READ = [
     ("table", "different", 1),
     ("table", "equal", 0),
     ("json", "different", 1),
-    *(pytest.param(format, "different", 1, marks=pytest.mark.slow) for format in ("junit", "markdown", "github")),
+    *((format, "different", 1) for format in ("junit", "markdown", "github")),
 ]
 
 
@@ -813,7 +803,6 @@ def test_a_closed_pipe_does_not_change_the_exit_code(
     assert (done.returncode, "Traceback" in done.stderr) == (code, False)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("format", "new", "code"), PARTLY_READ)
 def test_a_closed_pipe_of_a_real_interpreter_does_not_change_the_exit_code(
     folder: Path, tmp_path: Path, format: str, new: str, code: int

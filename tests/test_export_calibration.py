@@ -14,6 +14,9 @@ from impact.formatting import number
 
 from .conftest import Run
 
+# hundreds of commands, or sweeps step by step: `make test-faults` runs them
+pytestmark = pytest.mark.slow
+
 SPEEDS = [0.2, 0.6, 1.5, 3.0]
 TSUJI = "lammps-coeff-restitution-hertz"
 DROPS: dict[str, Any] = {
@@ -84,7 +87,6 @@ def test_a_law_that_was_not_fitted_is_refused_with_those_that_were(cli: Run, fit
     assert impact.export("yade", source=fit, at={"v1": 1.0}, code_version="2012.01").model == "yade-en-pulling"
 
 
-@pytest.mark.slow
 def test_every_command_of_one_impact_takes_a_calibration(cli: Run, fit: Path) -> None:
     shot = impact.run(fit, at={"v1": 1.5})
     assert (shot.model.key, shot.point["v1"]) == ("kuwabara-kono-1987", 1.5)
@@ -122,7 +124,6 @@ def test_a_law_without_an_estimate_is_refused(fit: Path) -> None:
         impact.export("lammps", source=lost, code_version="22Jul2025")
 
 
-@pytest.mark.slow
 def test_laws_without_an_aicc_have_no_weight_and_none_is_named(tmp_path: Path) -> None:
     """Three points are too few for the correction of AICc with a parameter and the scale of the noise."""
     few = {"columns": {name: values[:3] for name, values in DROPS["data"]["columns"].items()}, "noise": "scale"}

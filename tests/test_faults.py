@@ -37,7 +37,7 @@ from .faults import (
 )
 
 # reads the states of processes in /proc
-pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="needs /proc")
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(sys.platform != "linux", reason="needs /proc")]
 MISSING_SPACE = re.compile(r"; it takes ([\d,]+) bytes more, ([\d,]+) are free; ")
 # an atomic change of names, where None removes a name; and the content of a disk, where None is a folder
 Change = dict[str, int | None]
@@ -59,7 +59,7 @@ def test_all_file_operations_of_a_sweep_are_recorded(sweeps: SweepServer) -> Non
     ("text", "count"),
     [
         (CONFIG_TEXT, 3),
-        pytest.param(FACTORED_CONFIG, 4, marks=pytest.mark.slow),
+        (FACTORED_CONFIG, 4),
         pytest.param(CONFIG_TEXT, 20, marks=pytest.mark.faults),
         pytest.param(FACTORED_CONFIG, 20, marks=pytest.mark.faults),
         # all of them
@@ -101,7 +101,6 @@ def test_a_sweep_killed_at_a_random_time_is_resumed(sweeps: SweepServer, count: 
     report.check()
 
 
-@pytest.mark.slow
 def test_a_resumed_sweep_removes_all_temporary_files(sweeps: SweepServer) -> None:
     for words in (("link",), ("unlink", f"{RESULT}.part"), ("unlink", f"{WORK}/plan.json"), ("rmdir",)):
         folder = sweeps.run_killed_at(sweeps.find_operation(*words))
@@ -109,7 +108,6 @@ def test_a_resumed_sweep_removes_all_temporary_files(sweeps: SweepServer) -> Non
         assert sorted(path.name for path in folder.iterdir()) == [CONFIG, RESULT], words
 
 
-@pytest.mark.slow
 def test_a_result_is_replaced_only_by_a_complete_result(sweeps: SweepServer) -> None:
     old = sweeps.folder()
     assert sweeps(cwd=old).returncode == 0
@@ -253,8 +251,8 @@ def create_folder(sweeps: SweepServer, state: State, text: str = "") -> Path:
     ("text", "kinds", "writes"),
     [
         (CONFIG_TEXT, {"link"}, 0),
-        pytest.param(CONFIG_TEXT, {"rename", "rmdir"}, 0, marks=pytest.mark.slow),
-        pytest.param(FACTORED_CONFIG, {"link"}, 0, marks=pytest.mark.slow),
+        (CONFIG_TEXT, {"rename", "rmdir"}, 0),
+        (FACTORED_CONFIG, {"link"}, 0),
         pytest.param(CONFIG_TEXT, None, 10, marks=pytest.mark.faults),
         pytest.param(CONFIG_TEXT, None, 60, marks=pytest.mark.long),
     ],
@@ -290,7 +288,6 @@ def test_without_fsync_a_power_failure_leaves_an_incomplete_result_and_loses_blo
     pytest.fail("no block was lost, or no result was incomplete")
 
 
-@pytest.mark.slow
 def test_a_power_failure_while_another_sweep_replaces_the_work_folder(sweeps: SweepServer) -> None:
     # the work folder of a sweep, which another sweep overwrites
     old, text = sweeps.copy_finished(), CONFIG_TEXT.replace("1e-4", "1e-5")
@@ -325,7 +322,7 @@ def check_storage_error(completed: FinishedSweep, folder: Path) -> set[int]:
     ("text", "count"),
     [
         (CONFIG_TEXT, 2),
-        pytest.param(FACTORED_CONFIG, 3, marks=pytest.mark.slow),
+        (FACTORED_CONFIG, 3),
         pytest.param(CONFIG_TEXT, 15, marks=pytest.mark.faults),
         pytest.param(FACTORED_CONFIG, 15, marks=pytest.mark.faults),
         pytest.param(CONFIG_TEXT, 120, marks=pytest.mark.long),
@@ -361,7 +358,6 @@ def test_a_disk_error_before_the_first_block_leaves_no_trace_or_prints_how_to_co
             assert not sweeps(cwd=folder).returncode or "--resume" in completed.stderr, completed
 
 
-@pytest.mark.slow
 def test_a_disk_error_after_the_result_is_stored_does_not_damage_it(sweeps: SweepServer) -> None:
     for operation in range(sweeps.find_operation("unlink", f"{RESULT}.part"), len(sweeps.operations), 2):
         folder = sweeps.folder()
@@ -370,9 +366,7 @@ def test_a_disk_error_after_the_result_is_stored_does_not_damage_it(sweeps: Swee
         assert completed.returncode in (0, 4), (operation, sweeps.operations[operation], completed)
 
 
-@pytest.mark.parametrize(
-    "size", [*(pytest.param(size, marks=pytest.mark.slow) for size in (4_000, 20_000)), 8_000]
-)
+@pytest.mark.parametrize("size", [4_000, 8_000, 20_000])
 def test_a_sweep_is_resumed_after_the_limit_of_file_sizes_was_reached(sweeps: SweepServer, size: int) -> None:
     report, folder = FaultReport(f"file size limit of {size} bytes", sweeps), sweeps.folder()
     kept = check_storage_error(sweeps(cwd=folder, fault=("limit_file_size", size)), folder)
@@ -381,7 +375,7 @@ def test_a_sweep_is_resumed_after_the_limit_of_file_sizes_was_reached(sweeps: Sw
 
 
 # the last size is that of a file system that is full when the result is assembled
-@pytest.mark.parametrize("size", [24, *(pytest.param(size, marks=pytest.mark.slow) for size in (8, 44)), 52])
+@pytest.mark.parametrize("size", [8, 24, 44, 52])
 def test_a_full_file_system_is_reported_with_the_missing_space(
     sweeps: SweepServer, tmp_path: Path, size: int
 ) -> None:

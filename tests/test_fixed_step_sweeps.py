@@ -26,6 +26,9 @@ from impact.plots.kinds import Choice
 from .conftest import ROOT, Run, assert_same_bits, new_law
 from .test_plots import check_layout, names_of
 
+# hundreds of commands, or sweeps step by step: `make test-faults` runs them
+pytestmark = pytest.mark.slow
+
 LINEAR = "anagnostopoulos-1988"
 BALLS = {"v1": 1.0, "m1": 1.0, "m2": 1.0, "material": "steel"}
 # every law of a form: a spring and dashpot, with and without tension, hysteresis, unloading branches, adhesion
@@ -95,7 +98,6 @@ def test_a_sweep_gives_what_timestep_predicts(model: str) -> None:
         np.testing.assert_allclose(e.max("phase"), [row.e_largest for row in rows], rtol=1e-9)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("scheme", [scheme for scheme in SCHEMES if scheme != "mujoco-cone"])
 def test_small_steps_give_every_variable_of_the_continuous_law(scheme: str) -> None:
     law = {"kick-drift": LINEAR, "drake-tamsi": "exact-hysteresis"}.get(scheme, f"{LINEAR}-no-tension")
@@ -124,7 +126,6 @@ def test_contact_time_is_a_whole_number_of_steps() -> None:
     np.testing.assert_allclose(result["contact_time"], result["steps"] * result["dt"], rtol=1e-12)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("how", "step"),
     [
@@ -151,7 +152,6 @@ def test_only_distinct_problems_are_integrated(tmp_path: Path, cli: Run) -> None
     assert "e, steps_per_contact, phase" in dry.stdout
 
 
-@pytest.mark.slow
 def test_shards_extend_and_the_factored_layout_give_the_same_file(tmp_path: Path, cli: Run) -> None:
     (tmp_path / "c.toml").write_text(TOML, encoding="utf-8")
 
@@ -175,7 +175,6 @@ def test_shards_extend_and_the_factored_layout_give_the_same_file(tmp_path: Path
     run("rerun", "whole.h5")
 
 
-@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="needs SIGKILL")
 def test_a_killed_sweep_is_resumed_byte_for_byte(tmp_path: Path, cli: Run) -> None:
     phases = "sweep.phase={ arange = [0.00001, 1, 0.000015] }"
@@ -360,7 +359,6 @@ def test_values_of_at_may_complete_a_config() -> None:
         impact.run(at={"steps_per_contact": 10.0, "dt": 1e-6}, overrides=fixed)
 
 
-@pytest.mark.slow
 def test_solve_finds_the_e_to_ask_for() -> None:
     fixed = ["solver.integrator='kick-drift'"]
     asked = impact.solve(
@@ -421,7 +419,6 @@ def test_the_picture_over_dt_at_one_phase_has_no_band() -> None:
     assert (guide.case, curve.x, curve.least) == ("e = 0.5", (2e-6, 5e-6), ())
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("width", ["single", "double"])
 def test_the_texts_of_the_picture_do_not_overlap(coarse: xr.Dataset, width: str) -> None:
     figure = impact.plot(coarse, kind="timestep", width=width)
@@ -432,7 +429,6 @@ def test_the_texts_of_the_picture_do_not_overlap(coarse: xr.Dataset, width: str)
     check_layout(near)
 
 
-@pytest.mark.slow
 def test_the_numbers_of_the_picture_have_the_range(coarse: xr.Dataset, tmp_path: Path, cli: Run) -> None:
     impact.save(coarse, tmp_path / "r.h5")
     done = cli("plot", "r.h5", "--kind", "timestep", "--data", "wide.csv", "-o", "r.svg", cwd=tmp_path)
@@ -459,7 +455,6 @@ def test_a_result_without_the_axis_is_refused_in_one_line(sweep: dict[str, Any],
         impact.plot(swept(**{"e": 0.5} | sweep), kind="timestep")
 
 
-@pytest.mark.slow
 def test_a_report_has_the_picture_and_no_loop(coarse: xr.Dataset) -> None:
     page = impact.report(coarse)
     assert "Restitution at fixed steps: mean, least and largest over the phase." in page

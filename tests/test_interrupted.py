@@ -37,7 +37,7 @@ from .faults import (
 )
 
 # reads the states of processes in /proc
-pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="needs /proc")
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(sys.platform != "linux", reason="needs /proc")]
 ALL_BLOCKS = set(range(BLOCKS))
 FLAGS = ((), ("--overwrite",), ("--resume",))
 # long enough to be interrupted between blocks; and slow enough to be interrupted within them
@@ -75,7 +75,6 @@ def check_refused(sweeps: SweepServer, folder: Path, *words: str | int, message:
 # ---- a path in the way of the work folder or of the result
 
 
-@pytest.mark.slow
 def test_a_leftover_work_folder_is_not_changed_without_a_flag(sweeps: SweepServer) -> None:
     folder = sweeps.run_killed_at(sweeps.find_operation("create", f"{WORK}/block.part"))
     for flag in ("--resume", "--overwrite"):
@@ -114,7 +113,6 @@ def is_link_to_nothing(path: Path) -> None:
     path.symlink_to("nowhere")
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("make", [is_fifo, is_link, is_link_to_a_folder, is_link_to_nothing, is_text])
 def test_a_path_that_is_not_a_work_folder_is_not_changed(
     sweeps: SweepServer, make: Callable[[Path], None]
@@ -133,7 +131,6 @@ def test_a_folder_with_other_files_is_not_changed(sweeps: SweepServer) -> None:
         check_refused(sweeps, folder, *words, message=WORK)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("make", "name"),
     [
@@ -160,7 +157,6 @@ def test_an_unexpected_file_in_a_work_folder_is_replaced_or_reported_in_one_line
         assert completed.returncode or digest(folder / RESULT) == sweeps.expected_digest(folder)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("make", [is_folder, is_fifo, is_link, is_link_to_nothing, is_text])
 def test_a_path_that_is_not_a_result_is_not_changed(sweeps: SweepServer, make: Callable[[Path], None]) -> None:
     folder = sweeps.folder()
@@ -281,7 +277,6 @@ def test_a_block_with_a_flipped_bit_is_integrated_again(sweeps: SweepServer, cou
     report.check()
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "lost_blocks"),
     [
@@ -316,7 +311,6 @@ def start_stopped(
     return running
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "words"),
     [
@@ -363,7 +357,7 @@ def check_interrupted(completed: FinishedSweep, folder: Path, number: int, at: o
     ("text", "count", "moments"),
     [
         (CONFIG_TEXT, 3, 1),
-        pytest.param(FACTORED_CONFIG, 3, 1, marks=pytest.mark.slow),
+        (FACTORED_CONFIG, 3, 1),
         pytest.param(CONFIG_TEXT, 10, 8, marks=pytest.mark.faults),
         pytest.param(FACTORED_CONFIG, 10, 8, marks=pytest.mark.faults),
         pytest.param(CONFIG_TEXT, 60, 40, marks=pytest.mark.long),
@@ -428,7 +422,7 @@ def test_the_flags_that_an_interrupted_overwriting_sweep_prints_continue_it(swee
 @pytest.mark.parametrize(
     ("number", "group", "count"),
     [
-        pytest.param(KILL, False, 1, marks=pytest.mark.slow),
+        (KILL, False, 1),
         *(
             pytest.param(number, group, count, marks=pytest.mark.faults)
             for number, group in ((INT, False), (INT, True), (TERM, False), (TERM, True), (KILL, False))
@@ -456,7 +450,6 @@ def test_no_process_outlives_the_writing_process_after_any_signal(
     report.check()
 
 
-@pytest.mark.slow
 def test_an_interrupt_while_processes_start_prints_one_line(sweeps: SweepServer) -> None:
     # a terminal sends the signal to all processes
     folder = sweeps.folder(LONG_CONFIG)
@@ -473,7 +466,7 @@ def test_an_interrupt_while_processes_start_prints_one_line(sweeps: SweepServer)
 @pytest.mark.parametrize(
     "moments",
     [
-        pytest.param((0,), marks=pytest.mark.slow),
+        (0,),
         pytest.param((1, 1, 2, 2, 3), marks=pytest.mark.faults),
     ],
 )
