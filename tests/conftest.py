@@ -221,6 +221,8 @@ def no_installed_codes(
         return
     for name, value in ALONE.items():
         monkeypatch.setenv(name, value)
+    # Open MPI removes its folder when a process ends, also from under one that another worker starts
+    monkeypatch.setenv("OMPI_MCA_orte_tmpdir_base", str(silent_programs.parent))
 
 
 @pytest.fixture(scope="session")
