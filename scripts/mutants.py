@@ -58,7 +58,7 @@ RECORD_S = 120.0  # for a file of tests; the later tests of a slow file are not 
 START_S = 0.05  # of a test in addition to its recorded cost
 GRACE_S = 60.0  # beyond the limit, for the last test that began within it
 SERVERS = {"forked", "cli", "sweeps"}  # fixtures that start another interpreter
-# of the marks of tests, what `make test` and `make test-faults` run
+# selects what `make test` and `make test-faults` run
 SLOW_TOO = ["-m", "not long and not peers"]
 OUTCOMES = ("killed", "stopped", "survived", "not covered")
 
@@ -287,8 +287,8 @@ class Recorder:
             self.seconds[report.nodeid] = report.duration
 
 
-def record(copy: Path, test_file: str, chosen: list[str], to: Path) -> None:
-    """In a child: run the chosen tests of a file; write their costs, and which of them execute which lines."""
+def record(copy: Path, test_file: str, marks: list[str], to: Path) -> None:
+    """In a child: run tests of a file, chosen by marks; write their costs, and which lines each of them executes."""
     import coverage
 
     folder, source = to.with_suffix(""), copy / "src" / "impact"
@@ -298,7 +298,7 @@ def record(copy: Path, test_file: str, chosen: list[str], to: Path) -> None:
     os.environ["PYTHONPATH"] = os.pathsep.join([str(folder), os.environ["PYTHONPATH"]])
     measured = coverage.Coverage(data_file=None, config_file=False, include=[f"{source}/*"])
     recorder = Recorder(measured, source, folder)
-    pytest.main([test_file, *chosen, "-p", "no:cacheprovider"], plugins=[recorder])
+    pytest.main([test_file, *marks, "-p", "no:cacheprovider"], plugins=[recorder])
     measured.stop()
     data = measured.get_data()
     executed: dict[str, dict[int, set[str]]] = defaultdict(lambda: defaultdict(set))
@@ -430,6 +430,7 @@ class Judge:
             "no:cacheprovider",
             "--tb=no",
             "-rf",
+            # or pytest would leave out slow tests, although they are named
             *SLOW_TOO,
             *tests,
         ]
@@ -511,15 +512,15 @@ def main() -> None:
     code = hashlib.sha256()
     for file in (*sorted(Path("src").rglob("*.py")), Path("tests/conftest.py"), Path("tests/fork_server.py")):
         code.update(file.read_bytes())
-    records, chosen = [], SLOW_TOO if options.slow else []
+    records, marks = [], SLOW_TOO if options.slow else []
     files = [Path(file) for file in options.tests or sorted(Path("tests").glob("test_*.py"))]
     for file in files:
-        key = hashlib.sha256(code.digest() + file.read_bytes() + "".join(chosen).encode()).hexdigest()[:16]
+        key = hashlib.sha256(code.digest() + file.read_bytes() + "".join(marks).encode()).hexdigest()[:16]
         to = folder / f"{file.stem}-{key}.json"
         if not to.exists():
             begin = time.monotonic()
             in_child(
-                functools.partial(record, copy, str(file), chosen, to), to.with_suffix(".log"), 600.0, copy / "src"
+                functools.partial(record, copy, str(file), marks, to), to.with_suffix(".log"), 600.0, copy / "src"
             )
             print(f"{file}: recorded in {time.monotonic() - begin:.0f} s", flush=True)
         if to.exists():
@@ -531,7 +532,7 @@ def main() -> None:
     sys.path.insert(0, str(copy / "src"))
     os.environ["PYTHONPATH"] = os.pathsep.join([str(copy / "src"), os.environ.get("PYTHONPATH", "")])
     doctests = {mutant.path for mutant in judged.values()}
-    pytest.main([*map(str, files), *doctests, *chosen, "-p", "no:cacheprovider"], plugins=[plugin])
+    pytest.main([*map(str, files), *doctests, *marks, "-p", "no:cacheprovider"], plugins=[plugin])
 
 
 if __name__ == "__main__":

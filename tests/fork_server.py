@@ -278,7 +278,7 @@ def run_command(argv: list[str], cwd: str, code: str, stdout: int, stderr: int) 
                 # the exit status of the interpreter if it cannot flush
                 status = 120
         atexit._run_exitfuncs()
-        # HDF5 closes its files when the process ends, and can crash then; the ends of other libraries take longer
+        # HDF5 closes its files when a process ends, and can crash then; what other libraries do then takes longer
         if h5 := sys.modules.get("h5py.h5"):
             ctypes.CDLL(h5.__file__).H5close()
         os._exit(status if isinstance(status, int) else 99)

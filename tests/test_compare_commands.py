@@ -32,7 +32,7 @@ from impact.results.xarray_backend import write_sealed
 from .conftest import CHI, PLUGIN, ROOT, WIDE, full_disk
 from .fork_server import CompletedCommand, ForkServer, abandoned_pipe, printed_on_terminal
 
-# hundreds of commands, or sweeps step by step: `make test-faults` runs them
+# hundreds of commands: `make test-faults` runs them
 pytestmark = pytest.mark.slow
 
 FORMATS = ("table", "json", "junit", "markdown", "github")

@@ -14,7 +14,7 @@ from impact.formatting import number
 
 from .conftest import Run
 
-# hundreds of commands, or sweeps step by step: `make test-faults` runs them
+# calibrations of several laws: `make test-faults` runs them
 pytestmark = pytest.mark.slow
 
 SPEEDS = [0.2, 0.6, 1.5, 3.0]

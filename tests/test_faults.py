@@ -36,7 +36,7 @@ from .faults import (
     sweep_duration,
 )
 
-# reads the states of processes in /proc
+# many processes, whose states are read in /proc: `make test-faults` runs them
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(sys.platform != "linux", reason="needs /proc")]
 MISSING_SPACE = re.compile(r"; it takes ([\d,]+) bytes more, ([\d,]+) are free; ")
 # an atomic change of names, where None removes a name; and the content of a disk, where None is a folder

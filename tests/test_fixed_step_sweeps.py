@@ -26,7 +26,7 @@ from impact.plots.kinds import Choice
 from .conftest import ROOT, Run, assert_same_bits, new_law
 from .test_plots import check_layout, names_of
 
-# hundreds of commands, or sweeps step by step: `make test-faults` runs them
+# sweeps step by step: `make test-faults` runs them
 pytestmark = pytest.mark.slow
 
 LINEAR = "anagnostopoulos-1988"

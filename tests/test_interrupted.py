@@ -36,7 +36,7 @@ from .faults import (
     wait_until,
 )
 
-# reads the states of processes in /proc
+# many processes, whose states are read in /proc: `make test-faults` runs them
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(sys.platform != "linux", reason="needs /proc")]
 ALL_BLOCKS = set(range(BLOCKS))
 FLAGS = ((), ("--overwrite",), ("--resume",))

@@ -161,8 +161,9 @@ def test_a_sealed_file_with_a_defect_is_not_loaded(create_malicious: CreateMalic
             pytest.param(name, [COMMANDS[number % len(COMMANDS)]], marks=pytest.mark.slow)
             for number, name in enumerate(CASES)
         ),
-        # one of each kind by all commands, which read a file by the same functions
-        *((kinds[0], COMMANDS) for kinds in (list(CHANGES), list(PATCHES), list(FACTORED))),
+        # all commands read a file by the same functions: one case of each kind, and in the long tests every case
+        *((next(iter(cases)), COMMANDS) for cases in (CHANGES, PATCHES, FACTORED)),
+        *(pytest.param(name, COMMANDS, marks=pytest.mark.long) for name in CASES),
     ],
 )
 def test_commands_refuse_a_file_with_a_defect(

@@ -19,7 +19,7 @@ from rich.cells import cell_len
 
 import impact
 
-from .conftest import ROOT, Run
+from .conftest import ROOT, Run, assert_same_bits
 
 unit = pint.UnitRegistry()
 BASE = {
@@ -194,6 +194,14 @@ def test_the_command_line_names_a_wrong_value_of_sel(cli: Run, result: xr.Datase
 def test_public_functions_are_pickled_by_their_name() -> None:
     for name in impact.__all__:
         assert pickle.loads(pickle.dumps(getattr(impact, name))) is getattr(impact, name)
+
+
+@pytest.mark.parametrize("times", [np.int64(5), np.array(5)])
+def test_the_number_of_points_of_a_history_is_an_integer_of_any_library(times: Any) -> None:
+    history, expected = (impact.run(model="hertz", times=number).history for number in (times, 5))
+    assert history is not None
+    assert expected is not None
+    assert_same_bits(history, expected)
 
 
 @pytest.mark.slow

@@ -411,6 +411,7 @@ def law_quantities(law: ForceModel | FrictionLaw) -> dict[str, Quantity]:
 
 
 def _parameter_table(law: ForceModel | FrictionLaw) -> ParameterTable:
+    """List what the table [model.KEY] or [friction.KEY] of a law may contain."""
     defaults = {parameter.name: parameter.default for parameter in law.parameters}
     # a contact force and a friction law may have one key
     name = law.key if isinstance(law, ForceModel) else f"friction_{law.key}"
@@ -500,19 +501,16 @@ def document_type(
     models: Mapping[str, ForceModel], with_tables: Mapping[str, Iterable[str]] | None = None
 ) -> type[Document]:
     """Build the type of a whole config, in which some laws, by default all, have a table of parameters."""
-    laws_of_tables = [(name, laws_of(name, models)) for name in LAW_TABLES]
-    tables = (
-        tuple(
-            (key, _parameter_table(laws[key]))
-            for key in (with_tables[name] if with_tables else laws)
-            if key in laws
-        )
-        for name, laws in laws_of_tables
-    )
-    return _document_type(tuple(_law_names(laws) for _, laws in laws_of_tables), tuple(tables))
+    names, tables = [], []
+    for name in LAW_TABLES:
+        laws = laws_of(name, models)
+        keys = laws if with_tables is None else [key for key in with_tables[name] if key in laws]
+        names.append(_law_names(laws))
+        tables.append(tuple((key, _parameter_table(laws[key])) for key in keys))
+    return _document_type(tuple(names), tuple(tables))
 
 
-# a point of a result has the config of its sweep, and so have the points of a page of figures
+# each point of a result that is integrated again has the config of its sweep
 @lru_cache(maxsize=32)
 def _document_type(
     names: tuple[tuple[str, ...], ...], tables: tuple[tuple[tuple[str, ParameterTable], ...], ...]

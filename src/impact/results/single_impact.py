@@ -326,7 +326,9 @@ def run(
     plugin_set = read_plugins(plugins)
     opened = open_source(source, overrides, plugin_set)
     config, first = single_point(opened, model, at, friction=friction)
-    impact = run_single_impact(Plan(config, plugin_set.of(config.models)), first, times)
+    # an integer of another library would be taken for a time
+    samples = None if times is None else int(times)
+    impact = run_single_impact(Plan(config, plugin_set.of(config.models)), first, samples)
     if "e" not in first and (opened.has_own_e or "e" in (at or {})):
         warn_of_ignored_e(config, impact.values["e_out"])
     return impact
