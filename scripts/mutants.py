@@ -288,7 +288,7 @@ class Recorder:
 
 
 def record(copy: Path, test_file: str, marks: list[str], to: Path) -> None:
-    """In a child: run tests of a file, chosen by marks; write their costs, and which lines each of them executes."""
+    """In a child: run tests of a file, chosen by marks; write their costs, and which lines each executes."""
     import coverage
 
     folder, source = to.with_suffix(""), copy / "src" / "impact"
