@@ -431,15 +431,25 @@ def test_each_point_has_its_scale() -> None:
                 assert impact.compare(changed, fast, tol=tol).equal == equal
 
 
-def test_the_scale_of_a_spin_is_the_approach_with_the_slip_over_the_radius() -> None:
+def test_the_scales_of_spins_and_of_friction_have_the_approach_with_the_slip() -> None:
     radii = {"R1": 0.03, "R2": 0.04}
-    inputs = {"v1": 2.0, "v2": -1.0, "u1": 4.0, "m1": 1.0, "m2": 1.0, "K": 1e6, "mu": 0.3} | radii
+    inputs = {"v1": 2.0, "v2": -1.0, "u1": 4.0, "m1": 1.0, "m2": 3.0, "K": 1e6, "mu": 0.3} | radii
     swept = impact.sweep({"models": "hertz", "frictions": "coulomb-1785", "sweep": inputs})
-    for ball, R in enumerate(radii.values(), 1):
-        name, scale = f"omega{ball}_post", (3.0 + 4.0) / R
+    scales = {f"omega{ball}_post": (3.0 + 4.0) / R for ball, R in enumerate(radii.values(), 1)}
+    # m (v0^2 + g0^2)/2 with m = m1 m2/(m1 + m2)
+    scales["friction_loss"] = 0.75 * (3.0**2 + 4.0**2) / 2.0
+    for name, scale in scales.items():
         for part, equal in ((0.999, True), (1.001, False)):
             changed = _with(swept, name, swept[name].item() + part * 1e-6 * scale)
             assert impact.compare(changed, swept, tol=1e-6).equal == equal
+
+
+def test_impacts_without_slip_have_no_tangential_restitution_and_are_equal() -> None:
+    inputs = {"v1": 2.0, "u1": 0.0, "m1": 1.0, "m2": 3.0, "R1": 0.03, "R2": 0.04, "K": 1e6, "mu": 0.3}
+    swept = impact.sweep({"models": "hertz", "frictions": "coulomb-1785", "sweep": inputs})
+    assert np.isnan(swept["beta"].item())
+    assert swept["friction_status"].item() == 1
+    assert impact.compare(swept, swept, tol=0.0).equal
 
 
 def test_residuals_are_judged_by_their_bound(by_hand: xr.Dataset) -> None:
