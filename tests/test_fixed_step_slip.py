@@ -346,7 +346,9 @@ def test_timestep_has_the_tangential_restitution_of_a_sweep_over_the_phases() ->
     lines = [line.split() for line in str(result).splitlines()]
     for row in result.rows:
         (cells,) = (line for line in lines if line[:1] == [f"{row.steps_per_contact:g}"])
-        assert [*map(float, cells[-3:])] == pytest.approx([row.beta_mean, row.beta_least, row.beta_largest], rel=1e-3)
+        assert [*map(float, cells[-3:])] == pytest.approx(
+            [row.beta_mean, row.beta_least, row.beta_largest], rel=1e-3
+        )
     central = impact.timestep(LINEAR, at={**HOOKE, "v1": 1.0}, steps_per_contact=[12], phases=4).as_dict()
     assert "friction" not in central
     assert "beta_mean" not in central["rows"][0]
