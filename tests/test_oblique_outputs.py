@@ -127,17 +127,18 @@ def test_coulomb_is_its_closed_form() -> None:
     assert np.abs(elastic["beta_error"].values).max() < 1e-9
 
 
-def test_a_contact_of_coulomb_that_slides_and_then_sticks_changes_once() -> None:
+def test_a_contact_of_coulomb_changes_once_and_a_spring_twice() -> None:
     result = impact.sweep(
         {
             "models": "hertz",
-            "frictions": "coulomb-1785",
+            "frictions": ["coulomb-1785", SPRING],
             "sweep": BALL | {"u1": [0.1, 9.0]},
+            "friction": {SPRING: {"k_t": 3e3}},
             "output": {"variables": ["contact_regime", "slip_changes"]},
         }
     )
-    assert values(result, "contact_regime") == [3, 2]
-    assert values(result, "slip_changes") == [1, 0]
+    assert values(result, "contact_regime") == [3, 2, 3, 3]
+    assert values(result, "slip_changes") == [1, 0, 2, 2]
 
 
 def test_works_make_up_the_loss_and_momenta_are_kept() -> None:
