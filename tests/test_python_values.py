@@ -127,6 +127,7 @@ def test_another_type_is_named(source: object) -> None:
         (lambda: impact.estimate(BASE, jobs=1.5), "jobs: got a float, expected int"),  # type: ignore[arg-type]
         (lambda: impact.run(times=np.array(1)), "times: got 1, expected a whole number >= 2"),  # type: ignore[arg-type]
         (lambda: impact.sweep(impact.sweep(BASE)), "source: got a Dataset, expected a mapping"),
+        (lambda: impact.calibrate(impact.sweep(BASE)), "source: got a Dataset, expected a mapping"),  # type: ignore[arg-type]
         (
             lambda: impact.plot(impact.sweep(BASE), width=xr.DataArray(0.5)),  # type: ignore[arg-type]
             "width: got 0.5, expected a length from 26mm",
@@ -145,6 +146,10 @@ def test_another_type_is_named(source: object) -> None:
         (lambda: impact.export("lamps"), 'to: no code "lamps"; did you mean "lammps"?'),
         (lambda: impact.plot(impact.sweep(BASE), kind="foo"), 'kind: no kind "foo"'),
         (lambda: impact.plot(impact.sweep(BASE), sel={"e": [1, 2]}), 'sel={"e": [1, 2]}: got no single value'),
+        (
+            lambda: impact.plot(impact.sweep(BASE), sel={"e": xr.DataArray([1, 2])}),
+            'sel={"e": [1, 2]}: got no single value',
+        ),
         (lambda: impact.save(impact.sweep(BASE), ROOT / "README.md"), "or overwrite it (overwrite=True)"),
     ],
 )
@@ -225,6 +230,12 @@ def test_an_extension_takes_values_by_path(tmp_path: Path) -> None:
     impact.sweep(BASE, output=tmp_path / "r.h5")
     extended = impact.extend(tmp_path / "r.h5", {"sweep.e": np.array([0.25, 0.5, 0.75])})
     assert extended["e"].values.tolist() == [0.25, 0.5, 0.75]
+
+
+def test_an_extension_names_a_value_that_is_no_input(tmp_path: Path) -> None:
+    impact.sweep(BASE, output=tmp_path / "r.h5")
+    with pytest.raises(impact.ConfigError, match=r'^overrides\["sweep.v1"\]: sweep.v1: got a generator, expected'):
+        impact.extend(tmp_path / "r.h5", {"sweep.v1": (v for v in (1.0, 2.0))})
 
 
 def test_a_result_may_be_given_by_its_file(result: xr.Dataset, tmp_path: Path) -> None:
@@ -321,7 +332,8 @@ def test_the_text_of_a_result_has_100_columns() -> None:
 
 def test_a_result_at_a_prompt_is_its_text(result: xr.Dataset) -> None:
     results = impact.run(model="hertz"), impact.recommend(result), impact.compare(result, result)
-    for value in (*results, impact.cite("hertz"), impact.info(result)):
+    described = impact.cite("hertz"), impact.info(result), impact.check_model(impact.models()["hertz"])
+    for value in (*results, *described):
         assert repr(value) == str(value)
     assert repr(impact.models()["hertz"]) == "<ForceModel hertz: F = K δⁿ  (10)>"
 

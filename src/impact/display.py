@@ -307,8 +307,8 @@ class Displayed:
     """A result that a command prints: its plain data, its text, and what a notebook shows."""
 
     def __init_subclass__(cls) -> None:
-        # at a prompt a dataclass, a dict or a tuple would show its fields in place of its tables
-        if cls.__repr__ in (object.__repr__, dict.__repr__, tuple.__repr__):
+        # at a prompt a dataclass, a dict, a list or a tuple would show its fields in place of its tables
+        if cls.__repr__ in (object.__repr__, dict.__repr__, list.__repr__, tuple.__repr__):
             cls.__repr__ = cls.__str__  # type: ignore[assignment, method-assign]
 
     @abstractmethod

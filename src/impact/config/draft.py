@@ -263,14 +263,15 @@ def _library_setting(name: str, without: Iterable[str] = ()) -> Setting:
     return Setting(path, properties, argument("overrides", text), text)
 
 
-def open_config(source: Path | Mapping[str, object] | None, plugins: Sequence[ForceModel] = ()) -> Draft:
+def open_config(source: str | Path | Mapping[str, object] | None, plugins: Sequence[ForceModel] = ()) -> Draft:
     """Open the config of a TOML file or a mapping, in which names of files are relative to its folder.
 
     None is the starter config, for which they are relative to the working directory.
     """
     if source is None:
         return replace(open_text(STARTER_CONFIG.read_text(encoding="utf-8"), "starter", plugins), folder=Path())
-    if not isinstance(source, Mapping):
+    # a dataset is a mapping, too
+    if not isinstance(source, Mapping) or hasattr(source, "data_vars"):
         if not isinstance(source, str | Path):
             raise UsageError(f"source: got {type_of(source)}, expected a mapping, or the name of a TOML file")
         path = Path(source)

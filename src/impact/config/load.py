@@ -76,7 +76,7 @@ class Config:
 
 
 def read_config(
-    source: Path | Mapping[str, object] | None,
+    source: str | Path | Mapping[str, object] | None,
     overrides: Overrides = (),
     plugins: Sequence[ForceModel] = (),
     max_points: int = MAX_POINTS,

@@ -118,8 +118,7 @@ def calibrate(
     """
     require_counts(jobs=jobs)
     plugin_set = read_plugins(plugins)
-    read = Path(source) if isinstance(source, str) else source
-    config = read_config(read, overrides, plugin_set.models, purpose="calibrate")
+    config = read_config(source, overrides, plugin_set.models, purpose="calibrate")
     check_outputs([output, best], [source, *plugins, *config.files], overwrite=overwrite)
     if model is not None:
         if best is None:

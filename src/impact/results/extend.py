@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from .._version import __version__
 from ..atomic import check_outputs
-from ..config.draft import settings_of
+from ..config.draft import Setting, settings_of
 from ..config.files import override_text
 from ..config.grid import MAX_POINTS, Axis
 from ..config.input_names import InputName
@@ -127,19 +127,20 @@ def extend_to_file(
     3
     """
     source, target = Path(result), Path(result if output is None else output)
-    changes = [setting.override for setting in settings_of(overrides)]
     run = Run(
         backend or SERIAL, resume, overwrite, max_points, on_progress or ignore, should_stop=should_stop or never
     )
     check_outputs([target], plugins, overwrite=True)
     plugin_set = read_plugins(plugins)
     with run.connected() as connected:
-        outcome = _extend_into(target, source, changes, plugin_set, connected)
+        outcome = _extend_into(target, source, settings_of(overrides), plugin_set, connected)
     run.check_stop(f"{target} is complete")
     return outcome
 
 
-def _extend_into(output: Path, source: Path, overrides: Sequence[str], plugins: Plugins, run: Run) -> SweepOutcome:
+def _extend_into(
+    output: Path, source: Path, changes: Sequence[Setting], plugins: Plugins, run: Run
+) -> SweepOutcome:
     """Write the extended result: that of a single sweep of its config.
 
     A result of layout `full` holds values of points and no trajectories: those of all new points are integrated,
@@ -152,7 +153,7 @@ def _extend_into(output: Path, source: Path, overrides: Sequence[str], plugins: 
         config = stored_config(before.attrs, [], plugins, name, run.max_points)
         old = Plan(config, plugins.of(config.models))
         _check_whole(before, old, name)
-        new = _extended_plan(before, old, overrides, plugins, name, run.max_points)
+        new = _extended_plan(before, old, changes, plugins, name, run.max_points)
         if before.attrs.get("core") in CORES:
             # the existing trajectories were integrated by this core
             solver = replace(new.config.solver, core=str(before.attrs["core"]))
@@ -162,7 +163,8 @@ def _extend_into(output: Path, source: Path, overrides: Sequence[str], plugins: 
         axes = tuple(_axis_positions(axis, old.inputs, name) for axis in new.config.axes)
         _check_none_lost(old, axes, name)
         seal = str(before.encoding["seal"])
-        history = [*read_attribute(before.attrs, "extended", name), {"seal": seal, "set": list(overrides)}]
+        record = {"seal": seal, "set": [setting.override for setting in changes]}
+        history = [*read_attribute(before.attrs, "extended", name), record]
         old_positions = _OldPositions(old, new, axes)
         n_integrated: dict[int, int] = {}
 
@@ -195,10 +197,10 @@ def _check_whole(before: xr.Dataset, old: Plan, name: str) -> None:
 
 
 def _extended_plan(
-    before: xr.Dataset, old: Plan, overrides: Sequence[str], plugins: Plugins, source: str, max_points: int
+    before: xr.Dataset, old: Plan, changes: Sequence[Setting], plugins: Plugins, source: str, max_points: int
 ) -> Plan:
-    """Plan the sweep with the overrides, and all values and models of the result."""
-    config = stored_config(before.attrs, overrides, plugins, source, max_points)
+    """Plan the sweep with the changes, and all values and models of the result."""
+    config = stored_config(before.attrs, changes, plugins, source, max_points)
     added = []
     for axis in config.axes:
         name = axis.name
@@ -222,7 +224,7 @@ def _extended_plan(
             keys = [*(law.key for law in laws), *(law.key for law in now if law not in laws)]
             added.append(override_text((table,), keys))
     if added:
-        config = stored_config(before.attrs, [*overrides, *added], plugins, source, max_points)
+        config = stored_config(before.attrs, [*changes, *added], plugins, source, max_points)
     return Plan(config, plugins.of(config.models))
 
 

@@ -81,14 +81,14 @@ def select(dataset: xr.Dataset, sel: Mapping[str, object]) -> xr.Dataset:
         values = dataset[name].values
         plain = to_plain_value(value)
         if not isinstance(plain, float | int | str):
-            raise UsageError(f"{argument('sel', {name: value})}: got no single value, expected one")
+            raise UsageError(f"{argument('sel', {name: plain})}: got no single value, expected one")
         number = in_si(dataset[name], plain)
         same = _matches_value(values, number)
         if dim in masks and same.any():
             same &= masks[dim]
         if not same.any():
             shown = safe_text(_nearest_values(name, values, number))
-            raise UsageError(f"no {name} = {value} in this result; {shown}")
+            raise UsageError(f"no {name} = {plain} in this result; {shown}")
         masks[dim] = same
     return dataset.isel({dim: _matching_positions(dataset[dim], same) for dim, same in masks.items()})
 

@@ -615,7 +615,7 @@ def open_source(source: ConfigSource, overrides: Overrides, plugins: Plugins) ->
         draft = replace(starter, origins={}).with_settings(settings_of(overrides))
         return PointSource(draft, plugins, has_selection=("models",) in draft.origins, is_starter=True)
     reject_law_key(source, "model", plugins.models)
-    draft = open_config(Path(source) if isinstance(source, str) else source, plugins.models)
+    draft = open_config(source, plugins.models)
     return PointSource(draft.with_settings(settings_of(overrides)), plugins)
 
 

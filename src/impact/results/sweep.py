@@ -243,14 +243,10 @@ def read_plan(
     run: Run = DEFAULT_RUN,
 ) -> Plan:
     """Read a config and its plug-ins, and report values that are implausible."""
-    if isinstance(source, xr.Dataset):
-        # it is a mapping too
-        raise UsageError("source: got a Dataset, expected a mapping of the keys of a config, or a TOML file")
-    source = Path(source) if isinstance(source, str) else source
     plugin_set = read_plugins(plugins)
     config = read_config(source, overrides, plugin_set.models, run.max_points)
     plan = Plan(config, plugin_set.of(config.models))
-    name = str(source) if isinstance(source, Path) else "config"
+    name = str(source) if isinstance(source, str | Path) else "config"
     plan.check_count(run.max_points, name)
     for note in (*config.notes, *input_notes(plan.inputs), *plan.pair_notes(f"{name}: frictions")):
         run.on_note(note)
