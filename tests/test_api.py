@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import builtins
 import functools
 import inspect
 import json
@@ -41,6 +42,19 @@ def test_each_public_function_documents_what_it_returns() -> None:
     returning = [function for function in functions if inspect.signature(function).return_annotation != "None"]
     assert [f.__name__ for f in returning if "Returns\n    -------\n" not in (f.__doc__ or "")] == []
     assert "Raises\n    ------\n" in (impact.load.__doc__ or "")
+
+
+def test_types_of_results_and_errors_are_public() -> None:
+    """Users annotate their functions with them, and catch them."""
+    for name in impact.__all__:
+        function = getattr(impact, name)
+        if inspect.isfunction(function):
+            for kind in str(inspect.signature(function).return_annotation).split(" | "):
+                member = inspect.unwrap(function).__globals__.get(kind)
+                is_own = inspect.isclass(member) and member.__module__.startswith("impact.")
+                assert not is_own or kind in impact.__all__, f"{name} returns {kind}"
+            raised = re.findall(r"\b[A-Z][a-zA-Z]+Error\b", function.__doc__ or "")
+            assert set(raised) <= {*impact.__all__, *vars(builtins)}, name
 
 
 def test_all_is_exactly_what_is_public() -> None:

@@ -39,9 +39,11 @@ Laws and what they need: models, frictions, materials, cite, check_model, hyster
 Classes of laws: ForceModel, FrictionLaw, Parameter, Evidence
 
 Classes of results: Impact, PreparedProblem, Ranking, SolveResult, TimestepResult, Export, Estimate, Verdict,
-Models, Frictions, Citations, Environment, Board, Engines
+SweepOutcome, ShardProgress, PlotFiles, Info, Fits, Studies, Board, Engines, Models, ModelDescription, Frictions,
+FrictionDescription, ContractResult, Citations, Environment
 
-Errors and warnings: ImpactError, ConfigError, ModelError, ResultError, StoreError, UsageError, ImpactWarning
+Errors and warnings: ImpactError, ConfigError, ModelError, ResultError, StoreError, UsageError, InUseError,
+UnfinishedError, MissingFileError, ImpactWarning
 """
 
 from __future__ import annotations

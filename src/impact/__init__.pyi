@@ -10,21 +10,28 @@ from .config.starter import init as init
 from .config.tables import schema as schema
 from .conformance.conform import conform as conform
 from .conformance.registry import Engines as Engines, conform_engines as conform_engines
-from .contact.checks import check_model as check_model
+from .contact.checks import ContractResult as ContractResult, check_model as check_model
 from .contact.evidence import Evidence as Evidence
 from .contact.friction import FrictionLaw as FrictionLaw
 from .contact.model import ForceModel as ForceModel, Parameter as Parameter
 from .contact.models.hysteresis import hysteresis as hysteresis
 from .contact.powers import power as power
-from .engine.friction_catalogue import Frictions as Frictions, frictions as frictions
-from .engine.model_catalogue import Models as Models, models as models
+from .engine.friction_catalogue import (
+    FrictionDescription as FrictionDescription,
+    Frictions as Frictions,
+    frictions as frictions,
+)
+from .engine.model_catalogue import ModelDescription as ModelDescription, Models as Models, models as models
 from .errors import (
     ConfigError as ConfigError,
     ImpactError as ImpactError,
     ImpactWarning as ImpactWarning,
+    InUseError as InUseError,
+    MissingFileError as MissingFileError,
     ModelError as ModelError,
     ResultError as ResultError,
     StoreError as StoreError,
+    UnfinishedError as UnfinishedError,
     UsageError as UsageError,
 )
 from .exporters.environment import Environment as Environment, doctor as doctor
@@ -35,18 +42,19 @@ from .inverse.solve import SolveResult as SolveResult, solve as solve
 from .inverse.timestep import TimestepResult as TimestepResult, timestep as timestep
 from .plots.draw import plot as plot
 from .plots.explore import explore as explore
-from .plots.files import plot_to_files as plot_to_files
+from .plots.files import PlotFiles as PlotFiles, plot_to_files as plot_to_files
 from .progress_display import progress_bar as progress_bar
 from .reporting.page import page as page
 from .reporting.report import report as report
 from .results.board import Board as Board
 from .results.citations import Citations as Citations, cite as cite
-from .results.describe import describe as describe
+from .results.describe import Fits as Fits, Studies as Studies, describe as describe
 from .results.estimate import Estimate as Estimate, estimate as estimate
 from .results.extend import extend as extend, extend_to_file as extend_to_file
-from .results.info import info as info
+from .results.info import Info as Info, info as info
+from .results.outcome import SweepOutcome as SweepOutcome
 from .results.ranking import Ranking as Ranking, recommend as recommend
-from .results.shards import merge as merge, sweep_shard as sweep_shard
+from .results.shards import ShardProgress as ShardProgress, merge as merge, sweep_shard as sweep_shard
 from .results.single_impact import Impact as Impact, run as run
 from .results.sweep import sweep as sweep, sweep_to_file as sweep_to_file
 from .results.xarray_backend import expand as expand, load as load, save as save
