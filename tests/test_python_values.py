@@ -373,6 +373,42 @@ def test_implausible_inputs_and_results_are_warnings_at_the_line_of_the_user() -
         impact.sweep({"models": "hertz", "sweep": {**sweep, "v1": 2000.0, "material": "steel"}})
 
 
+def broken(e: np.ndarray) -> np.ndarray:
+    raise NameError("no such name")
+
+
+BROKEN = impact.hysteresis("broken-2026", title="Broken", year=2026, equation="", reference="", chi=broken)
+INCOMPLETE = {
+    "models": "anagnostopoulos-1988",
+    "sweep": {"v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 1e6, "n": 1.0, "e": {"fit": [0.1, 1.0]}},
+    "data": {"columns": {"e_out": [0.49, "NA", 0.51], "sigma": [0.01, 0.01, 0.01]}},
+}
+
+
+@pytest.mark.parametrize(
+    ("call", "note"),
+    [
+        (lambda: impact.calibrate(INCOMPLETE), "1 of 3 rows has no e_out"),
+        (
+            lambda: impact.sweep(models="broken-2026", plugins=[BROKEN]),
+            "model broken-2026: NameError: no such name",
+        ),
+        (lambda: impact.run(model="broken-2026", plugins=[BROKEN]), "model broken-2026: NameError: no such name"),
+        (lambda: impact.check_model(BROKEN), "model broken-2026: NameError: no such name"),
+        (
+            lambda: impact.plot(
+                impact.sweep(BASE), points=pd.DataFrame({"e": [0.5], "v1_post": [0.4], "batch": [1]})
+            ),
+            "columns without use: batch",
+        ),
+    ],
+)
+def test_a_note_is_a_warning_at_the_line_of_the_user(call: Callable[[], object], note: str) -> None:
+    with pytest.warns(impact.ImpactWarning, match=note) as caught:
+        call()
+    assert {warning.filename for warning in caught} == {__file__}
+
+
 @pytest.mark.parametrize("dt", ["2 us", 2e-6, np.float64(2e-6), 2 * unit.us, np.array([2e-6]), ["0.002 ms"]])
 def test_a_step_is_a_number_or_several_with_or_without_a_unit(dt: Any) -> None:
     (row,) = impact.timestep("anagnostopoulos-1988", at={"e": 0.5}, dt=dt, tol="2%", phases=4).rows

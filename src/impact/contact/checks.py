@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -12,6 +11,7 @@ import numpy as np
 
 from ..array_types import Array
 from ..display import Block, Displayed, Styled, Table
+from ..errors import warn
 from ..formatting import number
 from .impacts import INPUTS, Impacts, stiffness
 from .materials import effective_mass, hertz_stiffness, sphere_radius
@@ -162,7 +162,7 @@ def _check_clauses(model: ForceModel) -> Iterator[ClauseResult]:
         errors: dict[str, str] = {}
         values = collide(model, impacts, rtol=rtol, max_steps=CONTRACT_MAX_STEPS, errors=errors)
         for error in errors.keys() - reported:
-            warnings.warn(errors[error], stacklevel=2)
+            warn(errors[error])
         reported.update(errors)
         return values
 

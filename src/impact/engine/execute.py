@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import socket
 import time
-import warnings
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
@@ -30,7 +29,7 @@ from ..contact.records import Record
 from ..contact.simulate import simulate
 from ..contact.status import FRICTION_STATUSES, STATUSES
 from ..contact.tangential import TangentialResult, simulate_friction
-from ..errors import StoreError, UsageError
+from ..errors import StoreError, UsageError, warn
 from .executors import ExecutorSpec
 from .plan import Plan
 from .run import Run
@@ -143,7 +142,7 @@ def integrate_ranges(
                         partial(submit, executor), remaining, running, find_reused, spec.capacity, run.should_stop
                     ):
                         for error in errors.keys() - reported:
-                            warnings.warn(errors[error], stacklevel=2)
+                            warn(errors[error])
                         reported |= errors.keys()
                         yield trajectory_range, collisions
                     return

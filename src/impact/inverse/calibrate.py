@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import math
-import warnings
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -34,7 +33,7 @@ from ..engine.executors import choose_executor
 from ..engine.plan import Plan
 from ..engine.plugins import Plugins, read_plugins
 from ..engine.trajectories import PlanLaw, model_of
-from ..errors import UsageError
+from ..errors import UsageError, warn
 from ..formatting import argument
 from ..results.calibration import calibration_template, fitted_config, position_of_law
 from ..results.describe import describe
@@ -126,7 +125,7 @@ def calibrate(
             raise UsageError(f"{argument('model')}: set without {best_file}, which is written for that law")
         position_of_law(list(laws_to_fit(config)), model, argument("model"))
     for note in config.notes:
-        warnings.warn(note, stacklevel=2)
+        warn(note)
     result = calibrate_config(config, plugin_set.of(config.models), jobs)
     if output is not None and Path(output).suffix.lower() in TABLE_SUFFIXES:
         write_table(describe(result), Path(output), TableForm(), overwrite=overwrite)

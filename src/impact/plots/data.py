@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import Field, dataclass, replace
 from pathlib import Path
@@ -14,7 +13,7 @@ from ..config.quantities import Quantity
 from ..config.tables import LABORATORY, STANDARD_GRAVITY, SWEEP_QUANTITIES
 from ..contact.variables import HISTORY, OUTPUTS
 from ..display import TableForm, encode_frame
-from ..errors import ConfigError, UsageError
+from ..errors import ConfigError, UsageError, warn
 from ..formatting import argument, heading, safe_text
 from ..results.schema import plain_unit
 
@@ -128,7 +127,7 @@ def read_points(points: str | Path | Mapping[str, Sequence[object]] | pd.DataFra
         raise ConfigError(*problems)
     for note in (count, f"columns without use: {', '.join(unused)}" if unused else ""):
         if note:
-            warnings.warn(safe_text(f"{columns.source}: {note}", 1000), stacklevel=2)
+            warn(safe_text(f"{columns.source}: {note}", 1000))
     columns, values, variable = columns.take(rows), {}, ""
     for name in used:
         quantity, unit = quantities[name], ""

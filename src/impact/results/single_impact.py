@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import json
 import math
-import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -377,7 +376,7 @@ def run_single_impact(plan: Plan, first: tuple[str, ...], times: int | None = No
     )
     values = {name: array[0].item() for name, array in collision.items()}
     for error in errors.values():
-        warnings.warn(error, stacklevel=2)
+        warn(error)
     history = slip = None
     # a history is that of the continuous law
     has_slip = values.get("friction_status", FrictionStatus.OK) < FIRST_FAILURE
@@ -629,7 +628,7 @@ def _open_stored(dataset: xr.Dataset, overrides: Overrides, plugins: Plugins, na
         require_sweep(dataset, name)
     draft = stored_draft(dataset.attrs, plugins, name).with_settings(settings)
     for note in (*changed_plugins(dataset.attrs, plugins, name), *unknown_plugins(dataset.attrs, plugins, name)):
-        warnings.warn(note, stacklevel=4)
+        warn(note)
     labels = {str(key): label.values.item() for key, label in dataset.coords.items() if label.ndim == 0}
     labels = {} if calibration else {k: value for k, value in labels.items() if k not in LAW_DIMS}
     return PointSource(draft, plugins, labels, calibration=calibration)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import math
-import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -18,7 +17,7 @@ from ..config.files import RESULT_MAGIC
 from ..config.grid import MAX_POINTS
 from ..config.tables import Output
 from ..contact.variables import OUTPUTS
-from ..errors import ResultError, UnfinishedError, UsageError
+from ..errors import ResultError, UnfinishedError, UsageError, warn
 from ..formatting import argument, safe_text, type_of
 from .hdf5_structure import byte_reader, check_root
 from .kinds import kind_of, require_result, require_sweep
@@ -147,7 +146,7 @@ def open_result(path: str | Path) -> xr.Dataset:
         on_error.pop_all()
     if unknown:
         shown, names = safe_text(str(path)), safe_text(", ".join(unknown))
-        warnings.warn(f"{shown}: ignored variables that are not part of a result: {names}", stacklevel=2)
+        warn(f"{shown}: ignored variables that are not part of a result: {names}")
     dataset.encoding = {"source": str(path), "seal": seal, "layout": layout}
     dataset.set_close(file.close)
     return dataset
