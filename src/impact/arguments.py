@@ -143,11 +143,9 @@ def _alternatives(annotation: str) -> list[str]:
     ['str', 'Sequence[str | Path]', 'None']
     """
     union = ast.parse(annotation, mode="eval").body
-    last: list[str] = []
-    while isinstance(union, ast.BinOp):
-        last.insert(0, ast.unparse(union.right))
-        union = union.left
-    return [ast.unparse(union), *last]
+    if isinstance(union, ast.BinOp):
+        return [*_alternatives(ast.unparse(union.left)), ast.unparse(union.right)]
+    return [annotation]
 
 
 def _is_of(value: object, text: str, names: dict[str, Any]) -> bool:

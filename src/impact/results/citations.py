@@ -66,11 +66,9 @@ class Citations(tuple[Citation, ...], Displayed):
 
     def as_dict(self) -> dict[str, Any]:
         """The objects of the JSON by the keys of their laws."""
-        return {citation.model: dict(vars(citation)) for citation in self}
+        return {citation["model"]: citation for citation in self.as_list()}
 
-    def records(self) -> Sequence[dict[str, Any]]:
-        """A row for each law."""
-        return self.as_list()
+    records = as_list
 
     def sections(self, width: int) -> Iterator[Block]:
         """The entries."""
