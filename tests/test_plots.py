@@ -723,6 +723,22 @@ def test_parameters_of_laws_are_in_the_conditions_if_the_legend_lacks_them(legen
     assert ("A = " in text) == bool(end)
 
 
+def test_a_legend_in_foreign_axes_fits_them_and_takes_no_room() -> None:
+    result = impact.sweep(models=["flores-2011", "hunt-crossley-1975"], e=[0.5, 0.9])
+    figure = Figure((6.6, 2.6), layout="constrained")
+    first, second = figure.subplots(1, 2)
+    impact.plot(result, kind="restitution", ax=first)
+    impact.plot(result, kind="restitution", ax=second, legend="none")
+    figure.canvas.draw()
+    assert "Flores et al. (2011)" in [text.get_text() for text in first.get_legend().get_texts()]
+    assert first.get_legend().get_window_extent().width <= first.bbox.width == pytest.approx(second.bbox.width)
+    wide = Figure((9.0, 4.0)).subplots()
+    impact.plot(result, kind="restitution", ax=wide)
+    assert "Flores, Machado, Silva and Martins (2011)" in [
+        text.get_text() for text in wide.get_legend().get_texts()
+    ]
+
+
 def test_a_picture_without_legend_and_foreign_axes_without_title(coarse: xr.Dataset) -> None:
     axes = Figure((4.0, 4.0)).subplots(1, 2)
     impact.plot(coarse, kind="restitution", ax=axes[0], legend="none")

@@ -12,6 +12,7 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter
 
 from ..contact.model import ForceModel
@@ -87,7 +88,7 @@ def plot(
     title : write the title and the conditions; by default unless `ax` is set
     legend : name laws by title, year and parameters ("full"), by first author and year ("short"), or by key
         ("keys"); "none" for no legend; by default the first of these with which it takes at most a fifth of the
-        height, else the shortest in a higher picture
+        height, else the shortest in a higher picture; in `ax` the first with which it is as wide as the axes
     decimal : "point" or "comma", in all numbers; "locale" for that of LC_NUMERIC
     labels : texts by the name of an axis, of a variable whose name is at the end of its curve, the key of a law,
         "reference" or "title"
@@ -150,18 +151,21 @@ def draw(
 ) -> Figure:
     """Draw a picture, in a new figure or into the user's axes."""
     check_labels(look.labels or {}, label_keys(plot_data, look))
+    all_axes = [] if ax is None else _check_axes(ax, plot_data.panel_count)
+    if all_axes and look.legend is None:
+        look = replace(look, legend=_legend_for(all_axes[0], plot_data, look))
     labels = _labels(plot_data, look)
     measured = points if points is None or isinstance(points, Points) else read_points(points)
     if measured is not None and not isinstance(plot_data, CurveData):
         raise UsageError(f"{measured.source}: measured points are drawn over curves only")
     heading = labels.get("title", escape_mathtext(plot_data.title))
-    if ax is not None:
-        all_axes = _check_axes(ax, plot_data.panel_count)
+    if all_axes:
         entries = _draw_panels(plot_data, all_axes, labels, measured, look)
         if look.title:
             all_axes[0].set_title(heading)
         if entries and look.legend != "none":
-            all_axes[0].legend(*zip(*entries, strict=True), fontsize="small")
+            # outside of the layout, in which it would take room from the axes
+            all_axes[0].legend(*zip(*entries, strict=True), fontsize="small").set_in_layout(False)
         figure = all_axes[0].get_figure(root=True)
         assert figure is not None
         return figure
@@ -183,6 +187,19 @@ def _picture_with_room(plot_data: PlotData, look: Look, measured: Points | None,
         shares[legend] = picture.legend_share
     smallest = replace(look, legend=min(shares, key=shares.__getitem__))
     return _new_picture(plot_data, smallest, measured, heading, legend_rows=True)
+
+
+def _legend_for(axes: Axes, plot_data: PlotData, look: Look) -> str:
+    """Choose the longest names of laws with which a legend is no wider than the user's axes, else the keys."""
+    for legend in DEFAULT_LEGENDS:
+        names = {**plot_data.laws, **_labels(plot_data, replace(look, legend=legend))}
+        texts = [names[law] for law in plot_data.laws]
+        drawn = axes.legend([Line2D([], []) for _ in texts], texts, fontsize="small")
+        is_wide = drawn.get_window_extent().width > axes.bbox.width
+        drawn.remove()
+        if not is_wide:
+            break
+    return legend
 
 
 def _labels(plot_data: PlotData, look: Look) -> dict[str, str]:
