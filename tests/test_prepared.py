@@ -103,9 +103,10 @@ def test_where_there_is_no_rebound_outputs_are_nan() -> None:
         ({"e": [[0.1], [0.1, 0.2]]}, "e: got a list, expected a number from 0 to 1"),
         ({"angle": 0.1}, 'no input "angle" of this law; '),
         ({"gharib-hurmuzlu-2012.K": 1e9}, 'no input "gharib-hurmuzlu-2012.K" of this law; '),
+        (0.5, "values: got a float, expected Mapping[str, Any] | pd.DataFrame | None"),
     ],
 )
-def test_an_input_that_is_none_is_refused(values: dict[str, Any], message: str) -> None:
+def test_an_input_that_is_none_is_refused(values: Any, message: str) -> None:
     problem = impact.prepare(model="tsuji-1992", outputs="e_out")
     with pytest.raises(impact.UsageError) as refusal:
         problem(values)

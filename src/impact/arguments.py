@@ -105,7 +105,10 @@ def type_problem(function: Callable[..., object], args: Any, kwargs: Any) -> str
     for name, value in bound.arguments.items():
         parameter = signature.parameters[name]
         for item in value if parameter.kind is parameter.VAR_POSITIONAL else [value]:
-            if wrong := _wrong_type(item, parameter.annotation, function.__globals__):
+            # self has no annotation
+            if parameter.annotation is not parameter.empty and (
+                wrong := _wrong_type(item, parameter.annotation, function.__globals__)
+            ):
                 return f"{name}: got {wrong}, expected {parameter.annotation}"
     return ""
 

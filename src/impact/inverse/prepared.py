@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
+from ..arguments import name_wrong_types
 from ..array_types import Array
 from ..config.files import read_number, to_plain_data
 from ..config.grid import Axis
@@ -110,6 +111,7 @@ class PreparedProblem:
     def __repr__(self) -> str:
         return f"<PreparedProblem {self.law.key}>"
 
+    @name_wrong_types
     def __call__(self, values: Mapping[str, Any] | pd.DataFrame | None = None, /, **more: Any) -> dict[str, Any]:
         """Compute the outputs; `values` takes names that are no Python words, such as "materials.steel.E"."""
         read: dict[str, Array] = {}
