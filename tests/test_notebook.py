@@ -7,6 +7,7 @@ import io
 import re
 import sys
 from collections.abc import Callable
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -191,6 +192,9 @@ def test_controls_begin_with_what_is_given(tmp_path: Path) -> None:
     shown = impact.explore(tmp_path / "r.h5", kind="error", sel={"m2": "1500 g"}, models=["hertz"])
     controls, _, _ = controls_of(shown)
     assert [controls[name].value for name in ("kind", "m2", "models")] == ["error", 1.5, ("hertz",)]
+    # of any library, as the selection of a picture
+    for mass in (np.array(1.5), xr.DataArray(1.5), Fraction(3, 2)):
+        assert controls_of(impact.explore(result, sel={"m2": mass}))[0]["m2"].value == 1.5
     for choice, expected in (
         ({"kind": "eror"}, 'kind: no kind "eror" of this result; did you mean "error"'),
         ({"sel": {"m1": 1.0}}, 'sel: no axis "m1" to select along; known: e, m2'),

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..config.files import to_plain_value
 from ..config.grid import SAMPLE, Axis
 from ..config.input_names import InputName
 from ..config.load import Config
@@ -50,7 +51,7 @@ def explore(
     dataset: xr.Dataset | str | Path,
     *,
     kind: str | None = None,
-    sel: Mapping[str, float | str] | None = None,
+    sel: Mapping[str, object] | None = None,
     models: Sequence[str] | None = None,
     plugins: Sequence[ForceModel | str | Path] = (),
 ) -> VBox:
@@ -194,12 +195,12 @@ def _notes(swept: Sequence[str], reasons: Mapping[str, str]) -> str:
     return "".join(f"<p style='line-height: 1.4'>{escape(note)}</p>" for note in notes)
 
 
-def _slider(dataset: xr.Dataset, name: str, is_free: bool, value: float | str | None) -> Any:
+def _slider(dataset: xr.Dataset, name: str, is_free: bool, value: object) -> Any:
     """Make the slider of an axis, of any number in its range with a field or of its values, at a value."""
     import ipywidgets
 
     values, label = dataset[name].values, axis_label(name, unit_of(dataset[name]))
-    first = values[0].item() if value is None else in_si(dataset[name], value)
+    first = values[0].item() if value is None else in_si(dataset[name], to_plain_value(value))
     if not (is_free and isinstance(first, float | int) and values.min() <= first <= values.max()):
         # one of the grid, or the message that there is no such value
         first = select(dataset, {name: first})[name].values.ravel()[0].item()
