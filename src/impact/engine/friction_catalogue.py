@@ -10,7 +10,7 @@ from ..contact.friction import FrictionLaw
 from ..contact.frictions import frictions as catalogue
 from ..display import Block, Displayed, Table, Wrapped
 from ..formatting import with_year
-from .model_catalogue import MAX_TEXT, Laws, matching_laws, parameter_record, parameter_rows
+from .model_catalogue import MAX_TEXT, Laws, law_record, matching_laws, parameter_rows
 
 STIFFNESS = {
     "constant": "k_t or kt_over_kn",
@@ -39,14 +39,7 @@ class FrictionDescription(Displayed):
 
     def as_dict(self) -> dict[str, Any]:
         """The declaration as plain data."""
-        law = self.law
-        names = ["key", "title", "year", "kind", "equation", "reference", "doi", "same_as", "memory", "cap"]
-        names += ["scheme"] if law.scheme else []
-        return {
-            **{name: getattr(law, name) for name in names},
-            "evidence": vars(law.evidence),
-            "parameters": [parameter_record(parameter) for parameter in law.parameters],
-        }
+        return law_record(self.law, "kind", "memory", "cap", *(["scheme"] if self.law.scheme else []))
 
     def sections(self, width: int) -> Iterator[Block]:
         """The declaration, one property per line."""

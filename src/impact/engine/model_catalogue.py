@@ -43,16 +43,9 @@ class ModelDescription(Displayed):
 
     def as_dict(self) -> dict[str, Any]:
         """The declaration as plain data."""
-        model = self.model
-        names = ("key", "title", "year", "family", "equation", "reference", "doi", "same_as")
         return {
-            **{name: getattr(model, name) for name in names},
-            "evidence": vars(model.evidence),
-            "domain": {name: list(ends) for name, ends in model.domain.items()},
-            "domain_source": model.domain_source,
-            "parameters": [parameter_record(parameter) for parameter in model.parameters],
-            "exponent": model.exponent,
-            "release": model.release,
+            **law_record(self.model, "family", "domain_source", "exponent", "release"),
+            "domain": {name: list(ends) for name, ends in self.model.domain.items()},
             "delivered_restitution": self.delivered,
             "integrated_by": self.cores,
         }
@@ -99,10 +92,18 @@ class ModelDescription(Displayed):
         yield Table([row for row in rows.items() if row[1]], max_cell=MAX_TEXT)
 
 
-def parameter_record(parameter: Parameter) -> dict[str, Any]:
-    """The declaration of a parameter as plain data; what few parameters have is left out elsewhere."""
+def law_record(law: ForceModel | FrictionLaw, *others: str) -> dict[str, Any]:
+    """The declaration of a law as plain data, with other fields; a parameter lacks what few have."""
+    names = ("key", "title", "year", "equation", "reference", "doi", "same_as", *others)
     rare = ("optional", "choices", "is_damping")
-    return {name: value for name, value in vars(parameter).items() if value or name not in rare}
+    return {
+        **{name: getattr(law, name) for name in names},
+        "evidence": vars(law.evidence),
+        "parameters": [
+            {name: value for name, value in vars(parameter).items() if value or name not in rare}
+            for parameter in law.parameters
+        ],
+    }
 
 
 def parameter_rows(table: str, parameters: Sequence[Parameter]) -> dict[str, str]:
