@@ -55,5 +55,5 @@ def test_scripts_of_users_are_type_checked_and_misspelt_names_are_found(tmp_path
     (tmp_path / "misspelt.py").write_text(MISSPELT)
     done = run_python("-m", "mypy", *map(str, EXAMPLES), "misspelt.py", folder=tmp_path)
     assert [line for line in done.stdout.splitlines() if "error:" in line] == [
-        'misspelt.py:8: error: Module has no attribute "sweeep"  [attr-defined]'
+        'misspelt.py:8: error: Module has no attribute "sweeep"; maybe "sweep"?  [attr-defined]'
     ], done.stdout + done.stderr
