@@ -65,10 +65,10 @@ def info(result: xr.Dataset | str | Path) -> Info:
 
     Returns
     -------
-    dict : points; layout and seal of the file, None in memory; dimensions; coordinates; units, dims, smallest and
-        largest value and number of missing values of each variable; counts of points by status; largest errors by
-        variable and model; attributes. A value is None, or missing, where a summary would evaluate too many
-        points; `not_evaluated` counts the points without a status
+    Info : a dict of points; layout and seal of the file, None in memory; dimensions; coordinates; units, dims,
+        smallest and largest value and number of missing values of each variable; counts of points by status;
+        largest errors by variable and model; attributes. A value is None, or missing, where a summary would
+        evaluate too many points; `not_evaluated` counts the points without a status
 
     Raises
     ------
