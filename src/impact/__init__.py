@@ -48,7 +48,6 @@ UnfinishedError, MissingFileError, ImpactWarning
 
 from __future__ import annotations
 
-import ast
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -57,9 +56,13 @@ from typing import Any
 from ._version import __version__ as __version__
 
 # type checkers read the same names; each is imported on first use, so that `impact --help` needs no numpy
-_STUB = ast.parse(Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8"))
-_IMPORTS = [statement for statement in _STUB.body if isinstance(statement, ast.ImportFrom)]
-_MODULES = {alias.name: f".{statement.module}" for statement in _IMPORTS for alias in statement.names}
+_STUB = Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8")
+_MODULES = {
+    name: f".{module}"
+    for module, _, names in (statement.partition(" import ") for statement in _STUB.split("from .")[1:])
+    for name in names.replace("(", " ").replace(")", " ").replace(",", " ").split()
+    if name != "as"
+}
 __all__ = sorted(_MODULES.keys() - {"__version__"})
 
 
