@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -437,25 +436,16 @@ def test_a_map_of_many_points_is_stored_as_an_image(many: xr.Dataset, tmp_path: 
         assert (tmp_path / f"large.{form}").stat().st_size < 400_000
 
 
-def test_the_name_above_a_panel_has_at_most_three_lines() -> None:
+@pytest.mark.parametrize("legend", ["full", "short", "keys"])
+def test_names_above_panels_have_two_lines_within_them_and_letters_of_one_size(legend: str) -> None:
     sweep = {"v1": [1.0, 2.0], "e": [0.5, 0.9], "m1": 1.0, "m2": 1.0, "K": 6e9}
-    keys = ["lammps-coeff-restitution-hertz", "hertz"]
-    figure = draw(field_map(impact.sweep({"models": keys, "sweep": sweep})), Look(width="84mm"))
+    keys = ["lammps-coeff-restitution-hertz", "lankarani-nikravesh-1990", "hertz"]
+    figure = impact.plot(impact.sweep({"models": keys, "sweep": sweep}), kind="map", width="84mm", legend=legend)
     figure.draw_without_rendering()
-    long, short = (axes.get_children() for axes in figure.axes[:2])
-    (name,) = (text for text in long if isinstance(text, Text) and "coeff" in text.get_text())
-    assert name.get_text().count("\n") <= 2
-    (other,) = (text for text in short if isinstance(text, Text) and "Hertz" in text.get_text())
-    assert name.get_fontsize() < other.get_fontsize()
-
-
-def test_a_name_of_three_lines_keeps_its_letters(over_speed: xr.Dataset) -> None:
-    map_data = field_map(over_speed)
-    long = replace(
-        map_data.panels[0], label="Modia3D (v0.6.0 to v0.12.3, since February 2022), with a limit of 1 m/s"
-    )
-    figure = draw(replace(map_data, panels=(long, *map_data.panels[1:])), Look(width=7.1))
-    figure.draw_without_rendering()
-    first, second = (next(t for t in axes.get_children() if t is axes._left_title) for axes in figure.axes[:2])
-    assert first.get_text().count("\n") == 2
-    assert first.get_fontsize() == second.get_fontsize()
+    names = [axes.get_children() for axes in figure.axes[:3]]
+    shown = [text for each in names for text in each if isinstance(text, Text) and text.get_text()]
+    assert len(shown) == 3
+    assert len({text.get_fontsize() for text in shown}) == 1
+    for axes, text in zip(figure.axes, shown, strict=False):
+        assert text.get_text().count("\n") <= 1
+        assert text.get_window_extent().width <= axes.get_window_extent().width + 1.0

@@ -617,6 +617,14 @@ def test_every_line_and_text_follows_the_colours_of_a_style(coarse: xr.Dataset, 
     assert max(to_rgb(figure.axes[-1].get_xgridlines()[0].get_color())) == pytest.approx(0.1)
 
 
+def test_labels_of_low_panels_have_two_lines_and_letters_of_one_size(coarse: xr.Dataset) -> None:
+    figure = impact.plot(coarse, kind="history", sel={"e": 0.5}, width="84mm")
+    figure.draw_without_rendering()
+    labels = [axes.yaxis.label for axes in figure.axes]
+    assert all(label.get_text().count("\n") <= 1 for label in labels)
+    assert len({label.get_fontsize() for label in labels}) == 1
+
+
 def test_a_floor_of_errors_is_named_where_smaller_ones_are_drawn_at_it(coarse: xr.Dataset) -> None:
     def floors(result: xr.Dataset) -> list[str]:
         return [

@@ -41,8 +41,10 @@ LEGEND_SHARE = 0.5
 MANY_ENTRIES, LEGEND_PART = 16, 0.2
 # space between columns, in letters
 COLUMN_SPACING = 1.2
-# conditions and names of panels of more lines have smaller letters, and the last conditions are left out
+# conditions of more lines have smaller letters, and the last are left out
 MAX_LINES = 3
+# labels of axes and names of panels of more lines have smaller letters
+MAX_LABEL_LINES = 2
 # least height of a panel in a picture whose height the user chose
 MIN_PANEL_MM = 12.0
 
@@ -67,8 +69,8 @@ class Picture(Figure):
         # part of the height; each entry that is left out counts as another height
         self.legend_share = 0.0
         self.shared: tuple[Text, ...] = ()
-        # of panels whose names have more than MAX_LINES lines
-        self.short_names: dict[Text, str] = {}
+        # of panels whose names are too long for them, also in smaller letters
+        self.short_names: dict[Text, Sequence[str]] = {}
         # the axes without colour bars, and the height [in] that suits them
         self.panels: list[Axes] = []
         self.body = 0.0
@@ -271,32 +273,36 @@ class Picture(Figure):
         return left / width, below / height, above / height
 
     def fit_labels(self, height: float, *, may_shrink: bool) -> list[str]:
-        """Break the labels and titles of all axes to the length of their axis; returns their texts.
+        """Break the labels and names of all panels to the length of their axis; returns their texts.
 
-        Before the first layout the lengths are not those of the picture: no title may shrink.
+        Letters of all labels of a direction, and of all names, are smaller where one of them does not fit. Before
+        the first layout the lengths are not those of the picture: nothing may shrink.
         """
-        labels = []
         # in a single row of panels of a height [px] a vertical label may be longer than its axis
         rows = len({round(axes.get_position().y0, 1) for axes in self.axes})
         least = LABEL_SHARE_OF_ROW * height if rows == 1 else 0.0
+        across, up, names = dict[Text, float](), dict[Text, float](), dict[Text, float]()
         for axes in self.axes:
             box = axes.get_window_extent()
             titles = [text for text in axes.get_children() if isinstance(text, Text) and text not in axes.texts]
-            for text in (*titles, axes.xaxis.label, axes.yaxis.label):
-                across = LABEL_SHARE_OF_AXIS * box.width
-                up = max(LABEL_SHARE_OF_AXIS * box.height, least)
-                self.fit(text, up if text is axes.yaxis.label else across)
-                if may_shrink and text in titles and text.get_text().count("\n") >= MAX_LINES:
+            names |= dict.fromkeys(titles, box.width)
+            across[axes.xaxis.label] = LABEL_SHARE_OF_AXIS * box.width
+            up[axes.yaxis.label] = max(LABEL_SHARE_OF_AXIS * box.height, least)
+        for lengths in (names, across, up):
+            fits = [self.fit(text, length) for text, length in lengths.items()]
+            if may_shrink and not all(fits):
+                for text, length in lengths.items():
                     text.set_fontsize("x-small")
-                    self.fit(text, box.width)
-                    if text.get_text().count("\n") >= MAX_LINES and text in self.short_names:
-                        text.set_text(self.short_names[text])
-                        self.fit(text, box.width)
-                labels.append(text.get_text())
-        return labels
+                    shorter = iter(self.short_names.get(text, ()))
+                    while not self.fit(text, length) and (name := next(shorter, "")):
+                        text.set_text(name)
+        return [text.get_text() for text in (*names, *across, *up)]
 
-    def fit(self, text: Text, max_width: float) -> None:
-        """Break a text at spaces into lines up to `max_width` [px], and words longer than MAX_WORD_INCHES."""
+    def fit(self, text: Text, max_width: float) -> bool:
+        """Break a text at spaces into lines up to `max_width` [px], and longer words at hyphens or anywhere.
+
+        Returns whether it has at most MAX_LABEL_LINES lines, none of them longer.
+        """
         whole, shown = self.fitted.get(text, ("", ""))
         if not shown or text.get_text() != shown:
             whole = text.get_text()
@@ -308,18 +314,26 @@ class Picture(Figure):
 
         lines, renderer = [""], self.renderer
         if length(whole) <= max_width:
-            return
+            return True
         for word in whole.split(" "):
-            longer = f"{lines[-1]} {word}" if lines[-1] else word
-            if length(longer) <= max_width:
-                lines[-1] = longer
-                continue
-            letters = len(word)
-            if "$" not in word and length(word) > max(max_width, MAX_WORD_INCHES * self.dpi):
-                letters = max(1, int(len(word) * max_width / length(word)))
-            lines += [word[start : start + letters] for start in range(0, len(word), letters)]
-        text.set_text("\n".join(filter(None, lines)))
+            parts, space = [word], " "
+            if "$" not in word and length(word) > max_width:
+                parts = re.findall(r"[^-]*-|[^-]+", word)
+            for part in parts:
+                longer = f"{lines[-1]}{space}{part}" if lines[-1] else part
+                space = ""
+                if length(longer) <= max_width:
+                    lines[-1] = longer
+                    continue
+                letters = len(part)
+                if "$" not in part and length(part) > max(max_width, MAX_WORD_INCHES * self.dpi):
+                    letters = max(1, int(len(part) * max_width / length(part)))
+                lines += [part[start : start + letters] for start in range(0, len(part), letters)]
+        lines = list(filter(None, lines))
+        fits = len(lines) <= MAX_LABEL_LINES and all(length(line) <= max_width for line in lines)
+        text.set_text("\n".join(lines))
         self.fitted[text] = whole, text.get_text()
+        return fits
 
 
 class Layout(ConstrainedLayoutEngine):

@@ -25,7 +25,17 @@ from ..formatting import argument, heading, percentage, safe_text
 from ..results.ranking import error_floor
 from .data import Points
 from .kinds import Choice, Kind
-from .labels import REFERENCE, label_axis, number_axis, pretty_conditions, split_by_law, symbol, words_of
+from .labels import (
+    REFERENCE,
+    escape_mathtext,
+    label_axis,
+    legend_labels,
+    number_axis,
+    pretty_conditions,
+    split_by_law,
+    symbol,
+    words_of,
+)
 from .layout import Picture
 from .slices import choose_plane, conditions_of, not_a_sweep, read, take_plane, unit_of
 from .style import is_geometric, law_key, model_styles, tint
@@ -178,13 +188,15 @@ class MapData:
         mesh, entries = draw_panels(self, all_axes, x, y, labels)
         names = [labels.get(panel.key, pretty_conditions(panel.label)) for panel in self.panels]
         titles = ["Closest model", "Its absolute error"] if self.closest else names
-        # the words of a key are fewer than those of a name
-        short = {pretty_conditions(each.label): each.key.replace("-", " ") for each in self.panels}
+        short = legend_labels([panel.key for panel in self.panels], "short")
+        shorter = {
+            pretty_conditions(panel.label): (short[panel.key], escape_mathtext(panel.key)) for panel in self.panels
+        }
         figure = all_axes[0].figure
         for axes, title in zip(all_axes, titles, strict=True):
             heading_text = axes.set_title(title)
-            if isinstance(figure, Picture) and title in short:
-                figure.short_names[heading_text] = short[title]
+            if isinstance(figure, Picture) and title in shorter:
+                figure.short_names[heading_text] = shorter[title]
             axes.grid(False)
             axes.set(xscale="log" if self.x_log else "linear", yscale="log" if self.y_log else "linear")
             axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
