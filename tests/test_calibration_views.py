@@ -48,12 +48,15 @@ def test_the_axes_are_logarithmic_as_asked_or_as_the_input_is_spaced(drops: xr.D
         return [(axes.get_xscale(), axes.get_yscale()) for axes in impact.plot(fit, **options).axes]
 
     linear, log = "linear", "log"
-    assert scales(drops) == [(linear, linear), (linear, linear)]
+    # the speeds of the drops are in geometric progression, from 0.1 to 3 m/s
+    assert scales(drops) == [(log, linear), (log, linear)]
     assert scales(drops, log="x") == [(log, linear), (log, linear)]
     # residuals have both signs
     assert scales(drops, log="y") == [(linear, log), (linear, linear)]
+    even = drops.assign_coords(v1=drops["v1"].copy(data=np.linspace(0.1, 3.0, drops.sizes["point"])))
+    assert scales(even) == [(linear, linear), (linear, linear)]
     grid = drops["grid"]
-    geometric = drops.assign_coords(grid=grid.copy(data=np.geomspace(grid[0], grid[-1], grid.size)))
+    geometric = even.assign_coords(grid=grid.copy(data=np.geomspace(grid[0], grid[-1], grid.size)))
     assert scales(geometric) == [(log, linear), (log, linear)]
     assert scales(geometric, log="y") == [(linear, log), (linear, linear)]
 

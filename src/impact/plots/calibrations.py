@@ -78,7 +78,7 @@ def _panels(data: xr.Dataset, name: str, varied: str, choice: Choice) -> tuple[P
         residuals.append(curve_of(label, key, x, law["residual"] / _deviation(law), f"{name}_residual"))
     axis = x_axis_fields(data[varied or "point"], choice)
     axis["x_log"] = (
-        is_geometric(grid) if varied and not choice.log else "x" in choice.log and bool((x > 0.0).all())
+        _is_logarithmic(x, grid) if varied and not choice.log else "x" in choice.log and bool((x > 0.0).all())
     )
     values = Panel(
         y_label="Delivered restitution" if name == "e_out" else OUTPUTS[name].meaning.capitalize(),
@@ -98,6 +98,14 @@ def _panels(data: xr.Dataset, name: str, varied: str, choice: Choice) -> tuple[P
         height=RESIDUAL_HEIGHT,
         **axis,
     )
+
+
+def _is_logarithmic(measured: Array, grid: Array) -> bool:
+    """Whether the curve is, or the measured values over a decade or more are, spaced by their logarithm."""
+    low, median, high = map(float, np.quantile(measured, [0.0, 0.5, 1.0]))
+    # the middle value is nearer to the geometric mean of both ends than to the arithmetic one
+    has_more_small = median**2 < abs(low * high) ** 0.5 * (low + high) / 2.0
+    return is_geometric(grid) or (0.0 < 10.0 * low <= high and has_more_small)
 
 
 def _remark(law: xr.Dataset) -> str:
