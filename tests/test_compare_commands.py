@@ -386,6 +386,21 @@ def test_a_picture_of_differences_names_variables_as_axes_do(wide: xr.Dataset) -
     }
 
 
+def test_a_picture_of_differences_has_level_keys_and_few_symbols_on_lines(figure6: xr.Dataset) -> None:
+    moved = figure6.assign(e_out=figure6["e_out"] + 1e-6, contact_time=figure6["contact_time"] * (1.0 + 1e-6))
+    # a point alone, without a line
+    moved["peak_force"] = figure6["peak_force"] + 1.0 * (figure6["e"] == 0.33)
+    models, over_e = draw_differences(difference_data(impact.compare(moved, figure6))).axes
+    assert [(label.get_text(), label.get_rotation()) for label in models.get_xticklabels()] == [
+        (key, 0.0) for key in figure6["model"].values
+    ]
+    lines = [line for line in over_e.lines if line.get_markevery()]
+    drawn = [np.asarray(line.get_markevery()) & np.isfinite(line.get_ydata()) for line in lines]
+    counts = sorted(int(each.sum()) for each in drawn)
+    assert counts[0] == 1
+    assert all(10 <= count <= 16 for count in counts[1:])
+
+
 def test_a_picture_of_the_differences_replaces_an_old_one(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -28,14 +28,16 @@ MIN_DRAWN_RATIO = 1e-4
 # letters of the name of a label of an axis
 MAX_NAME_LENGTH = 34
 MAX_TICKS = 24
-# from this number of points on the markers are smaller
+# from this number of names on the markers are smaller
 MANY_POINTS = 40
 # ratio of the ends of the band above the panel for differences that have no number
 NO_NUMBER_BAND = 20.0
 # distance of the first and the last symbol at a name, over that of names
 NAMES_SPREAD = 0.4
-# letters of all names below an axis of half the width
-MAX_NAMES_LENGTH = 30
+# letters of all names below an axis of half the width, and of those below one of the whole width
+MAX_NAMES_LENGTH, MAX_WIDE_NAMES_LENGTH = 30, 80
+# symbols on a line, besides those at the ends of its parts
+SYMBOLS_ON_LINE = 12
 
 
 @dataclass(frozen=True)
@@ -159,12 +161,15 @@ def _draw_panel(
             "color": COLOURS[index % len(COLOURS)],
             "marker": MARKERS[index % len(MARKERS)],
             "markerfacecolor": tint(0.0),
-            "markersize": 4.5 if len(x) <= MANY_POINTS else 2.5,
+            "markersize": 2.5 if panel.names and len(x) > MANY_POINTS else 4.5,
         }
         counted = np.where(np.isfinite(ratio) & (ratio > 0.0), np.maximum(ratio, bottom), np.nan)
-        (entries[name],) = axes.plot(
-            shifted, counted, linewidth=0.9, linestyle="" if panel.names else "-", **style
-        )
+        # on a line of many points a few symbols, and those that have no line to one of the neighbours
+        every = 1 if panel.names else max(1, len(x) // SYMBOLS_ON_LINE)
+        is_gap = np.isnan(np.pad(counted, 1, constant_values=np.nan))
+        marked = (np.arange(len(x)) % every == index % every) | is_gap[:-2] | is_gap[2:]
+        line = {"linewidth": 0.9, "linestyle": "" if panel.names else "-", "markevery": marked.tolist()}
+        (entries[name],) = axes.plot(shifted, counted, **(style | line))
         # a difference without a number, such as a NaN against a number, is drawn in a band at the top
         height = top / NO_NUMBER_BAND ** ((index + 1) / (len(names) + 1))
         axes.plot(shifted, np.where(np.isinf(ratio), height, np.nan), linestyle="", **style)
@@ -207,7 +212,8 @@ def _label_ticks(axes: Axes, panel: DifferencePanel, x: np.ndarray) -> None:
     """Write names below the points, at most MAX_TICKS."""
     every = max(1, -(-len(x) // MAX_TICKS))
     names = panel.names[::every]
-    is_wide = sum(map(len, names)) > MAX_NAMES_LENGTH
+    # more than MAX_NAMES_LENGTH have a whole row
+    is_wide = sum(map(len, names)) > MAX_WIDE_NAMES_LENGTH
     axes.set_xticks(
         x[::every],
         names,
