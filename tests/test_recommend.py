@@ -157,6 +157,14 @@ def test_the_worst_point_has_a_value_of_every_axis(wide: xr.Dataset) -> None:
     assert "ismail-stronge-2008.gamma" in worst_points["ismail-stronge-2008"]
 
 
+def test_a_model_is_named_with_its_best_parameters_and_their_units() -> None:
+    sweep = {"e": [0.5, 0.9], "v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 6e9}
+    config = {"models": "kuwabara-kono-1987", "sweep": sweep, "model": {"kuwabara-kono-1987": {"A": [1e-6, 1e-5]}}}
+    (row,) = impact.recommend(impact.sweep(config)).models
+    assert row.row[0] == "kuwabara-kono-1987 with A = 10 µs"
+    assert "units" not in row.record
+
+
 def test_models_are_ranked_by_share_then_by_error() -> None:
     ranking = impact.recommend(swept(["hertz", *FAIR, "bilinear"], rtol=1e-10), tol=0.01)
     assert [ranked.model for ranked in ranking.models] == ["bilinear", *reversed(FAIR), "hertz"]

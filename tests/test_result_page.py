@@ -105,15 +105,16 @@ def test_inputs_that_vary_together_are_named_beside_their_slider() -> None:
 
 
 @pytest.mark.parametrize(("viscosity", "label"), [("1 us", ", A = 1 µs"), (["1 us", "2 us"], "")])
-def test_laws_are_named_with_their_parameters_of_one_value(viscosity: object, label: str) -> None:
+def test_laws_and_sliders_have_values_with_prefixes(viscosity: object, label: str) -> None:
     config = {
         "models": ["hertz", "kuwabara-kono-1987"],
         "model": {"kuwabara-kono-1987": {"A": viscosity}},
         "sweep": {"e": 0.5, "v1": [1.0, 2.0], "m1": 1.0, "m2": 1.0, "K": 1e9},
     }
-    laws = content_of(impact.page(impact.sweep(config)))["laws"]
-    labels = [law["label"].replace("\xa0", " ") for law in laws]
+    content = content_of(impact.page(impact.sweep(config)))
+    labels = [law["label"].replace("\xa0", " ") for law in content["laws"]]
     assert labels == ["Hertz (1882)", f"Kuwabara and Kono (1987){label}"]
+    assert [axis["texts"] for axis in content["axes"][1:]] == ([] if label else [["1 µs", "2 µs"]])
 
 
 def test_the_command_writes_a_page(results: dict[str, xr.Dataset], cli: Run, tmp_path: Path) -> None:

@@ -21,7 +21,7 @@ from ..contact.model import ForceModel
 from ..engine.plan import Plan
 from ..engine.plugins import Plugins, read_plugins
 from ..errors import ImpactError, UsageError, did_you_mean
-from ..formatting import quantity, safe_text
+from ..formatting import prefixed, safe_text
 from ..results.provenance import changed_plugins, config_of_part, stored_config
 from ..results.selection import chosen_laws, in_si, select
 from ..results.sweep import sweep_in_memory
@@ -344,4 +344,4 @@ def shown_values(coordinate: xr.DataArray) -> list[tuple[str, Any]]:
     """List the texts and values of the positions of an axis."""
     word, unit = InputName.parse(coordinate.name).word, unit_of(coordinate)
     values = coordinate.values.tolist()
-    return [("∞" if value == math.inf else safe_text(quantity(word(value), unit)), value) for value in values]
+    return [("∞" if value == math.inf else safe_text(prefixed(word(value), unit)), value) for value in values]

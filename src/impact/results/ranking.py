@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Hashable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, SupportsFloat, overload
@@ -19,13 +19,14 @@ from ..config.input_names import InputName
 from ..config.quantities import Quantity
 from ..config.tables import TOLERANCE
 from ..contact.status import FIRST_FAILURE, FrictionStatus, Status
+from ..contact.units import names_in
 from ..contact.variables import OUTPUTS
 from ..display import Block, Displayed, Table, html_of
 from ..errors import UsageError, did_you_mean
-from ..formatting import argument, number, percentage, safe_text
+from ..formatting import argument, number, percentage, prefixed, safe_text
 from .kinds import require_sweep
 from .replay_command import describe_point
-from .schema import columns_along, foreign_dims
+from .schema import columns_along, foreign_dims, plain_unit
 from .selection import LawDim, as_keys, law_positions, select
 from .slabs import Slab, distinct_points, is_computed, over_varying_dims, slabs, varying_dims
 from .xarray_backend import result_of
@@ -88,6 +89,7 @@ class Ranked:
         unless it varies along one axis
     friction : key of the friction law; "" for a model alone
     output : the output that is ranked
+    units : those of the parameters, by path, where they are known
     """
 
     model: str
@@ -102,17 +104,21 @@ class Ranked:
     served: tuple[tuple[float, float], ...] | None
     friction: str = ""
     output: str = "e_out"
+    units: Mapping[str, str] = field(default_factory=dict, repr=False, compare=False)
 
     @property
     def name(self) -> str:
         """The model, its friction law, and the parameters that were chosen."""
-        chosen = (f"{path.rpartition('.')[2]} = {number(value)}" for path, value in self.parameters.items())
+        chosen = (
+            f"{path.rpartition('.')[2]} = {prefixed(value, self.units.get(path, '1'), 6)}"
+            for path, value in self.parameters.items()
+        )
         return " with ".join(filter(None, [self.model, ", ".join(filter(None, [self.friction, *chosen]))]))
 
     @property
     def record(self) -> dict[str, Any]:
         """The fields as plain data, without those of friction and of a target that do not apply."""
-        record = {name: value for name, value in vars(self).items() if name not in ("output", "friction")}
+        record = {name: value for name, value in vars(self).items() if name not in ("output", "friction", "units")}
         if self.output != "e_out":
             record = {self.output if name == "e_out" else name: value for name, value in record.items()}
         return record | {"share": self.share} | ({"friction": self.friction} if self.friction else {})
@@ -548,6 +554,10 @@ def _rank_law(law_data: xr.Dataset, tol: float, criterion: Criterion) -> Ranked:
     parameters = {
         name.config_key: chosen[str(name)] for name in map(InputName.parse, chosen) if _is_parameter(name)
     }
+    units = {
+        InputName.parse(name).config_key: plain_unit(str(law_data.variables[name].attrs.get("units", "1")))
+        for name in chosen
+    }
     served = _served_ranges(served_input.values, requested, missed) if along_one else None
     model, friction = _keys(law_data)
     return Ranked(
@@ -563,6 +573,7 @@ def _rank_law(law_data: xr.Dataset, tol: float, criterion: Criterion) -> Ranked:
         served,
         friction,
         criterion.output,
+        {path: unit for path, unit in units.items() if not names_in(unit)},
     )
 
 
