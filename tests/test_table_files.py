@@ -141,6 +141,8 @@ def test_a_ranking_and_steps_are_tables_of_latex_and_csv(stored: Path, cli: Run,
     assert lines[2].startswith("{model} & {points} & {within}")
     assert lines[4].startswith("lankarani-nikravesh-1994 & 101 & 101 & 0 & ")
     assert "0 to 1" in lines[4]
+    assert cli("recommend", stored, "-o", "comma.tex", "--decimal", "comma", cwd=tmp_path).returncode == 0
+    assert " & 0,92 to 1 & " in (tmp_path / "comma.tex").read_text(encoding="utf-8")
     words = ["timestep", "--model", "tsuji-1992", "--at", "e=0.5", "--phases", "20"]
     assert cli(*words, "-o", "t.csv", cwd=tmp_path).returncode == 0
     again = cli(*words, "-o", "t.csv", cwd=tmp_path)

@@ -234,21 +234,27 @@ def check_table_output(path: Path | None, form: TableForm, *, overwrite: bool) -
 
 def write_table(value: Displayed, path: Path, form: TableForm, *, overwrite: bool) -> None:
     """Write the rows of a result to a file."""
-    frame = value.to_dataframe().map(_flat_cell)
+    frame = value.to_dataframe().map(lambda cell: _flat_cell(cell, form.decimal))
     # such as the parameters of laws that have none
     frame = frame.loc[:, [not frame[name].eq("").all() for name in frame.columns]]
     write_file(path, encode_frame(frame, path.suffix.lower(), form), overwrite=overwrite)
 
 
-def _flat_cell(cell: object) -> object:
+def _flat_cell(cell: object, decimal: str) -> object:
     """Write values by name, and ranges, as text."""
+
+    def write(value: object) -> str:
+        return (
+            number(value).replace(".", ",") if isinstance(value, float) and decimal == "comma" else number(value)
+        )
+
     match cell:
         case dict():
-            return ", ".join(f"{name} = {number(value)}" for name, value in cell.items())
+            return ", ".join(f"{name} = {write(value)}" for name, value in cell.items())
         case (float() as low, float() as high):
-            return f"{number(low)} to {number(high)}"
+            return f"{write(low)} to {write(high)}"
         case tuple() | list():
-            return ", ".join(str(_flat_cell(part)) for part in cell)
+            return ", ".join(str(_flat_cell(part, decimal)) for part in cell)
     return cell
 
 
