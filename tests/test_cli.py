@@ -774,6 +774,14 @@ def test_threads_integrate_in_the_process_of_the_command_and_jobs_in_others(
         assert keywords["backend"].shares_memory is shares_memory
 
 
+def test_every_paragraph_of_help_fills_its_lines(cli: Run) -> None:
+    paragraph = re.search(r"\n\s*\n( loop, history.*?)\n\s*\n", cli("plot", "--help").stdout, re.DOTALL)
+    assert paragraph is not None
+    *full, _ = paragraph[1].splitlines()
+    width = max(map(len, map(str.strip, full)))
+    assert all(len(line.strip()) > width - 20 for line in full)
+
+
 def test_help_of_a_command_and_the_version(cli: Run) -> None:
     assert cli("help", "sweep").stdout == cli("sweep", "--help").stdout
     assert cli("help").stdout.rstrip() == cli("--help").stdout.rstrip()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import re
 import sys
 from functools import partial
 from importlib import import_module
@@ -100,7 +101,10 @@ def load_command(name: str) -> Any:
     function = show_help if name == "help" else getattr(import_module(f"{__package__}.{module}"), name)
     program = typer.Typer(add_completion=False, rich_markup_mode="rich")
     program.command(name, cls=Command, epilog=f"Example: impact {name} {example}")(function)
-    return typer.main.get_command(program)
+    command = typer.main.get_command(program)
+    # only the first paragraph would be filled to the width of the terminal
+    command.help = re.sub(r"(?<!\n)\n(?!\n)", " ", command.help or "")
+    return command
 
 
 def _without_flag_types(params: list[Any]) -> list[Any]:
