@@ -65,7 +65,7 @@ table are:
 - Laws that do not depend on e have a curve of another colour: e_out, from 0 to 1, over v₀ from 0.01 to 10 m/s on
   a logarithmic scale. The balls are those of Table 1 of the paper:
   {balls}.
-  Parameters without a default are {damping} above their lower limit in units of the contact, K = m = v₀ = 1, at
+  A parameter without a default exceeds its lower limit by {damping} in units of the contact (K = m = v₀ = 1) at
   1 m/s; depths are the peak indentation of the elastic impact; K is that of 1 m/s at every speed.
 
 ## Evidence

@@ -334,8 +334,13 @@ class ForceModel:
         >>> from impact.contact.models import catalogue
         >>> catalogue()["lankarani-nikravesh-1990"].domain_text
         '0.9 ≤ e ≤ 1 (Gharib and Hurmuzlu 2012)'
+        >>> catalogue()["hertz"].domain_text
+        'e = 1 (by definition)'
         """
-        text = ", ".join(f"{low:g} ≤ {name} ≤ {high:g}" for name, (low, high) in self.domain.items())
+        text = ", ".join(
+            f"{low:g} ≤ {name} ≤ {high:g}" if low < high else f"{name} = {low:g}"
+            for name, (low, high) in self.domain.items()
+        )
         return f"{text} ({self.domain_source})" if text and self.domain_source else text
 
 
