@@ -680,7 +680,7 @@ def test_a_line_has_the_counts_and_the_worst_point(figure6: xr.Dataset) -> None:
         moved["v1_post"].loc[{"model": key, "e": e}] += by
     verdict = impact.compare(moved, figure6)
     assert verdict.headline == "not equal: values (v1_post)"
-    assert verdict.lines == (f"v1_post: 3 of 303 differ, worst 1.6e-07 = 160 x tolerance at model={key}, e=0.05",)
+    assert verdict.lines == (f"v1_post: 3 of 303 differ, worst 160 nm/s = 160 x tolerance at model={key}, e=0.05",)
     assert str(verdict) == f"{verdict.headline}\n{verdict.lines[0]}"
     (difference,) = verdict.differing
     assert difference.new == float(moved["v1_post"].sel(model=key, e=0.05))
@@ -899,7 +899,7 @@ def test_a_point_of_a_zip_group_is_matched_with_a_point_of_an_axis() -> None:
 def test_the_line_of_a_single_point_has_no_coordinates() -> None:
     point = impact.sweep({"models": "hertz", "sweep": {"e": 0.5, "v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 6e9}})
     moved = point.assign(v1_reference=point["v1_reference"] + 1.0)
-    assert "v1_reference: 1 of 1 differ, worst 1 = 1e+09 x tolerance\n" in f"{impact.compare(moved, point)}\n"
+    assert "v1_reference: 1 of 1 differ, worst 1 m/s = 1e+09 x tolerance\n" in f"{impact.compare(moved, point)}\n"
 
 
 @pytest.mark.slow

@@ -37,7 +37,7 @@ pytestmark = pytest.mark.slow
 
 FORMATS = ("table", "json", "junit", "markdown", "github")
 KEY = "lankarani-nikravesh-1990"
-WORST = f"v1_post: 2 of 303 differ, worst 1.6e-07 = 160 x tolerance at model={KEY}, e=0.05"
+WORST = f"v1_post: 2 of 303 differ, worst 160 nm/s = 160 x tolerance at model={KEY}, e=0.05"
 SMALL = {
     "title": "Small",
     "models": ["hertz", KEY],
@@ -490,7 +490,7 @@ def test_bless_writes_and_replaces_a_baseline(forked: ForkServer, folder: Path, 
     assert json.loads(first.attrs["tolerances"]) == {"all": 1e-8}
     assert impact.compare(folder / "base.h5", baseline).equal
     # 1e-8 instead of the default, 1e-9
-    assert "worst 1.6e-07 = 16 x tolerance" in str(impact.compare(folder / "different.h5", baseline))
+    assert "worst 160 nm/s = 16 x tolerance" in str(impact.compare(folder / "different.h5", baseline))
 
     words = ["bless", "different.h5", baseline, "--reason", "finer steps", "--tol", "v1_post=1e-5"]
     done = forked(*words, cwd=folder)
@@ -631,7 +631,7 @@ def test_a_rerun_of_an_unchanged_result_is_equal(
 def test_a_rerun_finds_changed_numbers(forked: ForkServer, folder: Path) -> None:
     done = forked("rerun", "different.h5", cwd=folder)
     assert done.returncode == 1
-    assert done.stdout.startswith("not equal: values (v1_post)\nv1_post: 2 of 303 differ, worst 1.6e-07 = 160 x ")
+    assert done.stdout.startswith("not equal: values (v1_post)\nv1_post: 2 of 303 differ, worst 160 nm/s = 160 x ")
     replay = done.stdout.splitlines()[2]
     assert replay == f"  impact run different.h5 --model {KEY} --at e=0.05"
     assert forked(*shlex.split(replay)[1:], cwd=folder).returncode == 0

@@ -92,9 +92,13 @@ class VariableComparison:
             text = f"{many}, the {which}{at}: {', baseline '.join(words)}"
             return f"{text}, which their statuses do not explain" if both else text
         if self.judged == "reported":
-            return f"{many}, by {number(self.worst)} at most{at} (not judged)"
+            return f"{many}, by {self.worst_text(6)} at most{at} (not judged)"
         ratio = f"{number(self.ratio, 3)} x tolerance" if self.ratio < float("inf") else "where none is allowed"
-        return f"{many}, worst {number(self.worst, 2)} = {ratio}{at}"
+        return f"{many}, worst {self.worst_text(3)} = {ratio}{at}"
+
+    def worst_text(self, digits: int) -> str:
+        """Write the largest difference with its unit."""
+        return prefixed(self.worst, OUTPUTS[self.name].unit if self.name in OUTPUTS else "1", digits)
 
 
 def _format_outcome(name: str, value: float) -> str:
@@ -196,7 +200,7 @@ class Verdict(Displayed):
                 variable.judged,
                 number(variable.tolerance, 3),
                 f"{variable.different} of {variable.points}",
-                prefixed(variable.worst, OUTPUTS[variable.name].unit if variable.name in OUTPUTS else "1", 3),
+                variable.worst_text(3),
                 number(variable.ratio if variable.tolerance == variable.tolerance else math.nan, 3),
             )
             for variable in self.ranked
