@@ -156,14 +156,14 @@ def legend_labels(laws: Collection[str], legend: str) -> dict[str, str]:
     if len({model for model, *_ in keys.values()}) == 1:
         keys = {law: friction or [model] for law, (model, *friction) in keys.items()}
     if legend == "keys":
-        return {law: escape_mathtext(WITH.join(parts)) for law, parts in keys.items()}
+        return {law: escape_mathtext(safe_text(WITH.join(parts), 80)) for law, parts in keys.items()}
 
     def short(key: str) -> str:
         law = catalogue().get(key) or frictions().get(key)
         # a plug-in is not in the catalogue
         return key if law is None else re.sub(THREE_AUTHORS, r"\1 et al.", with_year(law.title, law.year))
 
-    return {law: escape_mathtext(WITH.join(map(short, parts))) for law, parts in keys.items()}
+    return {law: escape_mathtext(safe_text(WITH.join(map(short, parts)), 80)) for law, parts in keys.items()}
 
 
 def parameters_of_laws(laws: Mapping[str, str], names: Mapping[str, str]) -> str:

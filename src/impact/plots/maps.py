@@ -27,7 +27,6 @@ from .data import Points
 from .kinds import Choice, Kind
 from .labels import (
     REFERENCE,
-    escape_mathtext,
     label_axis,
     legend_labels,
     number_axis,
@@ -188,10 +187,9 @@ class MapData:
         mesh, entries = draw_panels(self, all_axes, x, y, labels)
         names = [labels.get(panel.key, pretty_conditions(panel.label)) for panel in self.panels]
         titles = ["Closest model", "Its absolute error"] if self.closest else names
-        short = legend_labels([panel.key for panel in self.panels], "short")
-        shorter = {
-            pretty_conditions(panel.label): (short[panel.key], escape_mathtext(panel.key)) for panel in self.panels
-        }
+        keys = [panel.key for panel in self.panels]
+        short, plain = legend_labels(keys, "short"), legend_labels(keys, "keys")
+        shorter = {pretty_conditions(each.label): (short[each.key], plain[each.key]) for each in self.panels}
         figure = all_axes[0].figure
         for axes, title in zip(all_axes, titles, strict=True):
             heading_text = axes.set_title(title)
