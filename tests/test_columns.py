@@ -122,6 +122,17 @@ def test_every_reader_of_columns_knows_the_dialects(folder: Path) -> None:
     assert read_points({"v1 (cm/s)": [12.5, 25.0], "m1 [g]": [2.5, 5]}).columns == expected
 
 
+def test_a_column_of_a_file_leaves_out_rows_without_a_value_and_counts_them(folder: Path) -> None:
+    """Axes that vary together have the values of the same rows, so that none is left out."""
+    (folder / "a.csv").write_text("v1 [cm/s];e\n10;0,9\n20;\n;0,7\n30;0,6\n", encoding="utf-8")
+    sweep = {"m1": 1.0, "m2": 1.0, "K": 1e6, **{name: {"file": "a.csv", "column": name} for name in ("v1", "e")}}
+    config = read_config({"models": "hertz", "sweep": sweep})
+    assert [axis.columns for axis in config.axes] == [{"v1": (0.1, 0.2, 0.3)}, {"e": (0.9, 0.7, 0.6)}]
+    assert config.notes == ("a.csv: 1 of 4 rows has no v1: left out", "a.csv: 1 of 4 rows has no e: left out")
+    problems = problems_of(read_config, {"models": "hertz", "sweep": {**sweep, "zip": [["v1", "e"]]}})
+    assert problems == ["a.csv:4: v1: got nothing, expected a value", "a.csv:3: e: got nothing, expected a value"]
+
+
 GERMAN = (
     "Probe;Geschwindigkeit [cm/s];Restitution (gemessen);Datum\n"
     "1;12,5;0,91;1.2.24\n1;100;0,85;\n2;250,25;;\n2;300;0,75;\n"
@@ -452,6 +463,10 @@ def test_points_of_a_laboratory_table_are_drawn_with_a_note_of_what_is_left_out(
     (folder / "a.csv").write_text("v1 [cm/s];simga;e_out\n1;1;1\n", encoding="utf-8")
     with pytest.raises(ConfigError, match='simga: no such input or variable; did you mean "sigma"'):
         read_points("a.csv")
+    (folder / "a.csv").write_text("v1 [cm/s];e_out\n1;90\n2;80\n", encoding="utf-8")
+    (line,) = problems_of(read_points, "a.csv")
+    percent = 'expected a fraction: percent? name the unit, as in "e_out [%]"; also in 1 other row'
+    assert line == f'a.csv:2: e_out: got "90", {percent}'
 
 
 def test_fit_true_is_the_natural_range_of_what_the_laws_lack() -> None:
@@ -481,6 +496,21 @@ def test_the_natural_range_is_about_the_size_in_units_of_the_contact() -> None:
         assert upper / lower == pytest.approx(NATURAL_RATIO**2)
         sizes.append(math.sqrt(lower * upper))
     assert sizes[0] / sizes[1] == pytest.approx(100.0)
+
+
+def test_the_natural_range_of_a_damping_of_lammps_contains_that_of_small_balls() -> None:
+    """The damping per contact radius of a bead is a million times that of a ball of 1 kg."""
+    from impact.engine.plugins import read_plugins
+    from impact.inverse.calibrate import natural_bounds
+
+    beads = {"m1": "0.16 g", "m2": math.inf, "R1": "2.5 mm", "R2": math.inf, "material": "glass"}
+    data = {"fit": True, "columns": {"v1": [0.5, 1.0], "e_out": [0.7, 0.6]}}
+    for law in ("lammps-viscoelastic-hooke", "lammps-viscoelastic-hertz"):
+        config = read_config({"models": law, "sweep": beads, "data": data}, purpose="calibrate")
+        ((lower, upper),) = natural_bounds(config, read_plugins([])).values()
+        source = {"models": law, "sweep": {**beads, "v1": 1.0}}
+        (root,) = impact.solve(law, "eta", {"e_out": 0.6}, source=source).roots
+        assert 10.0 * lower < root.value < 0.1 * upper
 
 
 def test_the_natural_range_of_a_slip_speed_of_friction_is_about_the_speed_of_the_impact() -> None:

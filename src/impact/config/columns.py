@@ -470,13 +470,20 @@ def read_files(draft: Draft) -> tuple[dict[KeyPath, object], list[ConfigError], 
             values["sweep", "cases"], notes = _read_cases(open_csv(cases, form), draft)
         except ConfigError as error:
             errors.append(error)
+    # the values of axes that vary together stand in the same rows
+    zipped = {name for group in draft.zip_groups for name in group}
     for name, file, column, form in _file_columns(draft.data):
         try:
             columns = open_csv(file, form, () if column is None else (column,))
             # the single column of a file that names none may have any name
             is_single = column is None and len(columns.units) == 1
             found, unit = columns.find(next(iter(columns.units)) if is_single else column or str(name))
-            list_of_values = columns.values(found, name.quantity(draft.known_models), draft.exponent, unit)
+            rows, count, gaps = complete_rows(columns, [found], refuse=str(name) in zipped)
+            if gaps:
+                raise ConfigError(*(columns.problem(message, header, row) for header, row, message in gaps))
+            complete, quantity = columns.take(rows), name.quantity(draft.known_models)
+            list_of_values = complete.values(found, quantity, draft.exponent, unit)
+            notes += columns.notes(count)
             values[name.path] = list_of_values if column is not None else {"empirical": list_of_values}
         except ConfigError as error:
             errors.append(error)

@@ -133,6 +133,13 @@ class Draft:
         """Return a table of the config, or an empty one."""
         return as_table(self.data.get(name))
 
+    @property
+    def zip_groups(self) -> list[list[str]]:
+        """The names of each group of axes that vary together."""
+        groups = self.table("sweep").get("zip")
+        lists = filter(lambda group: isinstance(group, list), groups if isinstance(groups, list) else [])
+        return [[name for name in group if isinstance(name, str)] for group in lists]
+
     @cached_property
     def exponent(self) -> float | None:
         """The exponent n of [sweep], which the unit of K contains: None if it varies, NaN if it is invalid."""

@@ -87,6 +87,8 @@ class _Points:
 
 # the header of a column, or "" for all together; the index of a cell, or None for the whole column; and a message
 _Problem = tuple[str, int | None, str]
+# the index of a cell, or None for the header, and a message
+_CellProblem = tuple[int | None, str]
 
 
 def fit_paths(data: Mapping[str, Any]) -> Iterator[KeyPath]:
@@ -303,20 +305,26 @@ def _derived_problems(
 
 def _read_column(
     columns: Columns, column: _Column, header: str, unit: str, n: float | None
-) -> tuple[Sequence[object], Sequence[tuple[int | None, str]]]:
-    """Read a column; problems have the index of a cell, or None for the header."""
+) -> tuple[Sequence[object], Sequence[_CellProblem]]:
+    """Read a column."""
     cells = columns.cells[header]
     if column.kind == SPECIMEN:
         return [cell if isinstance(cell, str) else number(cell) for cell in cells], []
     si_unit, name = column.quantity.unit, safe_text(header, 60)
     if columns.is_text and not unit and si_unit != "1" and any(_as_float(cell) is not None for cell in cells):
         return (), [(None, f'got no unit, expected one in brackets, such as "{name} [{si_unit}]"')]
-    if column.quantity.most == _INTERVALS["fraction"]["most"] and not unit:
-        large = [index for index, cell in enumerate(cells) if (_as_float(cell) or 0.0) > column.quantity.most]
-        if large:
-            got = f"got {as_text(cells[large[0]])}, expected a fraction: percent? name the unit"
-            return (), [(large[0], f'{got}, as in "{name} [%]"{also(len(large) - 1)}')]
-    return columns.read(header, column.quantity, n, unit)
+    problems = [] if unit else percent_problems(cells, column.quantity, name)
+    return ((), problems) if problems else columns.read(header, column.quantity, n, unit)
+
+
+def percent_problems(cells: Sequence[object], quantity: Quantity | None, header: str) -> list[_CellProblem]:
+    """Describe the first value of a fraction without a unit that may be in percent, if there is one."""
+    most = _INTERVALS["fraction"]["most"]
+    if quantity is None or quantity.most != most:
+        return []
+    large = [index for index, cell in enumerate(cells) if (_as_float(cell) or 0.0) > most]
+    hint = f'percent? name the unit, as in "{header} [%]"{also(len(large) - 1)}'
+    return [(index, f"got {as_text(cells[index])}, expected a fraction: {hint}") for index in large[:1]]
 
 
 def _as_float(cell: object) -> float | None:

@@ -66,10 +66,7 @@ def _exclusion_hint(draft: Draft, model: ForceModel) -> str:
 
 def _vary_together(draft: Draft, *names: str) -> bool:
     """Whether inputs of [sweep] are members of one zip group, of the cases or of the measurements."""
-    zipped = draft.table("sweep").get("zip")
-    groups: list[Iterable[object]] = (
-        [group for group in zipped if isinstance(group, list)] if isinstance(zipped, list) else []
-    )
+    groups: list[Iterable[object]] = [*draft.zip_groups]
     groups.append([str(InputName.of_path(path)) for path in draft.cases])
     groups.append(draft.table("sweep").get("cases") or [])
     groups.append(draft.measurements.inputs if draft.measurements is not None else [])

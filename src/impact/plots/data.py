@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 from ..config.columns import columns_of_table, complete_rows, near_miss, read_csv
-from ..config.measurements import SIGMA, SPECIMEN, derive_impacts
+from ..config.measurements import MEASURED_OUTPUTS, SIGMA, SPECIMEN, derive_impacts, percent_problems
 from ..config.quantities import Quantity
 from ..config.tables import LABORATORY, STANDARD_GRAVITY, SWEEP_QUANTITIES
 from ..contact.variables import HISTORY, OUTPUTS
@@ -136,6 +136,9 @@ def read_points(points: str | Path | Mapping[str, Sequence[object]] | pd.DataFra
             measured = name.removeprefix(f"{SIGMA}_") if name != SIGMA else variable
             unit = columns.units.get(measured, "")
             quantity = replace(quantity, unit=quantities[measured].unit) if measured else quantity
+        if not (columns.units[name] or unit):
+            for row, message in percent_problems(columns.cells[name], MEASURED_OUTPUTS.get(name), name):
+                raise ConfigError(columns.problem(message, name, row))
         values[name] = tuple(map(float, columns.values(name, quantity, None, unit)))
         variable = name
     if not LABORATORY.keys().isdisjoint(values):
