@@ -125,8 +125,8 @@ class Interval:
         if self.is_accurate or self.values is None:
             return False
         is_finite = np.isfinite(self.values)
-        # what fails near its ends is not worth many divisions
-        return bool(is_finite.all() or (is_finite.any() and self.divisions < MAX_DIVISIONS))
+        # what fails in most of it, or near its ends, is not worth many divisions
+        return bool(is_finite.all() or (is_finite.mean() > 0.5 and self.divisions < MAX_DIVISIONS))
 
     def tried(self, values: Array, floors: Array) -> Interval:
         """Interpolate the values of the function at all nodes."""

@@ -464,8 +464,8 @@ class SolveProblem:
         return with_numbers(self.unknown.unit, {**numbers, **exponent})
 
     def natural_size(self) -> float:
-        """Find the size of the unknown that is 1 in the contact's own units, or that of its typical value."""
-        if self.unknown.typical:
+        """Find the size of the unknown: 1 in the contact's own units, or its typical value if it is no damping."""
+        if self.unknown.typical and not self.unknown.is_damping:
             return abs(self.unknown.typical)
         inputs = self.plan(np.ones(1), np.zeros(1, np.intp)).inputs
         impacts = build_impacts(inputs, self.model, inputs.index())
