@@ -164,6 +164,10 @@ def test_the_damping_of_a_law_without_e_is_solved_for(key: str, expected: float)
     export = impact.export("lammps", key, source=source(), at={"e": 0.5, "K": 1e6}, code_version="22Jul2025")
     assert export.parameters["eta_n0"] == pytest.approx(expected, rel=1e-8)
     assert export.e_continuous == pytest.approx(0.5, abs=1e-9)
+    fields = export.as_dict()
+    assert fields["e"] == 0.5
+    (name,) = fields["solved"]
+    assert fields["solved"][name] == export.parameters["eta_n0"]
 
 
 def test_liggghts_takes_the_properties_of_each_type_and_pair() -> None:

@@ -33,7 +33,7 @@ ADVISED_TOL = 0.01
 # a larger difference between the requested e and that of the continuous law is a warning
 ASKED_TOL = 0.005
 # fields of an export that its plain data begin with
-EXPORT_FIELDS = ("code", "version", "model", "scheme", "e", "e_continuous", "contact_time")
+EXPORT_FIELDS = ("code", "version", "model", "scheme", "e", "solved", "e_continuous", "contact_time")
 # the longest line of a comment
 MAX_COMMENT = 1000
 
@@ -46,7 +46,8 @@ class Export(Displayed):
     ----------
     model : key of the law
     scheme : name of the code's fixed-step scheme, see `impact.contact.fixed_step.SCHEMES`; None if unknown here
-    e : the requested e; NaN for a law without one
+    e : the requested e; NaN for a law without one, unless its damping was solved for
+    solved : the value of the damping parameter that gives the e of a law without one; None if none was asked for
     e_continuous, contact_time : of the continuous law [-, s]
     needed : the value of a parameter from which on every phase is within 1 % at the step, where it was asked for
         or a given step is too large; None where there is none
@@ -66,6 +67,7 @@ class Export(Displayed):
     model: str
     scheme: str | None
     e: float
+    solved: Mapping[str, float] | None
     e_continuous: float
     contact_time: float
     at_dt: timestep.TimestepRow
@@ -235,7 +237,8 @@ def export(
         version=problem.version,
         model=problem.model.key,
         scheme=code.scheme and problem.law.scheme,
-        e=problem.law.e,
+        e=problem.law.e if problem.point.solved is None else float(problem.point.config.scalars["e"]),
+        solved=problem.point.solved,
         e_continuous=problem.e_continuous,
         contact_time=contact_time,
         friction=collision.friction,
