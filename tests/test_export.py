@@ -486,6 +486,7 @@ def test_every_law_of_a_code_is_in_the_list(cli: Run) -> None:
     [
         ((), "--to: expected a code; impact export --list shows them"),
         (("--to", "lamps"), '--to: no code "lamps"; did you mean "lammps"?'),
+        (("--to", "isaac"), '--to: no code "isaac"; did you mean "physx"?'),
         (("--to", "mujoco", "--model", "hertz"), 'MuJoCo has no law "hertz"; known: mujoco-solref'),
         (("--to", "lammps", "--script", "--at", "m1=inf"), "--script: m1: got inf, expected m2 = inf for a wall"),
         (

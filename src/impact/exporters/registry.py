@@ -20,5 +20,6 @@ CODES: dict[str, Code] = {name: import_module(f".{name}", __package__).CODE for 
 
 def find_code(name: str) -> Code:
     if name not in CODES:
-        raise UsageError(f'{argument("to")}: no code "{name}"; {did_you_mean(name, list(CODES))}')
+        by_title = next((key for key, code in CODES.items() if name.lower() in code.title.lower().split()), name)
+        raise UsageError(f'{argument("to")}: no code "{name}"; {did_you_mean(by_title, list(CODES))}')
     return CODES[name]
