@@ -222,6 +222,21 @@ def test_excess_without_specimens_says_that_points_repeat(cli: Run, tmp_path: Pa
     assert "20 of 20 points repeat the inputs of another" in done.stdout
 
 
+def test_specimens_that_all_deviate_to_one_side_are_named(cli: Run, tmp_path: Path) -> None:
+    """A law with too little change within each specimen fits it at restitutions that none of them has."""
+    rows = ["1,a,0.9", "1,a,0.91", "2,a,0.85", "1,b,0.95", "2,b,0.9", "1,c,0.88", "2,c,0.83"]
+    text = "\n".join(["v1 [m/s],specimen,e_out", *rows, ""])
+    (tmp_path / "balls.csv").write_text(text, encoding="utf-8")
+    config = """
+models = "kuwabara-kono-1987"
+data = { file = "balls.csv", sigma = 0.01, fit = true }
+sweep = { R1 = "2.5 mm", m2 = inf, material = "steel" }
+"""
+    (tmp_path / "fit.toml").write_text(config, encoding="utf-8")
+    done = cli("calibrate", tmp_path / "fit.toml")
+    assert "the specimens deviate from kuwabara-kono-1987 to one side, by 0." in done.stdout
+
+
 @pytest.mark.slow
 def test_a_rejected_law_and_its_largest_residuals_are_named(cli: Run, tmp_path: Path) -> None:
     config = write_specimens(tmp_path)

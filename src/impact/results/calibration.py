@@ -27,6 +27,8 @@ from . import schema
 
 # probability of chi2 below which a law is called rejected
 REJECTED_P = 1e-3
+# probability below which the mean of the deviations of specimens is no chance
+ONE_SIDED_P = 1e-2
 # residuals that are named
 NAMED_RESIDUALS = 3
 FIT_HEADINGS = ("law", "parameter", "estimate", "95 %", "chi2/dof", "p", "AICc", "weight", "loo", "status")
@@ -110,8 +112,23 @@ def fit_notes(dataset: xr.Dataset) -> list[str]:
 
 
 def _noise_notes(dataset: xr.Dataset) -> Iterator[str]:
-    """Explain the noise "excess" without specimens."""
-    if dataset.attrs["noise"] != "excess" or "specimen" in dataset.coords:
+    """Explain the noise "excess" without specimens, or with specimens that the best law does not describe."""
+    if dataset.attrs["noise"] != "excess":
+        return
+    if "specimen" in dataset.coords:
+        from scipy.special import stdtrit
+
+        best = dataset.isel(model=0)
+        specimens, residuals = best["specimen"].values, best["residual"].values
+        offsets = [residuals[specimens == specimen].mean() for specimen in np.unique(specimens)]
+        mean, freedom = float(np.mean(offsets)), len(offsets) - 1
+        largest = stdtrit(freedom, 1.0 - ONE_SIDED_P / 2.0) * np.std(offsets) / max(freedom, 1) ** 0.5
+        # with two specimens one side is no evidence
+        if freedom > 1 and abs(mean) > largest:
+            yield (
+                f"the specimens deviate from {best['model'].item()} to one side, by {number(mean, 2)} on average: "
+                "its fit has their change, not their values; try other laws"
+            )
         return
     yield "without a column specimen, each measured value has an excess deviation of its own"
     inputs = [
