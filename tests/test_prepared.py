@@ -123,3 +123,10 @@ def test_an_output_that_the_law_lacks_is_refused() -> None:
 def test_an_exponent_that_the_law_fixes_is_no_input() -> None:
     with pytest.raises(impact.UsageError, match='no input "n" of this law'):
         impact.prepare(model="tsuji-1992", at={"v1": 1.0})(n=1.5)
+
+
+def test_a_pair_takes_arrays_of_inputs_on_which_its_tangential_problem_does_not_depend() -> None:
+    sweep = {"e": 0.5, "speed": 1.0, "angle": [0.1, 0.9], "mu": 0.1, "m1": 1.0, "m2": 1.0, "R1": 0.02, "R2": 0.02}
+    source = {"models": "hertz", "frictions": "coulomb-1785", "sweep": {**sweep, "K": 1e6}}
+    beta = impact.prepare(source, at={"angle": 0.1}, outputs="beta")(angle=[0.1, 0.9])["beta"]
+    np.testing.assert_array_equal(beta, impact.sweep(source)["beta"].values.ravel())

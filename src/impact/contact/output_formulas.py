@@ -123,7 +123,7 @@ def collide(
     with np.errstate(all="ignore"):
         own = np.where(checked == STATUS_OK, check_friction(pair, inputs), checked).astype(np.int8)
         columns = {**values, **friction_values(pair, inputs)}
-    shape = np.broadcast_shapes(own.shape, *(column.shape for column in columns.values()))
+    shape = np.broadcast_shapes(impacts.n.shape, own.shape, *(column.shape for column in columns.values()))
     tangential = simulate_friction(
         pair,
         np.broadcast_to(impacts.n, shape),
