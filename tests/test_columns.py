@@ -484,7 +484,6 @@ def test_fit_true_is_the_natural_range_of_what_the_laws_lack() -> None:
 
 def test_the_natural_range_is_about_the_size_in_units_of_the_contact() -> None:
     """A time of the law is of the order of v0^(-1/5) (m/K)^(2/5), in which the stiffness counts."""
-    from impact.engine.plugins import read_plugins
     from impact.inverse.calibrate import NATURAL_RATIO, natural_bounds
 
     data = {"fit": True, "columns": {"v1": [1.0, 2.0], "e_out": [0.9, 0.8]}}
@@ -492,7 +491,7 @@ def test_the_natural_range_is_about_the_size_in_units_of_the_contact() -> None:
     for stiffness in (1e6, 1e11):
         sweep = {**SWEEP, "m1": 1.0, "K": stiffness}
         config = read_config({"models": "kuwabara-kono-1987", "sweep": sweep, "data": data}, purpose="calibrate")
-        ((lower, upper),) = natural_bounds(config, read_plugins([])).values()
+        ((lower, upper),) = natural_bounds(config).values()
         assert upper / lower == pytest.approx(NATURAL_RATIO**2)
         sizes.append(math.sqrt(lower * upper))
     assert sizes[0] / sizes[1] == pytest.approx(100.0)
@@ -514,7 +513,6 @@ def test_the_natural_range_of_a_damping_of_lammps_contains_that_of_small_balls()
 
 
 def test_the_natural_range_of_a_slip_speed_of_friction_is_about_the_speed_of_the_impact() -> None:
-    from impact.engine.plugins import read_plugins
     from impact.inverse.calibrate import natural_bounds
 
     law = {
@@ -524,7 +522,7 @@ def test_the_natural_range_of_a_slip_speed_of_friction_is_about_the_speed_of_the
     }
     balls = {**SWEEP, "v1": 1e-3, "angle": 0.7, "mu": 0.3, "R1": 0.01, "R2": math.inf}
     config = read_config({**law, "sweep": balls, "data": {"columns": {"beta": [-0.5]}}}, purpose="calibrate")
-    ((lower, upper),) = natural_bounds(config, read_plugins([])).values()
+    ((lower, upper),) = natural_bounds(config).values()
     assert math.sqrt(lower * upper) == pytest.approx(1e-3)
 
 

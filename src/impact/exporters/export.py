@@ -15,7 +15,6 @@ from ..atomic import check_outputs, write_file
 from ..config.files import read_number
 from ..config.tables import SWEEP_QUANTITIES
 from ..display import Block, Displayed
-from ..engine.plugins import Plugins
 from ..errors import UsageError
 from ..formatting import argument, decimals, number, quantity, rounded, safe_text
 from ..inverse import timestep
@@ -227,7 +226,7 @@ def export(
     with nullcontext() if parameter else suppress(UsageError):
         if name:
             needed = timestep.needed_parameter(
-                problem.point, Plugins(), name, dt, ADVISED_TOL, problem.law, problem.outputs, advised
+                problem.point, name, dt, ADVISED_TOL, problem.law, problem.outputs, advised
             )
     needed_text = str(needed or (timestep.missing_parameter(parameter, ADVISED_TOL) if parameter else ""))
     header = _header(problem, collision, at_dt, advised, needed_text)

@@ -142,7 +142,7 @@ def calibrate(
 
 def calibrate_config(config: Config, plugins: Plugins, jobs: int = 1) -> xr.Dataset:
     """Fit the laws of a config to its measurements; see `calibrate`."""
-    natural = natural_bounds(config, plugins)
+    natural = natural_bounds(config)
     config = replace(config, fits={**config.fits, **natural})
     keys = list(laws_to_fit(config))
     if jobs > 1 and len(keys) > 1:
@@ -157,7 +157,7 @@ def calibrate_config(config: Config, plugins: Plugins, jobs: int = 1) -> xr.Data
     return _calibration_dataset(config, plugins, laws)
 
 
-def natural_bounds(config: Config, plugins: Plugins) -> dict[str, tuple[float, float]]:
+def natural_bounds(config: Config) -> dict[str, tuple[float, float]]:
     """Find the bounds of parameters with `fit = true`: decades about the size of which `solve` tries values."""
     bounds: dict[str, tuple[float, float]] = {}
     scalars = dict(config.scalars)
@@ -170,7 +170,7 @@ def natural_bounds(config: Config, plugins: Plugins) -> dict[str, tuple[float, f
         one = replace(config, models=(model,), scalars=others, axes=())
         friction = next((law for law in config.frictions if parsed.friction in ("", law.key)), None)
         unknown = unknown_of(model, name if parsed.friction else parsed.key, friction)
-        size = SolveProblem(one, plugins, unknown, "e_out").natural_size()
+        size = SolveProblem(one, unknown, "e_out").natural_size()
         quantity = _quantity(config, name)
         bounds[name] = (max(size / NATURAL_RATIO, quantity.least), min(size * NATURAL_RATIO, quantity.most))
         scalars[name] = middle_of(*bounds[name])

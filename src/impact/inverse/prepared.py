@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from ..arguments import name_wrong_types
 from ..array_types import Array
@@ -26,7 +28,7 @@ from ..contact.model import ForceModel
 from ..contact.output_formulas import Outputs, collide
 from ..contact.simulate import ComputeCollisions
 from ..contact.variables import CENTRAL_OUTPUTS, OUTPUTS
-from ..engine.build_impacts import build_impacts, build_oblique
+from ..engine.build_impacts import build_impacts, build_oblique, fixed_steps_at
 from ..engine.inputs import Inputs
 from ..engine.plan import Plan
 from ..engine.plugins import read_plugins
@@ -55,38 +57,51 @@ def interpolated(config: Config, law: PlanLaw, outputs: Sequence[str]) -> Interp
     return InterpolatedCollisions(law, outputs, rtol=solver.rtol, max_steps=solver.max_steps, core=core_of(config))
 
 
+def trial_inputs(config: Config, columns: Mapping[str, NDArray[Any]]) -> Inputs:
+    """Replace inputs of a config by columns of one length, along the axis of the cells; no column is one cell."""
+    size = len(next(iter(columns.values()))) if columns else 1
+    scalars = {name: value for name, value in config.scalars.items() if name not in columns}
+    # an axis has tuples; arrays are as good for looking up values, and faster
+    values: dict[str, Any] = {**columns, "trial": np.arange(size)}
+    return Inputs(scalars, (Axis(values, numbered="trial"),), config.materials)
+
+
 def outputs_at(
     config: Config,
     law: PlanLaw,
-    columns: Mapping[str, Array],
+    columns: Mapping[str, NDArray[Any]],
     names: Sequence[str],
     compute: ComputeCollisions | None = None,
 ) -> Outputs:
     """Compute outputs of a law at arrays of inputs by config name, all of one length; others are of a config.
 
     An output is of that length, or of length 1 if no column has an effect; NaN where the law has no result.
-    `compute` is that of `impact.contact.simulate.simulate`.
+    `compute` is that of `impact.contact.simulate.simulate`. A warning states each distinct error of the law.
     """
-    size = len(next(iter(columns.values()))) if columns else 1
-    scalars = {name: value for name, value in config.scalars.items() if name not in columns}
-    # an axis has tuples; arrays are as good for looking up values, and faster
-    values: dict[str, Any] = {**columns, "trial": np.arange(size)}
-    axis = Axis(values, numbered="trial")
-    swept, model = Inputs(scalars, (axis,), config.materials), model_of(law)
-    impacts = build_impacts(swept, model, swept.index()).broadcast()
+    inputs, model, solver = trial_inputs(config, columns), model_of(law), config.solver
+    index = inputs.index()
+    impacts = build_impacts(inputs, model, index).broadcast()
+    steps = fixed_steps_at(inputs, impacts, index)
     oblique = None
     if isinstance(law, Pair):
-        oblique = law, build_oblique(swept, impacts, swept.index(), law.friction)
-    return collide(
+        oblique = law, build_oblique(inputs, impacts, index, law.friction)
+    errors: dict[str, str] = {}
+    outputs = collide(
         model,
         impacts,
-        rtol=config.solver.rtol,
-        max_steps=config.solver.max_steps,
+        rtol=solver.rtol,
+        max_steps=solver.max_steps,
         core=core_of(config),
+        integrator=solver.integrator,
+        fixed_step={name: np.broadcast_to(values, impacts.n.shape) for name, values in steps.items()},
+        errors=errors,
         names=names,
         oblique=oblique,
         compute=compute,
     )
+    for error in errors.values():
+        warnings.warn(error, stacklevel=2)
+    return outputs
 
 
 @dataclass(frozen=True)

@@ -19,17 +19,14 @@ from pathlib import Path
 from typing import Any, Literal, NoReturn, TypeAlias
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 from scipy.optimize import elementwise, minimize_scalar
 
 from ..array_types import Array, Mask
-from ..config.grid import Axis
 from ..config.input_names import InputName
 from ..config.load import Config
-from ..config.tables import Output
 from ..contact.fixed_step import EXACT
-from ..contact.friction import FrictionLaw
+from ..contact.friction import FrictionLaw, Pair
 from ..contact.frictions import find_friction
 from ..contact.interpolant import NODE_MAX_STEPS, Interpolant
 from ..contact.model import ForceModel, Parameter
@@ -41,12 +38,12 @@ from ..display import Block, Displayed
 from ..engine.build_impacts import build_impacts
 from ..engine.inputs import Inputs
 from ..engine.plan import Plan
-from ..engine.plugins import Plugins, read_plugins
+from ..engine.plugins import read_plugins
 from ..errors import UsageError, did_you_mean
 from ..formatting import argument, number, quantity
 from ..results.ranking import target_value
 from ..results.single_impact import PointSource, open_source, single_point, warn_of_ignored_e
-from ..results.sweep import sweep_in_memory
+from .prepared import outputs_at, trial_inputs
 
 # values that are tried before roots are refined: powers of ten times the contact's own unit of the parameter
 SCAN_DECADES, SCAN_PER_DECADE = 8, 16
@@ -72,9 +69,6 @@ ONE_ROOT = 1e-5
 SLOPE_STEP = 1e-6
 # a refined root is a jump of the output if it is farther from the target
 REFINED_TOLERANCE = 1e-7
-
-# the laws of a result of one model and at most one friction law
-LAWS = {"model": 0, "friction": 0}
 
 SolveStatus: TypeAlias = Literal["ok", "at_bound", "several_roots", "no_root"]
 
@@ -205,7 +199,7 @@ def solve(
     unknown = unknown_of(law, name, friction_law)
     inputs = {**placeholder(law, unknown), **(at or {})}
     config, _ = single_point(point_source, model, inputs, over, friction=friction)
-    return solve_input(config, plugin_set.of(config.models), unknown, target)
+    return solve_input(config, unknown, target)
 
 
 def unknown_of(model: ForceModel, name: str, friction: FrictionLaw | None = None) -> Parameter:
@@ -283,7 +277,7 @@ def point_with_e(
     config = replace(config, scalars={**config.scalars, **(replaced or {})})
     if not is_solved:
         return PointWithE(config, defaulted_axes, None, replaced)
-    config = solve_damping(config, source.plugins, float(config.scalars["e"]))
+    config = solve_damping(config, float(config.scalars["e"]))
     solved = {law.damping: float(config.scalars[f"{law.key}.{law.damping}"])}
     return PointWithE(config, defaulted_axes, solved, replaced)
 
@@ -294,12 +288,12 @@ def warn_of_point(source: PointSource, point: PointWithE, e_out: float) -> None:
         warn_of_ignored_e(point.config, e_out)
 
 
-def solve_damping(config: Config, plugins: Plugins, e: float) -> Config:
+def solve_damping(config: Config, e: float) -> Config:
     """Set the damping parameter of a law without an e to the value that gives an e."""
     law = config.models[0]
     unknown = unknown_of(law, law.damping)
     # the e of the continuous law, which friction does not change
-    problem = SolveProblem(replace(config, frictions=()), plugins, unknown, "e_out")
+    problem = SolveProblem(replace(config, frictions=()), unknown, "e_out")
     roots, _ = _roots_and_values(problem, target_value("e_out", e), with_range=False)
     if not roots:
         lower, upper = map(number, _all_roots(problem, e).attainable)
@@ -308,7 +302,7 @@ def solve_damping(config: Config, plugins: Plugins, e: float) -> Config:
     return replace(config, scalars={**config.scalars, config_name(law, unknown): roots[0]})
 
 
-def solve_input(config: Config, plugins: Plugins, unknown: Parameter, target: Mapping[str, object]) -> SolveResult:
+def solve_input(config: Config, unknown: Parameter, target: Mapping[str, object]) -> SolveResult:
     """Find all values of an input that give a target; with an axis, the value nearest to it everywhere."""
     names = [name for name, variable in OUTPUTS.items() if variable.dtype == "f8" and variable.per_model]
     if len(target) != 1:
@@ -321,9 +315,9 @@ def solve_input(config: Config, plugins: Plugins, unknown: Parameter, target: Ma
         raise UsageError(
             f"{argument('target', key=name)}: got no friction law, expected {argument('friction', 'KEY')}"
         )
-    Plan(config, plugins).pair_notes("frictions")
+    Plan(config).pair_notes("frictions")
     wanted = target_value(name, value)
-    problem = SolveProblem(config, plugins, unknown, name)
+    problem = SolveProblem(config, unknown, name)
     return _best_over_axis(problem, wanted) if config.axes else _all_roots(problem, wanted)
 
 
@@ -332,7 +326,6 @@ class SolveProblem:
     """The target variable as a function of the unknown and of the condition, a position on the axis."""
 
     config: Config
-    plugins: Plugins
     unknown: Parameter
     variable: str
 
@@ -354,38 +347,33 @@ class SolveProblem:
         """Whether differences of the target count as they are, as those of a restitution do."""
         return OUTPUTS[self.variable].scale == "1"
 
-    def plan(self, values: Array, conditions: NDArray[np.intp], *, is_scan: bool = False) -> Plan:
-        """Plan to integrate each value under the condition of the same position."""
-        columns: dict[str, Any] = {self.name: tuple(values.tolist())}
+    def columns(self, values: Array, conditions: NDArray[np.intp]) -> dict[str, NDArray[Any]]:
+        """Pair each value with the inputs of the condition of the same position."""
+        columns: dict[str, NDArray[Any]] = {self.name: values}
         for axis in self.config.axes:
-            for name, column in axis.columns.items():
-                columns[name] = tuple(column[condition] for condition in conditions.tolist())
-        solver = self.config.solver
-        replaced = {self.name, "alpha"} if self.name == "e" else {self.name}
-        config = replace(
-            self.config,
-            axes=(Axis(columns, numbered="trial"),),
-            scalars={name: value for name, value in self.config.scalars.items() if name not in replaced},
-            output=Output(layout="full"),
-            # the number of steps of a fixed-step scheme is given by its step
-            solver=replace(solver, rtol=max(solver.rtol, SCAN_RTOL), max_steps=SCAN_MAX_STEPS)
-            if is_scan and solver.integrator == EXACT
-            else solver,
-        )
-        return Plan(config, self.plugins)
+            columns |= {name: np.asarray(column)[conditions] for name, column in axis.columns.items()}
+        return columns
 
     def evaluate(
         self, values: Array, conditions: NDArray[np.intp] | None = None, *, is_scan: bool = False
-    ) -> xr.Dataset:
-        """Compute the outputs at some values, along the dimension `trial`; NaN where the integration fails."""
+    ) -> dict[str, NDArray[Any]]:
+        """Compute the target variable, its status and e_out at some values; NaN where the integration fails."""
         conditions = np.zeros(values.size, np.intp) if conditions is None else conditions
-        return sweep_in_memory(self.plan(values, conditions, is_scan=is_scan)).isel(LAWS, missing_dims="ignore")
+        config, solver = self.config, self.config.solver
+        # the number of steps of a fixed-step scheme is given by its step
+        if is_scan and solver.integrator == EXACT:
+            solver = replace(solver, rtol=max(solver.rtol, SCAN_RTOL), max_steps=SCAN_MAX_STEPS)
+            config = replace(config, solver=solver)
+        law = Pair(self.model, config.frictions[0]) if config.frictions else self.model
+        names = dict.fromkeys((self.variable, OUTPUTS[self.variable].status, "e_out"))
+        outputs = outputs_at(config, law, self.columns(values, conditions), list(names))
+        return {name: np.broadcast_to(array, values.shape).copy() for name, array in outputs.items()}
 
     def raise_failure(self, values: Array, conditions: NDArray[np.intp] | None = None) -> NoReturn:
         """Raise a UsageError with the most frequent status of the integrations that fail."""
-        result = self.evaluate(values, conditions, is_scan=True)
+        outputs = self.evaluate(values, conditions, is_scan=True)
         of_friction = OUTPUTS[self.variable].of_friction
-        statuses = result[OUTPUTS[self.variable].status].values[np.isnan(result[self.variable].values)]
+        statuses = outputs[OUTPUTS[self.variable].status][np.isnan(outputs[self.variable])]
         reason = (FrictionStatus if of_friction else Status)(int(np.bincount(statuses).argmax())).meaning
         laws = _laws(self.model.key, self.friction)
         raise UsageError(f"{laws}: no {self.variable} at any value of {self.unknown.name}: {reason}")
@@ -427,7 +415,7 @@ class SolveProblem:
         def function(x: Array) -> Array:
             nonlocal smallest, largest
             outputs = limited.evaluate(np.repeat(x, conditions.size), np.tile(conditions, x.size))
-            values = np.asarray(outputs[self.variable].values, float).reshape(x.size, conditions.size)
+            values = np.asarray(outputs[self.variable], float).reshape(x.size, conditions.size)
             smallest = float(np.fmin.reduce(values, None, initial=smallest))
             largest = float(np.fmax.reduce(values, None, initial=largest))
             return values
@@ -467,7 +455,7 @@ class SolveProblem:
         """Find the size of the unknown: 1 in the contact's own units, or its typical value if it is no damping."""
         if self.unknown.typical and not self.unknown.is_damping:
             return abs(self.unknown.typical)
-        inputs = self.plan(np.ones(1), np.zeros(1, np.intp)).inputs
+        inputs = trial_inputs(self.config, self.columns(np.ones(1), np.zeros(1, np.intp)))
         impacts = build_impacts(inputs, self.model, inputs.index())
         if self.unknown.name == "K":
             # without a stiffness in the config that of the materials, else of the radii, is the scale
@@ -486,7 +474,7 @@ class SolveProblem:
 def _all_roots(problem: SolveProblem, target: float) -> SolveResult:
     """Find all values that give the target, and the range of the output."""
     roots, values = _roots_and_values(problem, target)
-    e_out = problem.evaluate(np.array(roots))["e_out"].values.tolist() if roots else []
+    e_out = problem.evaluate(np.array(roots))["e_out"].tolist() if roots else []
     status: SolveStatus = "no_root" if not roots else "several_roots" if len(roots) > 1 else "ok"
     if status == "ok" and roots[0] in (problem.unknown.least, problem.unknown.most):
         status = "at_bound"
@@ -507,7 +495,7 @@ def _roots_and_values(
         interpolant.resolve()
         known_scan, known_values = interpolant.samples()
         scan = scan[np.isnan(interpolant(scan)[:, 0])]
-    values = problem.evaluate(scan, is_scan=True)[problem.variable].values if scan.size else np.zeros(0)
+    values = problem.evaluate(scan, is_scan=True)[problem.variable] if scan.size else np.zeros(0)
     # a value at which the integration fails, often for want of steps, hides no root between its neighbours
     scan, values = scan[~np.isnan(values)], values[~np.isnan(values)]
     if not scan.size + known_scan.size:
@@ -518,7 +506,7 @@ def _roots_and_values(
     if scan.size and with_range:
         is_exact[[values.argmin(), values.argmax()]] = True
     if is_exact.any():
-        exact = problem.evaluate(scan[is_exact])[problem.variable].values
+        exact = problem.evaluate(scan[is_exact])[problem.variable]
         values[is_exact] = np.where(np.isnan(exact), values[is_exact], exact)
     if interpolant is None:
         scan, values = _with_extrema(problem, scan, values, np.abs(values - target) <= tolerance)
@@ -562,7 +550,7 @@ def _known(
     unknown = np.flatnonzero(np.isnan(known).any(axis=1))
     if unknown.size:
         integrated = problem.evaluate(np.repeat(x[unknown], conditions.size), np.tile(conditions, unknown.size))
-        known[unknown] = integrated[problem.variable].values.reshape(unknown.size, conditions.size)
+        known[unknown] = integrated[problem.variable].reshape(unknown.size, conditions.size)
     return known
 
 
@@ -570,7 +558,7 @@ def _polished(problem: SolveProblem, interpolant: Interpolant | None, roots: Arr
     """Correct roots of polynomials by one step of Newton's method from the integrated value."""
     if interpolant is None or not roots.size:
         return roots
-    distance = problem.evaluate(roots)[problem.variable].values - target
+    distance = problem.evaluate(roots)[problem.variable] - target
     near = np.concatenate([roots * (1.0 - SLOPE_STEP), roots * (1.0 + SLOPE_STEP)])
     below, above = np.split(interpolant(near)[:, 0], 2)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -589,7 +577,7 @@ def _with_extrema(problem: SolveProblem, scan: Array, values: Array, reached: Ma
     if not extrema.size:
         return scan, values
     refined = elementwise.find_minimum(
-        lambda x, *signs: signs[0] * problem.evaluate(x)[problem.variable].values,
+        lambda x, *signs: signs[0] * problem.evaluate(x)[problem.variable],
         (scan[extrema - 1], scan[extrema], scan[extrema + 1]),
         args=(sign,),
         tolerances={"fatol": EXTREMUM_TOLERANCE * problem.is_of_order_one, "frtol": EXTREMUM_TOLERANCE},
@@ -637,7 +625,7 @@ def _best_over_axis(problem: SolveProblem, target: float) -> SolveResult:
         if is_scan:
             trials = np.repeat(values, axis.size)
             outputs = problem.evaluate(trials, np.tile(conditions, values.size), is_scan=True)
-            of_values = outputs[problem.variable].values.reshape(values.size, axis.size)
+            of_values = outputs[problem.variable].reshape(values.size, axis.size)
         else:
             of_values = _known(problem, interpolant, values, conditions)
         distances = np.abs(of_values - target)
@@ -666,12 +654,12 @@ def _best_over_axis(problem: SolveProblem, target: float) -> SolveResult:
     inputs = {name: column for name, column in axis.columns.items() if not isinstance(column[0], str)}
     over = tuple(
         {name: float(column[condition]) for name, column in inputs.items()}
-        | {name: float(outputs[name].values[condition]) for name in dict.fromkeys((problem.variable, "e_out"))}
+        | {name: float(outputs[name][condition]) for name in dict.fromkeys((problem.variable, "e_out"))}
         for condition in conditions.tolist()
     )
     status: SolveStatus = "at_bound" if value in (problem.unknown.least, problem.unknown.most) else "ok"
-    root = Root(value, float(outputs["e_out"].values.mean()))
-    return _result(problem, target, status, (root,), outputs[problem.variable].values, over)
+    root = Root(value, float(outputs["e_out"].mean()))
+    return _result(problem, target, status, (root,), outputs[problem.variable], over)
 
 
 def _result(

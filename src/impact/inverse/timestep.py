@@ -55,7 +55,7 @@ from ..contact.variables import CENTRAL_OUTPUTS
 from ..display import Block, Displayed, Table
 from ..engine.build_impacts import build_impacts, build_oblique, rayleigh_time_at
 from ..engine.plan import Plan
-from ..engine.plugins import Plugins, read_plugins
+from ..engine.plugins import read_plugins
 from ..errors import UsageError
 from ..formatting import argument, decimals, number, quantity, rounded
 from ..results.single_impact import open_source
@@ -361,7 +361,7 @@ def timestep(
     point_source = replace(opened, config_draft=replace(opened.config_draft, has_own_scheme=True))
     point = point_with_e(point_source, find(model, plugin_set.models), at or {}, friction=friction)
     if point.config.frictions:
-        Plan(point.config, plugin_set).pair_notes("frictions")
+        Plan(point.config).pair_notes("frictions")
     law, collision = fixed_step_law(point.config, phases, scheme, of_friction=True)
     warn_of_point(point_source, point, collision["e_out"])
     steps = time_steps(law.contact_time, counts or (() if given else STEPS_PER_CONTACT), given)
@@ -369,7 +369,7 @@ def timestep(
     if tol is not None:
         needed = needed_steps(law, tol, collision["e_out"])
         if parameter is not None:
-            found = needed_parameter(point, plugin_set, parameter, given[0], tol, law, collision, needed)
+            found = needed_parameter(point, parameter, given[0], tol, law, collision, needed)
     return TimestepResult(
         model=law.model.key,
         scheme=law.scheme,
@@ -587,7 +587,6 @@ def missing_parameter(name: str, tol: float) -> str:
 
 def needed_parameter(
     point: PointWithE,
-    plugins: Plugins,
     name: str,
     dt: float,
     tol: float,
@@ -602,7 +601,7 @@ def needed_parameter(
     time scale, else by solving again.
     """
     if name == RELAXATION_TIME:
-        return _needed_relaxation_time(point, plugins, dt, tol, law, collision, needed)
+        return _needed_relaxation_time(point, dt, tol, law, collision, needed)
     config, model = point.config, law.model
     e = None if point.solved is None else float(config.scalars["e"])
     unknown, path, value = _seek(config, law, name)
@@ -622,7 +621,7 @@ def needed_parameter(
         law, collision = law_of(changed)
         if abs(collision["e_out"] - e) < HELD_E:
             return changed, law, collision
-        changed = solve_damping(changed, plugins, e)
+        changed = solve_damping(changed, e)
         return changed, *law_of(changed)
 
     slope = 0.0
@@ -666,7 +665,6 @@ def needed_parameter(
 
 def _needed_relaxation_time(
     point: PointWithE,
-    plugins: Plugins,
     dt: float,
     tol: float,
     law: FixedStepLaw,
@@ -684,7 +682,7 @@ def _needed_relaxation_time(
             f"{role}: {RELAXATION_TIME} = C/K sets e at a given K, and not the contact time: expected "
             f"{argument('at', 0.8, key='e')} or another e < 1, which K and {RELAXATION_TIME} together keep"
         )
-    needed = needed_parameter(point, plugins, "K", dt, tol, law, collision, known)
+    needed = needed_parameter(point, "K", dt, tol, law, collision, known)
     if needed is None:
         return None
     return replace(
