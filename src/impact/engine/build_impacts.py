@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -19,11 +18,8 @@ from ..contact.simulate import PHASE, STEP, STEPS_PER_CONTACT
 from ..errors import ModelError
 from .inputs import Index, Inputs, dimensions
 
-# K of a law at cells of the grid [N/m^n]
-Stiffness = Callable[[Index], Array]
 
-
-def build_impacts(inputs: Inputs, model: Law, index: Index, stiffness: Stiffness | None = None) -> Impacts:
+def build_impacts(inputs: Inputs, model: Law, index: Index) -> Impacts:
     """Build the impacts of a model at cells; arrays have length 1 along axes on which they do not vary.
 
     Parameters
@@ -31,7 +27,6 @@ def build_impacts(inputs: Inputs, model: Law, index: Index, stiffness: Stiffness
     inputs : of the sweep
     model : the law, or what a file stores of it
     index : the cells
-    stiffness : returns K at cells [N/m^n], if the law has a formula for it; by default that formula
     """
     names = set(inputs.names())
     missing = np.full((1,) * dimensions(index), np.nan)
@@ -51,8 +46,6 @@ def build_impacts(inputs: Inputs, model: Law, index: Index, stiffness: Stiffness
         stiffness_name = f"{model.key}.K"
         if stiffness_name in names or "K" in names:
             K = value(stiffness_name if stiffness_name in names else "K")
-        elif stiffness is not None:
-            K = stiffness(index)
         else:
             K = hertz_or_secant(n, hertz_stiffness(E1, nu1, E2, nu2, R1, R2), effective_mass(m1, m2), v1 - v2)
         e = restitution_at(inputs, index)
@@ -75,7 +68,7 @@ def build_impacts(inputs: Inputs, model: Law, index: Index, stiffness: Stiffness
         yield_strength2=of_material("2", "yield_strength"),
         parameters=parameters,
     )
-    if not has_stiffness_rule(inputs, model) or stiffness is not None:
+    if not has_stiffness_rule(inputs, model):
         return impacts
     assert model.stiffness is not None
     with np.errstate(all="ignore"):

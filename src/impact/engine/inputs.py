@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -30,11 +30,16 @@ def index_of(cells: NDArray[np.integer], shape: Sequence[int]) -> Index:
 
 @dataclass(frozen=True)
 class Inputs:
-    """The inputs of a sweep: scalars by config name, and the axes of its grid in config order."""
+    """The inputs of a sweep: scalars by config name, and the axes of its grid in config order.
+
+    `stiffness` is K [N/m^n] of the laws of a file that have a rule for it, by the config name of their K: the axes
+    on which it depends, and its values over them.
+    """
 
     scalars: Mapping[str, float | str]
     axes: tuple[Axis, ...]
     materials: Mapping[str, Material]
+    stiffness: Mapping[str, tuple[tuple[int, ...], NDArray[np.float64]]] = field(default_factory=dict)
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -56,7 +61,7 @@ class Inputs:
 
     def names(self) -> tuple[str, ...]:
         """List all config names that have a value, those of axes first."""
-        return (*(name for axis in self.axes for name in axis.columns), *self.scalars)
+        return (*(name for axis in self.axes for name in axis.columns), *self.scalars, *self.stiffness)
 
     def axes_of(self, name: str) -> tuple[int, ...]:
         """List the axes along which a name varies: none for a scalar."""
@@ -66,6 +71,10 @@ class Inputs:
         """Look up the values of a name at cells; of length 1 along the axes on which it does not vary."""
         if name in self.scalars:
             return np.full((1,) * dimensions(index), self.scalars[name])
+        if name in self.stiffness:
+            axes, values = self.stiffness[name]
+            at_cells = values[tuple(index[axis] for axis in axes)]
+            return at_cells if axes else at_cells.reshape((1,) * dimensions(index))
         (number,) = self.axes_of(name)
         return self._arrays[name][index[number]]
 

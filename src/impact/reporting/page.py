@@ -167,7 +167,7 @@ def _trajectories(table: TrajectoryTable, positions: Sequence[int]) -> Iterator[
         # before they are read
         _check_size(trajectory_map.count * len(TRAJECTORY) * VALUE_BYTES)
         rows = table.rows.take(position, np.arange(trajectory_map.count))
-        impacts = build_impacts(table.inputs, law, index, table.stiffness[position])
+        impacts = build_impacts(table.inputs, law, index)
         _check_size(impacts.K.size * VALUE_BYTES)
         columns = {
             name: {**_encoded(getattr(rows, column)), "axes": list(trajectory_map.axes), "is_shared": True}

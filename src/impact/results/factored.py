@@ -10,7 +10,7 @@ import itertools
 import json
 import math
 import operator
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -29,8 +29,8 @@ from ..contact.slip_motion import FrictionKind
 from ..contact.status import FRICTION_STATUSES, STATUSES, Status
 from ..contact.tangential import TangentialResult
 from ..contact.variables import OUTPUTS, Variable
-from ..engine.build_impacts import Stiffness, has_stiffness_rule, mass_at, radius_at, values_at, velocity_at
-from ..engine.inputs import Index, Inputs, index_of
+from ..engine.build_impacts import has_stiffness_rule, mass_at, radius_at, values_at, velocity_at
+from ..engine.inputs import Inputs, index_of
 from ..engine.trajectories import TrajectoryMap
 from ..errors import ResultError, UsageError
 from ..formatting import number, safe_text
@@ -58,13 +58,11 @@ ReadVariable = Callable[[str, slice | NDArray[np.intp]], NDArray[Any]]
 ReadParts = Callable[[str, Sequence[int]], Iterator[NDArray[Any]]]
 
 
-def stored_stiffness(
-    inputs: Inputs, law: Law, rule: Stiffness | None = None
-) -> tuple[tuple[int, ...], Array] | None:
+def stored_stiffness(inputs: Inputs, law: Law) -> tuple[tuple[int, ...], Array] | None:
     """Evaluate K [N/m^n] by a law's own rule, or return None; raise a UsageError for too many values."""
-    if rule is None and not has_stiffness_rule(inputs, law):
+    if not has_stiffness_rule(inputs, law):
         return None
-    axes, K = whole_stiffness(inputs, law, rule)
+    axes, K = whole_stiffness(inputs, law)
     if K is None:
         raise UsageError(
             f"output.layout: {law.key} has a rule of K that takes more than {MAX_STIFFNESS_VALUES:,} values, "
@@ -73,19 +71,12 @@ def stored_stiffness(
     return axes, K
 
 
-def _stiffness_of_laws(table: TrajectoryTable) -> list[tuple[tuple[int, ...], Array] | None]:
-    """Evaluate the rules of K of all laws of a table; see `stored_stiffness`."""
-    return [
-        stored_stiffness(table.inputs, law, rule) for law, rule in zip(table.laws, table.stiffness, strict=True)
-    ]
-
-
 def factored_template(
     result_template: xr.Dataset, table: TrajectoryTable, variables: Sequence[Variable]
 ) -> xr.Dataset:
     """Build the dataset of a factored file, with placeholder values, from the coordinates of the result."""
     names = [axis.name for axis in table.inputs.axes]
-    laws, stiffness = {}, _stiffness_of_laws(table)
+    laws, stiffness = {}, [stored_stiffness(table.inputs, law) for law in table.laws]
     for law, trajectory_map, rule in zip(table.laws, table.maps, stiffness, strict=False):
         record = LawRecord(
             exponent=law.exponent,
@@ -147,7 +138,8 @@ def table_values(table: TrajectoryTable, variables: Sequence[Variable]) -> Itera
                 yield f"{prefix}_{name}", (slice(start + first, start + first + rows.size),), array
         starts[trajectory_map.record] += trajectory_map.count
     cells = [trajectory_map.of_cell for trajectory_map in table.maps if trajectory_map.of_cell is not None]
-    stiffness = [rule[1].reshape(-1) for rule in _stiffness_of_laws(table) if rule is not None]
+    rules = (stored_stiffness(table.inputs, law) for law in table.laws)
+    stiffness = [rule[1].reshape(-1) for rule in rules if rule is not None]
     stored: dict[str, Sequence[NDArray[Any]]] = {"trajectory_of_cell": cells, "law_stiffness": stiffness}
     for name, arrays in stored.items():
         for region, array in zip(_consecutive([array.size for array in arrays]), arrays, strict=True):
@@ -227,7 +219,7 @@ def stored_table(dataset: xr.Dataset, sizes: Mapping[str, int], read: ReadVariab
         raise ResultError("is not a readable result (pairs: not those of its models and friction laws)")
     try:
         maps = _stored_maps(inputs, [*laws.values(), *pairs], len(laws), parts)
-        rules = _stored_rules(inputs, laws.values(), parts)
+        inputs = replace(inputs, stiffness=_stored_stiffness(inputs, laws, parts))
         rows: list[slice] = []
         for record_type, prefix in PREFIXES.items():
             of_type = [trajectory_map.count for trajectory_map in maps if trajectory_map.record is record_type]
@@ -250,7 +242,7 @@ def stored_table(dataset: xr.Dataset, sizes: Mapping[str, int], read: ReadVariab
     if summary is not None:
         _check_summary(summary, dataset, inputs.shape)
     stored_laws = tuple(_stored_law(key, law) for key, law in laws.items())
-    return TrajectoryTable(inputs, stored_laws, tuple(maps), trajectory_rows, tuple(rules), summary, frictions)
+    return TrajectoryTable(inputs, stored_laws, tuple(maps), trajectory_rows, summary, frictions)
 
 
 def _axis_numbers(inputs: Inputs, names: Sequence[str]) -> tuple[int, ...]:
@@ -281,12 +273,21 @@ def _stored_maps(
     return maps
 
 
-def _stored_rules(inputs: Inputs, laws: Collection[LawRecord], parts: ReadParts) -> list[Stiffness | None]:
-    """Read K of each law with a rule for it, over the axes that it depends on."""
-    axes = [None if law.stiffness_axes is None else _axis_numbers(inputs, law.stiffness_axes) for law in laws]
-    lengths = [math.prod(inputs.shape[axis] for axis in numbers) for numbers in axes if numbers is not None]
-    values = parts("law_stiffness", lengths)
-    return [None if numbers is None else _stiffness_lookup(inputs, numbers, next(values)) for numbers in axes]
+def _stored_stiffness(
+    inputs: Inputs, laws: Mapping[str, LawRecord], parts: ReadParts
+) -> dict[str, tuple[tuple[int, ...], Array]]:
+    """Read K of each law with a rule for it, over the axes that it depends on; see `Inputs`."""
+    axes = {
+        f"{key}.K": _axis_numbers(inputs, law.stiffness_axes)
+        for key, law in laws.items()
+        if law.stiffness_axes is not None
+    }
+    shapes = [tuple(inputs.shape[axis] for axis in numbers) for numbers in axes.values()]
+    values = parts("law_stiffness", [math.prod(shape) for shape in shapes])
+    return {
+        name: (numbers, np.reshape(K, shape))
+        for (name, numbers), shape, K in zip(axes.items(), shapes, values, strict=True)
+    }
 
 
 def _check_summary(summary: SummaryRecord, dataset: xr.Dataset, shape: tuple[int, ...]) -> None:
@@ -320,19 +321,6 @@ def _stored_law(key: str, law: LawRecord) -> StoredLaw:
     parameters = tuple(Parameter(name, "1", "") for name in law.parameters)
     quantities = frozenset({"e"} if law.asks_for_e else ())
     return StoredLaw(key, law.exponent, parameters, law.domain, quantities, law.is_permanent)
-
-
-def _stiffness_lookup(inputs: Inputs, axes: tuple[int, ...], values: Array) -> Stiffness:
-    """Return a function that looks K up at some cells, from its values over the axes that it depends on."""
-    K = values.reshape([size if axis in axes else 1 for axis, size in enumerate(inputs.shape)] or (1,))
-
-    def look_up(index: Index) -> Array:
-        if not index:
-            return K
-        zero = np.zeros((1,) * index[0].ndim, np.intp)
-        return np.asarray(K[tuple(positions if axis in axes else zero for axis, positions in enumerate(index))])
-
-    return look_up
 
 
 def read_inputs(dataset: xr.Dataset, axis_names: Sequence[str]) -> Inputs:

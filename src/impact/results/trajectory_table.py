@@ -32,7 +32,7 @@ from ..contact.slip_motion import FrictionKind
 from ..contact.status import FrictionStatus, Status
 from ..contact.tangential import TangentialResult
 from ..contact.variables import AXES, Variable
-from ..engine.build_impacts import Stiffness, build_impacts, build_oblique, has_stiffness_rule
+from ..engine.build_impacts import build_impacts, build_oblique, has_stiffness_rule
 from ..engine.inputs import Index, Inputs, dimensions
 from ..engine.plan import Plan
 from ..engine.trajectories import (
@@ -109,7 +109,6 @@ class TrajectoryTable:
 
     laws : the models; those of a file have no formulas
     maps : of each model, then of the pairs of each model with each friction law
-    stiffness : K of each law that has a rule for it but no formula (a law of a file); None otherwise
     summary : of all points, if the file contains one
     frictions : the kinds of the friction laws by key
     """
@@ -118,7 +117,6 @@ class TrajectoryTable:
     laws: tuple[Law, ...]
     maps: tuple[TrajectoryMap, ...]
     rows: TrajectoryRows
-    stiffness: tuple[Stiffness | None, ...]
     summary: SummaryRecord | None = None
     frictions: Mapping[str, FrictionKind] = field(default_factory=dict)
 
@@ -140,17 +138,14 @@ class TrajectoryTable:
     @cached_property
     def checks(self) -> tuple[frozenset[str], ...]:
         """Find, by model, the checks of `impact.contact.impacts.check_inputs` that are necessary at each point."""
-        return tuple(
-            checks_that_may_fail(self.inputs, law, stiffness)
-            for law, stiffness in zip(self.laws, self.stiffness, strict=True)
-        )
+        return tuple(checks_that_may_fail(self.inputs, law) for law in self.laws)
 
 
 def table_of(plan: Plan, read: Callable[[int, int, int], Record]) -> TrajectoryTable:
     """Build the trajectory table of a plan; for `read` see `TrajectoryRows`."""
-    rows, no_rules = TrajectoryRows(plan.maps, read), (None,) * len(plan.models)
     frictions = {friction.key: friction.kind for friction in plan.frictions}
-    return TrajectoryTable(plan.inputs, plan.models, plan.maps, rows, no_rules, frictions=frictions)
+    rows = TrajectoryRows(plan.maps, read)
+    return TrajectoryTable(plan.inputs, plan.models, plan.maps, rows, frictions=frictions)
 
 
 def table_of_ranges(plan: Plan, load: Callable[[TrajectoryRange], Record]) -> TrajectoryTable:
@@ -167,7 +162,7 @@ def expand(table: TrajectoryTable, number: int, index: Index, names: Sequence[st
     """
     model, *friction = table.place(number)
     law = table.laws[model]
-    impacts = build_impacts(table.inputs, law, index, table.stiffness[model])
+    impacts = build_impacts(table.inputs, law, index)
     with np.errstate(all="ignore"):
         checked = check_inputs(law, impacts, table.checks[model])
     result = table.rows.take(model, table.maps[model].rows(index))
@@ -184,7 +179,7 @@ def varies_along(table: TrajectoryTable, number: int, names: Sequence[str]) -> d
     law, inputs = table.laws[model], table.inputs
     # K may depend on the value of n: Hertz's K is for n = 3/2
     index = probe_index(inputs, {"n"})
-    impacts = build_impacts(inputs, law, index, table.stiffness[model])
+    impacts = build_impacts(inputs, law, index)
     # assume that every check that may fail does, so that the masks have all axes that they may have
     arrays = checked_arrays(impacts)
     shapes = [array.shape for check in table.checks[model] for array in arrays[check]]
@@ -213,7 +208,7 @@ def _alternating_statuses(shape: tuple[int, ...], *statuses: IntEnum) -> NDArray
     return status_array
 
 
-def checks_that_may_fail(inputs: Inputs, law: Law, stiffness: Stiffness | None = None) -> frozenset[str]:
+def checks_that_may_fail(inputs: Inputs, law: Law) -> frozenset[str]:
     """Find the checks of `check_inputs` that may fail at some point of the grid; the others hold at all of them.
 
     The scales of a contact are monotonic, or nearly so, in each of closing speed, masses, radii, K and n: they are
@@ -231,8 +226,8 @@ def checks_that_may_fail(inputs: Inputs, law: Law, stiffness: Stiffness | None =
             if is_used and name not in ("v1", "v2", "e", "alpha", *FIXED_STEP_INPUTS, *OBLIQUE_INPUTS):
                 is_text = isinstance(values[0], str)
                 ends[name] = tuple(sorted({*values})) if is_text else tuple({min(values), max(values)})
-    if stiffness is not None or has_stiffness_rule(inputs, law):
-        K = whole_stiffness(inputs, law, stiffness)[1]
+    if f"{law.key}.K" in inputs.stiffness or has_stiffness_rule(inputs, law):
+        K = whole_stiffness(inputs, law)[1]
         if K is None:
             return CHECKS
         ends[f"{law.key}.K"] = (float(K.min()), float(K.max()))
@@ -273,16 +268,14 @@ def _closing_speeds(inputs: Inputs) -> tuple[float, float, float]:
     return slowest, fastest, slowest if slowest > 0.0 else bound
 
 
-def whole_stiffness(
-    inputs: Inputs, law: Law, stiffness: Stiffness | None = None
-) -> tuple[tuple[int, ...], Array | None]:
+def whole_stiffness(inputs: Inputs, law: Law) -> tuple[tuple[int, ...], Array | None]:
     """Evaluate K [N/m^n] by a law's own rule, and name the axes it depends on; no K if the values are too many."""
-    probed = build_impacts(inputs, law, probe_index(inputs, {"n"}), stiffness).K
+    probed = build_impacts(inputs, law, probe_index(inputs, {"n"})).K
     axes = tuple(sorted(axes_of_arrays([probed])))
     if math.prod(inputs.shape[axis] for axis in axes) > MAX_STIFFNESS_VALUES:
         return axes, None
     region = [slice(None) if axis in axes else slice(1) for axis in range(len(inputs.shape))]
-    return axes, build_impacts(inputs, law, inputs.index(region), stiffness).K
+    return axes, build_impacts(inputs, law, inputs.index(region)).K
 
 
 class ExpandedArray(BackendArray):
