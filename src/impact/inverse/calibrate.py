@@ -5,13 +5,14 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from ..arguments import require_counts
 from ..array_types import Array
@@ -62,14 +63,9 @@ def laws_to_fit(config: Config) -> dict[str, PlanLaw]:
     return {law.key: law for law in (laws[len(config.models) :] if config.frictions else laws)}
 
 
-@dataclass(frozen=True)
-class FittedLaw:
-    """The fit of one law."""
-
-    names: tuple[str, ...]
-    fit: Fit
-    # each output over the varied input, with the ends of its band, shape (3, outputs, CURVE_POINTS)
-    curve: Array
+def parameters_of(config: Config, law: PlanLaw) -> tuple[str, ...]:
+    """List the config names of the fitted parameters of a law."""
+    return fitted_parameters(config.fits, model_of(law), law.friction if isinstance(law, Pair) else None)
 
 
 def calibrate(
@@ -206,7 +202,7 @@ def prediction(
     return predict
 
 
-def _fit_remotely(key: str, text: str, overrides: Sequence[str], context: WorkerContext) -> FittedLaw:
+def _fit_remotely(key: str, text: str, overrides: Sequence[str], context: WorkerContext) -> Fit:
     """Fit the law of a key, in any process, with a config given by its text and overrides."""
     models = models_of_context(context)
     plugins = [models[name] for name, _ in context.hashes]
@@ -215,7 +211,7 @@ def _fit_remotely(key: str, text: str, overrides: Sequence[str], context: Worker
     return fit_laws(parse_config(text, [*overrides, *selection], plugins, "", purpose="calibrate"))[key]
 
 
-def fit_laws(config: Config) -> dict[str, FittedLaw]:
+def fit_laws(config: Config) -> dict[str, Fit]:
     """Fit all laws of a config, evaluated together in this process."""
     assert config.data is not None
     data = config.data
@@ -226,24 +222,20 @@ def fit_laws(config: Config) -> dict[str, FittedLaw]:
     specimens = np.unique(data.specimens, return_inverse=True)[1] if data.specimens else None
     points = DataPoints(values, sigma, data.noise, specimens, data.loss)
     laws = laws_to_fit(config)
-    names = {
-        key: fitted_parameters(config.fits, model_of(law), law.friction if isinstance(law, Pair) else None)
-        for key, law in laws.items()
-    }
     problems: list[FitProblem] = []
     functions: dict[str, VectorFunction] = {}
     shared: dict[object, InterpolatedCollisions] = {}
     varied = varied_input(data.inputs)
     for key, law in laws.items():
-        problem = FitProblem(key, _bounds(config, names[key]), points, f"{key}, integrated")
+        names = parameters_of(config, law)
+        problem = FitProblem(key, _bounds(config, names), points, f"{key}, integrated")
         problems.append(problem)
         compute = interpolated(config, law, tuple(data.outputs))
         if compute is not None:
             compute = shared.setdefault(motion_key(model_of(law)), compute)
-        functions[problem.key] = prediction(config, law, names[key], data.inputs, len(data.lines), compute)
-        functions[problem.final_key] = _with_curve(config, law, names[key], varied)
-    fits = fit_all(problems, functions)
-    return {key: FittedLaw(names[key], fit, _curve(config, fit)) for key, fit in zip(laws, fits, strict=True)}
+        functions[problem.key] = prediction(config, law, names, data.inputs, len(data.lines), compute)
+        functions[problem.final_key] = _with_curve(config, law, names, varied)
+    return dict(zip(laws, fit_all(problems, functions), strict=True))
 
 
 def _bounds(config: Config, names: Sequence[str]) -> Bounds:
@@ -281,13 +273,6 @@ def _with_curve(config: Config, law: PlanLaw, names: Sequence[str], varied: tupl
         return np.concatenate([part.reshape(len(rows), -1) for part in parts], axis=1)
 
     return predict_with_curve
-
-
-def _curve(config: Config, fit: Fit) -> Array:
-    """Collect the outputs over the varied input, with the ends of the band of 95 % without the noise."""
-    assert config.data is not None
-    curve, half = fit.other_predicted, fit.other_half_width
-    return np.stack([curve, curve - half, curve + half]).reshape(3, len(config.data.outputs), -1)
 
 
 def determined_groups(config: Config, model: ForceModel, names: Sequence[str], fit: Fit) -> list[str]:
@@ -347,17 +332,11 @@ def _dimension_of_product(
     powers: Sequence[Fraction], units: Sequence[str], exponents: Mapping[str, float]
 ) -> tuple[Fraction, Fraction, Fraction]:
     """Add up the powers of mass, length and time."""
-    dimensions = [dimension(unit, exponents) for unit in units]
-    mass, length, time = (
-        sum(
-            (
-                power * Fraction(float(part)).limit_denominator(MAX_DENOMINATOR)
-                for power, part in zip(powers, parts, strict=True)
-            ),
-            Fraction(0),
-        )
-        for parts in zip(*dimensions, strict=True)
-    )
+    dimensions = [
+        [Fraction(float(power)).limit_denominator(MAX_DENOMINATOR) for power in dimension(unit, exponents)]
+        for unit in units
+    ]
+    mass, length, time = np.array(powers, object) @ np.array(dimensions, object)
     return mass, length, time
 
 
@@ -403,7 +382,7 @@ def _factors(powers: Sequence[tuple[str, Fraction]]) -> str:
     return f"({text})" if len(words) > 1 else text
 
 
-def _calibration_dataset(config: Config, plugins: Plugins, laws: Mapping[str, FittedLaw]) -> xr.Dataset:
+def _calibration_dataset(config: Config, plugins: Plugins, fits: Mapping[str, Fit]) -> xr.Dataset:
     """Store the fits of laws, the best law first: by AICc, those without one last, by chi2."""
     assert config.data is not None
     candidates = laws_to_fit(config)
@@ -411,45 +390,46 @@ def _calibration_dataset(config: Config, plugins: Plugins, laws: Mapping[str, Fi
     # a law at a bound is ranked by what it reaches there: a wider search can only improve it. Laws that fit
     # equally well are in the order of the config
     def rank(key: str) -> tuple[float, float]:
-        fit = laws[key].fit
+        fit = fits[key]
         if not math.isnan(fit.aicc):
             return round(fit.aicc, 6), 0.0
         return math.inf, math.inf if math.isnan(fit.chi2_reduced) else fit.chi2_reduced
 
-    keys = sorted(laws, key=rank)
-    fits = [laws[key].fit for key in keys]
+    keys = sorted(fits, key=rank)
+    laws, ranked = [candidates[key] for key in keys], [fits[key] for key in keys]
     parameters = list(config.fits)
     varied = varied_input(config.data.inputs)
-    dataset = calibration_template(config, [candidates[key] for key in keys], plugins, varied)
+    dataset = calibration_template(config, laws, plugins, varied)
     shape = (len(keys), len(parameters))
     arrays = {name: np.full(shape, np.nan) for name in ("estimate", "lower", "upper")}
     covariance = np.full((*shape, len(parameters)), np.nan)
     identifiable = np.full(shape, -1, np.int8)
-    for row, (key, fit) in enumerate(zip(keys, fits, strict=True)):
-        columns = [parameters.index(name) for name in laws[key].names]
+    for row, (law, fit) in enumerate(zip(laws, ranked, strict=True)):
+        columns = [parameters.index(name) for name in parameters_of(config, law)]
         for name, array in arrays.items():
             array[row, columns] = getattr(fit, name)
         covariance[row][np.ix_(columns, columns)] = fit.covariance
         identifiable[row, columns] = fit.identifiable
-    weights = akaike_weights({key: law.fit.aicc for key, law in laws.items()})
-    values: dict[str, object] = {
+    weights = akaike_weights({key: fit.aicc for key, fit in fits.items()})
+    values: dict[str, Array | NDArray[np.int8]] = {
         **arrays,
         "covariance": covariance,
         "identifiable": identifiable,
-        "fit_status": np.array([list(FIT_STATUSES).index(fit.status) for fit in fits], np.int8),
+        "fit_status": np.array([list(FIT_STATUSES).index(fit.status) for fit in ranked], np.int8),
         "weight": np.array([weights[key] for key in keys]),
-        **{name: np.array([getattr(fit, name) for fit in fits]) for name in FIT_VARIABLES},
+        **{name: np.array([getattr(fit, name) for fit in ranked]) for name in FIT_VARIABLES},
     }
     if varied[0]:
-        curve, lower, upper = np.stack([laws[key].curve for key in keys], axis=1)
-        values |= {"curve": curve, "curve_lower": lower, "curve_upper": upper}
+        # each output over the varied input, with the ends of its band of 95 % without the noise
+        parts = [[fit.other_predicted for fit in ranked], [fit.other_half_width for fit in ranked]]
+        curve, half = (np.reshape(part, dataset["curve"].shape) for part in parts)
+        values |= {"curve": curve, "curve_lower": curve - half, "curve_upper": curve + half}
     groups = [
-        "; ".join(determined_groups(config, model_of(candidates[key]), law.names, law.fit))
-        for key, law in ((key, laws[key]) for key in keys)
+        "; ".join(determined_groups(config, model_of(law), parameters_of(config, law), fit))
+        for law, fit in zip(laws, ranked, strict=True)
     ]
-    return dataset.assign(
-        {name: (dataset[name].dims, array, dataset[name].attrs) for name, array in values.items()}
-    ).assign_coords(determined=("model", groups))
+    variables = {name: dataset.variables[name].copy(data=array) for name, array in values.items()}
+    return dataset.assign(variables).assign_coords(determined=("model", groups))
 
 
 def akaike_weights(aicc: Mapping[str, float]) -> dict[str, float]:

@@ -195,7 +195,6 @@ def sensitivity_of(plan: Plan, of: str, swept: xr.Dataset) -> xr.Dataset:
     inputs, n = list(config.distributions), config.design.n
     outputs = swept[of].transpose("model", ..., SAMPLE)
     others = [str(dim) for dim in outputs.dims if dim not in ("model", SAMPLE)]
-    shape = [outputs.sizes["model"], *(outputs.sizes[dim] for dim in others)]
     values = np.asarray(outputs.values, float).reshape(-1, len(inputs) + 2, n)
     result = sensitivity_template(plan, of, others)
     statistics = _statistics(values, config)
@@ -203,14 +202,11 @@ def sensitivity_of(plan: Plan, of: str, swept: xr.Dataset) -> xr.Dataset:
         # a pair that has no meaning has not failed
         status = swept["friction_status"].transpose("model", ..., SAMPLE).values.reshape(values.shape)
         statistics["failed"] -= (status == FrictionStatus.NOT_COMBINABLE).sum(axis=(1, 2))
+    variables = {name: result.variables[name] for name in statistics}
     return result.assign(
         {
-            name: (
-                result[name].dims,
-                np.asarray(array).reshape([*shape, *array.shape[1:]]).astype(result[name].dtype),
-                result[name].attrs,
-            )
-            for name, array in statistics.items()
+            name: variable.copy(data=statistics[name].reshape(variable.shape).astype(variable.dtype))
+            for name, variable in variables.items()
         }
     )
 
