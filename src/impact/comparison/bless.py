@@ -13,7 +13,7 @@ import xarray as xr
 from ..atomic import check_output
 from ..errors import ResultError, UsageError
 from ..formatting import argument, safe_text
-from ..results.replay_command import command_start, describe_point, inputs_of_model
+from ..results.replay_command import command_start, describe_point, inputs_at
 from ..results.summary import summarize
 from ..results.xarray_backend import load, save_with_attributes
 from .compare import check_comparable, compare
@@ -91,9 +91,8 @@ def _check_no_failures(result: xr.Dataset, path: Path) -> None:
         count = f"{summary.failed:,} of {summary.points:,} points failed"
         first = ""
         for name, status, laws, indices in summary.first_failed[:1]:
-            point = result[name].isel(dict(zip(result[name].dims, (*laws, *indices), strict=True)))
-            at = inputs_of_model({str(dim): point[dim].item() for dim in result[name].dims})
-            first = f", the first at {describe_point(at)} ({status.name.lower()})"
+            at = describe_point(inputs_at(result[name], (*laws, *indices)))
+            first = f", the first at {at} ({status.name.lower()})"
         raise UsageError(f"{path}: {count}{first}; expected none, or {argument('allow_failed', True)}")
 
 

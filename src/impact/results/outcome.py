@@ -13,7 +13,7 @@ from ..contact.status import FIRST_FAILURE, FrictionStatus
 from ..display import Block, Displayed, Table, Wrapped
 from ..formatting import label, number
 from .plausibility import result_notes
-from .replay_command import command_start, inputs_of_model, replay_command
+from .replay_command import command_start, inputs_at, replay_command
 from .summary import Summary, counts_by_name, counts_text, worst_by_model
 
 # headings of the largest errors, in the order of a table
@@ -73,9 +73,7 @@ class SweepOutcome(Displayed):
         command = command_start(str(self.output), self.dataset)
         records = []
         for name, status, place, index in self.summary.first_failed:
-            statuses = self.dataset[name]
-            point = statuses.isel(dict(zip(statuses.dims, (*place, *index), strict=True)))
-            at = inputs_of_model({str(dim): point[dim].values.item() for dim in statuses.dims})
+            at = inputs_at(self.dataset[name], (*place, *index))
             replay = replay_command(command, at) if command else None
             records.append({"status": status.name.lower(), "at": at, "replay": replay})
         return records

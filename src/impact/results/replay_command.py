@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Mapping, Sequence
-from typing import TypeVar
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, TypeVar
 
 import xarray as xr
 
@@ -37,6 +37,12 @@ def inputs_of_model(at: Mapping[str, InputValue]) -> dict[str, InputValue]:
     """
     keys = [str(at.get(dim, "")) for dim in ("model", "friction")]
     return {name: value for name, value in at.items() if InputName.parse(name).applies_to(*keys)}
+
+
+def inputs_at(values: xr.DataArray, position: Iterable[int]) -> dict[str, Any]:
+    """Look up the inputs of a point of a variable, with its laws and without the parameters of others."""
+    point = values.isel(dict(zip(values.dims, position, strict=True)))
+    return inputs_of_model({str(dim): point[dim].values.item() for dim in values.dims})
 
 
 def describe_point(at: Mapping[str, float | str], digits: int = 12) -> str:
