@@ -15,7 +15,7 @@ from ..contact.variables import OUTPUTS
 from ..errors import UsageError
 from ..formatting import argument, number, safe_text
 from ..results.attributes import read_attribute
-from ..results.kinds import is_calibration, kind_of, require_sweep
+from ..results.kinds import kind_of, require_sweep
 from ..results.replay_command import command_start
 from ..results.schema import MODEL_METADATA, SCHEMA, SCHEMA_VERSION, is_case
 from ..results.xarray_backend import load
@@ -80,14 +80,15 @@ def compare(
     names = files[0] or "NEW", files[1] or "BASELINE"
     a, b = (load(source) if isinstance(source, str | Path) else source for source in (new, baseline))
     repeats: tuple[str, ...] = ()
-    is_study = kind_of(a) == kind_of(b) and kind_of(b) in ("calibration", "board")
+    kind = kind_of(b)
+    is_study = kind_of(a) == kind and kind in ("calibration", "board")
     if is_study:
         tolerances = calibration_tolerances(tol)
-        align = align_calibrations if is_calibration(b) else align_boards
+        align = align_calibrations if kind == "calibration" else align_boards
         aligned = align(a, b, subset=subset)
         faults = [*aligned.faults]
         notes = _attribute_notes(a.attrs, b.attrs, {"rtol": None, "impact_version": None})
-        notes += fit_notes(a, b) if is_calibration(b) else version_notes(a, b)
+        notes += fit_notes(a, b) if kind == "calibration" else version_notes(a, b)
     else:
         for dataset, name in zip((a, b), names, strict=True):
             check_comparable(dataset, name)
@@ -104,7 +105,7 @@ def compare(
         notes += [fault.text for fault in missing] if subset else []
         faults += [] if subset else missing
         repeats = command_start(files[0], a) or command_start(files[1], b)
-    schema = SCHEMA[kind_of(b)]
+    schema = SCHEMA[kind]
     variables = [schema[name] for name in schema if name in aligned.dims]
     # for all variables before the first comparison, so that a refusal comes early
     regions = representative_regions(variables, aligned)

@@ -13,7 +13,7 @@ from ..config.grid import MAX_POINTS
 from ..contact.model import ForceModel
 from ..engine.plan import Plan
 from ..engine.plugins import Plugins, read_plugins
-from ..results.kinds import is_calibration, require_sweep
+from ..results.kinds import kind_of, require_sweep
 from ..results.provenance import config_of_part, stored_config
 from ..results.replay_command import command_start
 from ..results.sweep import sweep_in_memory
@@ -66,7 +66,7 @@ def rerun(
     keys = stored["model"].values.tolist() if "model" in stored.dims else []
     changes = [f"models={json.dumps(keys)}"]
     changes += [f"solver.{name}={stored.attrs.get(name)}" for name in ("rtol", "max_steps")]
-    if is_calibration(stored):
+    if kind_of(stored) == "calibration":
         new = _repeat_calibration(stored, changes, plugin_set, str(result))
         return replace(compare(new, stored, tol=tol, subset=subset), new="the rerun", baseline=str(result))
     require_sweep(stored, "rerun")

@@ -45,7 +45,7 @@ SCALE_INPUTS = {
 def representative_regions(variables: Sequence[Variable], aligned: Alignment) -> dict[str, list[Region]]:
     """Choose by variable the regions whose points represent all common points; see `compare` for the rule."""
     results = (aligned.new, aligned.baseline)
-    known = [v.name for v in variables if any(_declares_dims(result, v.name) for result in results)]
+    known = [v.name for v in variables if any(slabs.is_computed(r.dataset.variables[v.name]) for r in results)]
     models = range(aligned.sizes.get("model", 0) if known else 0)
     datasets_by_model = [[_dataset_of_model(result, model) for result in results] for model in models]
     regions: dict[str, list[Region]] = {}
@@ -65,12 +65,6 @@ def representative_regions(variables: Sequence[Variable], aligned: Alignment) ->
             raise UsageError(f"{variable.name}: got {points:,} points to compare, {expected}")
         regions[variable.name] = parts
     return regions
-
-
-def _declares_dims(result: AlignedResult, name: str) -> bool:
-    """Return whether the axes along which a variable varies are known."""
-    variable = result.dataset.variables[name]
-    return slabs.is_lazy(variable) and slabs.VARIES_ALONG in variable.encoding
 
 
 def _dataset_of_model(result: AlignedResult, model: int) -> xr.Dataset:

@@ -408,8 +408,9 @@ class SolveProblem:
         """
         conditions = np.zeros(1, np.intp) if conditions is None else conditions
         scan = self.scan_values(per_decade=1, between_bounds=2)
-        config = replace(self.config, solver=replace(self.config.solver, max_steps=self.node_steps))
-        limited = replace(self, config=config)
+        solver = self.config.solver
+        solver = replace(solver, max_steps=min(solver.max_steps, NODE_MAX_STEPS))
+        limited = replace(self, config=replace(self.config, solver=solver))
         smallest, largest = math.inf, -math.inf
 
         def function(x: Array) -> Array:
@@ -440,10 +441,6 @@ class SolveProblem:
     def digits(self, value: float) -> float:
         """How far values of the variable are from each other that count as equal."""
         return RANGE_TOLERANCE * (1.0 if self.is_of_order_one else abs(value))
-
-    @property
-    def node_steps(self) -> int:
-        return min(self.config.solver.max_steps, NODE_MAX_STEPS)
 
     def unit(self) -> str:
         """Write the SI unit of the unknown, with numbers for the names in its exponents."""

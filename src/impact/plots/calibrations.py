@@ -12,7 +12,7 @@ from ..contact.variables import OUTPUTS
 from ..errors import UsageError
 from ..formatting import argument, decimals, safe_text
 from ..results.calibration import calibration_title, fit_status
-from ..results.kinds import is_calibration
+from ..results.kinds import kind_of
 from ..results.selection import chosen_laws
 from .curves import CurveData, Panel, curve_of, x_axis_fields
 from .data import Points
@@ -35,7 +35,7 @@ RESIDUAL_HEIGHT = 0.55
 
 def calibration_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     """Read measured values over the varied input or their number, the best laws, and their residuals."""
-    if not is_calibration(dataset):
+    if kind_of(dataset) != "calibration":
         raise UsageError("this result is no calibration: impact calibrate writes those")
     for name, value in (("sel", choice.sel), ("x", choice.x), ("y", choice.y)):
         if value:

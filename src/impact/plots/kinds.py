@@ -177,9 +177,9 @@ def source_of(dataset: xr.Dataset) -> str:
 
 def default_kind(dataset: xr.Dataset) -> Kind:
     """Find the kind of picture that shows what a dataset is for."""
-    from ..results.kinds import is_board
+    from ..results.kinds import kind_of
 
-    if is_board(dataset):
+    if kind_of(dataset) == "board":
         raise UsageError("plot: this is a board, which has no picture; impact report writes its page")
     return next(kind for kind in map(find_kind, KINDS) if kind.source == source_of(dataset))
 

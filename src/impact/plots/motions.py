@@ -14,7 +14,6 @@ from ..contact.models import catalogue
 from ..errors import UsageError
 from ..formatting import safe_text
 from ..results.attributes import read_attribute
-from ..results.kinds import has_fixed_steps
 from ..results.schema import exponent_text
 from .curves import Curve, CurveData, Mark, Panel, curve_of
 from .kinds import Choice, Kind
@@ -197,7 +196,7 @@ def _units_of(inputs: Mapping[str, object]) -> dict[str, str]:
 
 def choose_point(dataset: xr.Dataset, keys: Sequence[str]) -> Choice | None:
     """Choose the axis at whose middle a motion is drawn; None for results at fixed steps, which have no motion."""
-    return None if has_fixed_steps(dataset) else choose_line(dataset, keys)
+    return None if "integrator" in dataset.attrs else choose_line(dataset, keys)
 
 
 # a kind of picture of one impact

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from ..contact.variables import OUTPUTS
 from ..errors import UsageError
 from ..formatting import argument, heading
-from ..results.kinds import is_sensitivity
+from ..results.kinds import kind_of
 from ..results.selection import select, select_laws
 from ..results.sensitivity import distribution_texts
 from .data import Points
@@ -133,7 +133,7 @@ class BarData:
 
 def sensitivity_bars(dataset: xr.Dataset, choice: Choice) -> BarData:
     """Read the first-order and total indices of each uncertain input, with their intervals."""
-    if not is_sensitivity(dataset):
+    if kind_of(dataset) != "sensitivity study":
         raise UsageError("this result is no sensitivity study: impact sensitivity -o writes those")
     for name, value in (("x", choice.x), ("y", choice.y), ("log", choice.log)):
         if value:

@@ -41,7 +41,7 @@ from ..results.calibration import (
     fit_notes,
     fit_rows,
 )
-from ..results.kinds import is_board, is_calibration, is_sensitivity
+from ..results.kinds import kind_of
 from ..results.plausibility import input_notes, inputs_of, result_notes, with_depths
 from ..results.provenance import stored_config
 from ..results.ranking import DEFAULT_TOL, Ranking, rank_models, rankable_parts
@@ -128,7 +128,7 @@ def _report_of(
     for name in sections or ():
         if name not in SECTIONS:
             raise UsageError(f'{argument("sections")}: no section "{name}"; {did_you_mean(name, SECTIONS)}')
-    if is_board(dataset):
+    if kind_of(dataset) == "board":
         for name, value in (("models", models), ("sections", sections)):
             if value:
                 raise UsageError(f"{argument(name)}: does not apply to the page of a board")
@@ -141,8 +141,8 @@ def _report_of(
         part_notes = [f"this page shows {dataset.sizes['model']} of the {model_count} models of the result"]
     sections = sections or SECTIONS
     summary = with_depths(summarize(dataset, MAX_FAILED), dataset)
-    fits = _fits_section(dataset) if is_calibration(dataset) else None
-    studies = list(_studies(dataset)) if is_sensitivity(dataset) else []
+    fits = _fits_section(dataset) if kind_of(dataset) == "calibration" else None
+    studies = list(_studies(dataset)) if kind_of(dataset) == "sensitivity study" else []
     ranked, headline = (None, "") if fits or studies else _rank_models(dataset)
     keys = [str(key) for key in dataset["model"].values]
     selection = ""
@@ -241,9 +241,9 @@ def _css_text(text: str) -> Markup:
 
 
 def page_title(dataset: xr.Dataset) -> str:
-    if is_calibration(dataset):
+    if kind_of(dataset) == "calibration":
         return calibration_title(dataset) or "Calibration"
-    if is_sensitivity(dataset):
+    if kind_of(dataset) == "sensitivity study":
         return f"Which uncertain input matters for {dataset.attrs['of']}"
     return str(dataset.attrs.get("title", "")) or "Impact of two balls"
 

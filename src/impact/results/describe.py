@@ -19,7 +19,7 @@ from ..errors import UsageError
 from . import calibration, sensitivity
 from .attributes import read_attribute
 from .board import Board
-from .kinds import is_board, is_calibration, is_sensitivity
+from .kinds import kind_of
 from .replay_command import describe_point
 from .xarray_backend import result_of
 
@@ -153,10 +153,11 @@ def describe(
     if isinstance(item, FrictionLaw):
         return FrictionDescription(item)
     result = result_of(item)
-    if is_calibration(result):
-        return Fits(result)
-    if is_sensitivity(result):
-        return Studies(result)
-    if is_board(result):
-        return Board(result)
+    match kind_of(result):
+        case "calibration":
+            return Fits(result)
+        case "sensitivity study":
+            return Studies(result)
+        case "board":
+            return Board(result)
     raise UsageError("expected the result of a calibration, of a sensitivity study, or a board")

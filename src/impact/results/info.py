@@ -14,7 +14,7 @@ from ..display import PIPE_WIDTH, Block, Displayed, Table
 from ..formatting import label, number
 from .attributes import read_attribute
 from .describe import describe
-from .kinds import is_board, is_calibration, is_sensitivity
+from .kinds import STUDIES, kind_of
 from .outcome import error_table
 from .schema import count_points, exponents_of, plain_unit
 from .slabs import is_large
@@ -138,7 +138,7 @@ def _tables(result: xr.Dataset, name: str, description: Mapping[str, Any]) -> li
     tables: list[Block] = [Table(list(rows.items())), "", Table(variables, headings)]
     if description["worst"]:
         tables += ["", error_table(description["worst"])]
-    if is_calibration(result) or is_sensitivity(result) or is_board(result):
+    if kind_of(result) in STUDIES:
         tables += ["", *describe(result).sections(PIPE_WIDTH)]
     return tables
 
@@ -175,8 +175,11 @@ def _values_text(dataset: xr.Dataset, name: str) -> str:
 
 def _count_points(dataset: xr.Dataset) -> int:
     """Count the points of a sweep, the measured values of a calibration, the studies of a study, or the checks."""
-    if is_calibration(dataset):
-        return dataset.sizes["point"]
-    if is_board(dataset):
-        return int(dataset["check_status"].size)
-    return int(dataset["mean"].size) if is_sensitivity(dataset) else count_points(dataset)
+    match kind_of(dataset):
+        case "calibration":
+            return dataset.sizes["point"]
+        case "sensitivity study":
+            return int(dataset["mean"].size)
+        case "board":
+            return int(dataset["check_status"].size)
+    return count_points(dataset)

@@ -10,6 +10,9 @@ from ..errors import UsageError
 
 Kind = Literal["sweep", "history", "calibration", "sensitivity study", "board"]
 
+# the results of other commands than sweeps and single impacts
+STUDIES: tuple[Kind, ...] = ("calibration", "sensitivity study", "board")
+
 
 def kind_of(dataset: xr.Dataset) -> Kind:
     """Find the kind of a dataset by its dimensions."""
@@ -28,28 +31,8 @@ def require_result(dataset: xr.Dataset) -> None:
         raise UsageError("this dataset is not a result of impact: it has no coordinate model")
 
 
-def is_calibration(dataset: xr.Dataset) -> bool:
-    """Whether a dataset is the result of a calibration."""
-    return kind_of(dataset) == "calibration"
-
-
-def is_sensitivity(dataset: xr.Dataset) -> bool:
-    """Whether a dataset is the result of a sensitivity study."""
-    return kind_of(dataset) == "sensitivity study"
-
-
-def is_board(dataset: xr.Dataset) -> bool:
-    """Whether a dataset is the board of `impact conform`."""
-    return kind_of(dataset) == "board"
-
-
-def has_fixed_steps(dataset: xr.Dataset) -> bool:
-    """Whether the points of a dataset are collisions at a fixed step; results of the continuous law do not say."""
-    return "integrator" in dataset.attrs
-
-
 def require_sweep(dataset: xr.Dataset, command: str) -> None:
     """Raise a UsageError where a command takes the result of a sweep, and got that of another command."""
     kind = kind_of(dataset)
-    if kind in ("calibration", "sensitivity study", "board"):
+    if kind in STUDIES:
         raise UsageError(f"{command}: this is a {kind}, expected the result of a sweep")

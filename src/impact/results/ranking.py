@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..array_types import Mask
 from ..config.files import read_number
-from ..config.input_names import InputName
+from ..config.input_names import InputName, is_foreign
 from ..config.quantities import Quantity
 from ..config.tables import TOLERANCE
 from ..contact.status import FIRST_FAILURE, FrictionStatus, Status
@@ -26,7 +26,7 @@ from ..errors import UsageError, did_you_mean
 from ..formatting import argument, number, percentage, prefixed, safe_text
 from .kinds import require_sweep
 from .replay_command import describe_point
-from .schema import columns_along, foreign_dims, plain_unit
+from .schema import columns_along, plain_unit
 from .selection import LawDim, as_keys, law_positions, select
 from .slabs import Slab, distinct_points, is_computed, over_varying_dims, slabs, varying_dims
 from .xarray_backend import result_of
@@ -413,7 +413,8 @@ def _uses_e(dataset: xr.Dataset) -> bool:
 def _select_law(dataset: xr.Dataset, place: Mapping[str, int]) -> xr.Dataset:
     """Select a model of a result, or a pair, without the axes of other laws' parameters."""
     keys = [str(dataset[dim].values[position]) for dim, position in place.items()]
-    return dataset.isel({**place, **dict.fromkeys(foreign_dims(dataset, *keys), 0)})
+    foreign = [dim for dim in dataset.dims if is_foreign(columns_along(dataset, dim), *keys)]
+    return dataset.isel({**place, **dict.fromkeys(foreign, 0)})
 
 
 def _keys(law_data: xr.Dataset) -> tuple[str, str]:

@@ -47,22 +47,15 @@ FIT_STATUSES = {
     "no_prediction": "the law has no result at a point",
     "at_limit": "a parameter is at an end of its allowed values, where its interval ends too",
 }
-_LAWS, _PARAMETERS, _MEASURED = ("model",), ("model", "parameter"), ("model", "point")
-_CURVES = ("model", "output_name", "grid")
+_PARAMETERS = ("model", "parameter")
+_of_parameter = partial(Variable, dims=_PARAMETERS, unit="SI", scale="itself + interval")
+_of_law = partial(Variable, dims=("model",), scale="max(1, itself)")
+_of_point = partial(Variable, dims=("model", "point"), unit="SI", scale="measured")
+_curve = partial(Variable, dims=("model", "output_name", "grid"), unit="SI", scale="measured")
 CALIBRATION = by_name(
-    Variable(
-        "estimate",
-        "best value of the parameter; NaN where the law does not have it",
-        _PARAMETERS,
-        "SI",
-        "itself + interval",
-    ),
-    Variable(
-        "lower", "lower end of the interval of 95 % by profile likelihood", _PARAMETERS, "SI", "itself + interval"
-    ),
-    Variable(
-        "upper", "upper end of the interval of 95 % by profile likelihood", _PARAMETERS, "SI", "itself + interval"
-    ),
+    _of_parameter("estimate", "best value of the parameter; NaN where the law does not have it"),
+    _of_parameter("lower", "lower end of the interval of 95 % by profile likelihood"),
+    _of_parameter("upper", "upper end of the interval of 95 % by profile likelihood"),
     Variable(
         "covariance",
         "covariance in the linear approximation",
@@ -74,48 +67,42 @@ CALIBRATION = by_name(
         "identifiable",
         "1 if the data determine the parameter, -1 if it is not the law's",
         _PARAMETERS,
-        "1",
-        "exact",
+        scale="exact",
         dtype="i1",
     ),
     Variable(
         "fit_status",
         "outcome of the fit",
-        _LAWS,
-        "1",
-        "exact",
+        ("model",),
+        scale="exact",
         dtype="i1",
         flags={name: number for number, name in enumerate(FIT_STATUSES)},
     ),
-    Variable("chi2_reduced", "squared residuals in variances per degree of freedom", _LAWS, "1", "max(1, itself)"),
-    Variable(
-        "p_value", "probability of a larger chi2 by the noise alone", _LAWS, "1", "max(1, itself)", is_new=True
+    _of_law("chi2_reduced", "squared residuals in variances per degree of freedom"),
+    _of_law("p_value", "probability of a larger chi2 by the noise alone", is_new=True),
+    _of_law(
+        "excess",
+        "standard deviation between specimens, besides that of the measurements",
+        unit="SI",
+        scale="itself",
     ),
-    Variable(
-        "excess", "standard deviation between specimens, besides that of the measurements", _LAWS, "SI", "itself"
+    _of_law("aicc", "corrected information criterion of Akaike"),
+    _of_law("weight", "Akaike weight among the laws"),
+    _of_law(
+        "loo", "root mean square of leave-one-out residuals in given standard deviations; in SI units without one"
     ),
-    Variable("aicc", "corrected information criterion of Akaike", _LAWS, "1", "max(1, itself)"),
-    Variable("weight", "Akaike weight among the laws", _LAWS, "1", "max(1, itself)"),
-    Variable(
-        "loo",
-        "root mean square of leave-one-out residuals in given standard deviations; in SI units without one",
-        _LAWS,
-        "1",
-        "max(1, itself)",
-    ),
-    Variable("predicted", "output of the law at the point", _MEASURED, "SI", "measured"),
-    Variable("residual", "measured minus predicted", _MEASURED, "SI", "measured"),
-    Variable(
+    _of_point("predicted", "output of the law at the point"),
+    _of_point("residual", "measured minus predicted"),
+    _of_point(
         "loo_residual",
         "residual of the point in the fit without it, in its own standard deviations",
-        _MEASURED,
-        "1",
-        "max(1, itself)",
+        unit="1",
+        scale="max(1, itself)",
         is_new=True,
     ),
-    Variable("curve", "output of the law over the varied input", _CURVES, "SI", "measured"),
-    Variable("curve_lower", "lower end of the band of 95 % of the curve", _CURVES, "SI", "measured"),
-    Variable("curve_upper", "upper end of the band of 95 % of the curve", _CURVES, "SI", "measured"),
+    _curve("curve", "output of the law over the varied input"),
+    _curve("curve_lower", "lower end of the band of 95 % of the curve"),
+    _curve("curve_upper", "upper end of the band of 95 % of the curve"),
 )
 _STUDIES, _INPUTS = ("model", AXES), ("model", AXES, "input")
 SENSITIVITY = by_name(
@@ -413,11 +400,6 @@ def columns_along(dataset: xr.Dataset, dim: Hashable) -> list[str]:
     derived = derived_names(dataset.coords)
     along = [str(name) for name, coordinate in dataset.coords.variables.items() if coordinate.dims == (dim,)]
     return [name for name in along if is_input(name) and name not in derived]
-
-
-def foreign_dims(dataset: xr.Dataset, model: str, friction: str = "") -> list[Hashable]:
-    """List the dimensions along which only parameters of other laws vary, so that this model or pair does not."""
-    return [dim for dim in dataset.dims if is_foreign(columns_along(dataset, dim), model, friction)]
 
 
 def places_of_laws(

@@ -54,7 +54,7 @@ from ..engine.plugins import Plugins, read_plugins
 from ..errors import ConfigError, UsageError, did_you_mean, warn
 from ..formatting import argument, number, prefixed, safe_text
 from .calibration import fitted_config, position_of_law
-from .kinds import is_calibration, require_result, require_sweep
+from .kinds import kind_of, require_result, require_sweep
 from .plausibility import input_notes
 from .provenance import changed_plugins, stored_config, stored_draft, unknown_plugins
 from .schema import DEFAULT_RTOL_FACTOR, SCHEMA_VERSION, attributes_of, is_case, plain_unit, scale_of
@@ -621,7 +621,7 @@ def open_source(source: ConfigSource, overrides: Overrides, plugins: Plugins) ->
 def _open_stored(dataset: xr.Dataset, overrides: Overrides, plugins: Plugins, name: str) -> PointSource:
     require_result(dataset)
     calibration, settings = None, tuple(settings_of(overrides))
-    if is_calibration(dataset):
+    if kind_of(dataset) == "calibration":
         config = stored_config(dataset.attrs, (), plugins, name, allow_changed_plugins=True, purpose="calibrate")
         calibration = Calibration(dataset.load(), config, settings, name)
     else:

@@ -29,7 +29,7 @@ from .schema import (
     STUDY_COORDINATES,
     is_case,
 )
-from .slabs import VARIES_ALONG, is_lazy, slabs
+from .slabs import is_computed, slabs
 
 TEXT_COORDINATES = frozenset(
     {"model", "friction", *MODEL_METADATA, *MATERIAL_KEYS, *CALIBRATION_TEXTS, "input"} - {"year"}
@@ -160,7 +160,7 @@ def _attribute_violations(dataset: xr.Dataset) -> Iterator[str]:
 def _status_violations(dataset: xr.Dataset) -> Iterator[str]:
     """Numbers that are no status; computed statuses always are one."""
     for name, noun in STATUS_NOUNS.items():
-        if name in dataset and not (is_lazy(dataset[name].variable) and VARIES_ALONG in dataset[name].encoding):
+        if name in dataset and not is_computed(dataset[name].variable):
             known = [*{**OUTPUTS, **CALIBRATION, **BOARD}[name].flags.values()]
             parts = (dataset[name].isel(where).values for where in slabs(dataset[name].sizes, STATUS_SLAB_POINTS))
             if any(not np.isin(np.unique(part), known).all() for part in parts):
