@@ -216,7 +216,7 @@ def export(
     advised = None
     # with friction that changes e, no step delivers the e that is asked for
     if code.scheme is not None and problem.requested_e > 0.0 and not problem.law.is_coupled:
-        advised = timestep.needed_steps(problem.law, ADVISED_TOL, problem.e_continuous)
+        advised = timestep.needed_steps(problem.law, ADVISED_TOL)
     if parameter and code.scheme is None:
         raise UsageError(f"{argument('parameter')}: what {code.title} delivers at a time step is not predicted")
     needed, name = None, parameter
@@ -225,9 +225,7 @@ def export(
     # where nobody asked for it, a law whose time scale has no such parameter is exported without
     with nullcontext() if parameter else suppress(UsageError):
         if name:
-            needed = timestep.needed_parameter(
-                problem.point, name, dt, ADVISED_TOL, problem.law, problem.outputs, advised
-            )
+            needed = timestep.needed_parameter(problem.point, name, dt, ADVISED_TOL, problem.law, advised)
     needed_text = str(needed or (timestep.missing_parameter(parameter, ADVISED_TOL) if parameter else ""))
     header = _header(problem, collision, at_dt, advised, needed_text)
     lines = [*comment_lines(header), code.script(collision, parameters)] if script else []

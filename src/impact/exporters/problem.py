@@ -150,8 +150,8 @@ def prepare_export(
     if chosen:
         Plan(point.config).pair_notes("frictions")
     scheme = (find_friction(chosen).scheme if chosen else "") or code.scheme
-    fixed, outputs = fixed_step_law(point.config, PHASES, scheme, of_friction=chosen is not None)
-    warn_of_point(point_source, point, outputs["e_out"])
+    fixed = fixed_step_law(point.config, PHASES, scheme, of_friction=chosen is not None)
+    warn_of_point(point_source, point, fixed.continuous["e_out"])
     if fixed.oblique is not None:
         _check_limit(code, fixed.oblique)
     calibration = point_source.calibration
@@ -160,7 +160,7 @@ def prepare_export(
         code=code,
         version=version,
         law=fixed,
-        outputs=outputs,
+        outputs=fixed.continuous,
         point=point,
         fit_notes=fit_notes,
         better_fit=better_fit,

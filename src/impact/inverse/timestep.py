@@ -362,19 +362,19 @@ def timestep(
     point = point_with_e(point_source, find(model, plugin_set.models), at or {}, friction=friction)
     if point.config.frictions:
         Plan(point.config).pair_notes("frictions")
-    law, collision = fixed_step_law(point.config, phases, scheme, of_friction=True)
-    warn_of_point(point_source, point, collision["e_out"])
+    law = fixed_step_law(point.config, phases, scheme, of_friction=True)
+    warn_of_point(point_source, point, law.continuous["e_out"])
     steps = time_steps(law.contact_time, counts or (() if given else STEPS_PER_CONTACT), given)
     needed, found = None, None
     if tol is not None:
-        needed = needed_steps(law, tol, collision["e_out"])
+        needed = needed_steps(law, tol)
         if parameter is not None:
-            found = needed_parameter(point, parameter, given[0], tol, law, collision, needed)
+            found = needed_parameter(point, parameter, given[0], tol, law, needed)
     return TimestepResult(
         model=law.model.key,
         scheme=law.scheme,
         e=law.e if point.solved is None else float(point.config.scalars["e"]),
-        e_continuous=collision["e_out"],
+        e_continuous=law.continuous["e_out"],
         contact_time=law.contact_time,
         rows=timestep_rows(law, steps),
         needed=needed,
@@ -385,7 +385,7 @@ def timestep(
         needed_parameter=found,
         rayleigh_time=law.rayleigh_time,
         friction=law.oblique.pair.friction.key if law.oblique else "",
-        beta_continuous=collision.get("beta", math.nan),
+        beta_continuous=law.continuous.get("beta", math.nan),
     )
 
 
@@ -424,15 +424,26 @@ class ObliqueLaw:
 
 @dataclass(frozen=True)
 class FixedStepLaw:
-    """One impact of a law, whose e, step and phase vary; `rayleigh_time` [s] is the smaller one of both balls."""
+    """One impact of a law, whose e, step and phase vary.
+
+    Parameters
+    ----------
+    continuous : outputs of the continuous law by name, in SI
+    rayleigh_time : the smaller one of both balls [s]
+    """
 
     model: ForceModel
     impact: Impacts
-    contact_time: float
+    continuous: Mapping[str, float]
     phases: int
     scheme: str
     rayleigh_time: float
     oblique: ObliqueLaw | None = None
+
+    @property
+    def contact_time(self) -> float:
+        """Contact time of the continuous law [s]."""
+        return self.continuous["contact_time"]
 
     @property
     def has_e(self) -> bool:
@@ -538,16 +549,13 @@ def compensated_e(law: FixedStepLaw, dt: Array) -> Array:
 
 
 def needed_steps(
-    law: FixedStepLaw,
-    tol: float,
-    e_continuous: float,
-    most: int = MAX_STEPS_PER_CONTACT,
-    nearby: NeededSteps | None = None,
+    law: FixedStepLaw, tol: float, most: int = MAX_STEPS_PER_CONTACT, nearby: NeededSteps | None = None
 ) -> NeededSteps | None:
     """Search for the smallest number of steps per contact with which every phase is within a tolerance.
 
     The search begins at the number that a similar law needs, which mostly is the answer.
     """
+    e_continuous = law.continuous["e_out"]
     target = law.e if law.has_e else e_continuous
     if not target > 0.0:
         raise UsageError(f"{argument('tol')} is relative to e, expected e > 0")
@@ -591,17 +599,16 @@ def needed_parameter(
     dt: float,
     tol: float,
     law: FixedStepLaw,
-    collision: Mapping[str, float],
     needed: NeededSteps | None = None,
 ) -> NeededParameter | None:
     """Find the value of a parameter from which on every phase is within a tolerance at a step dt [s].
 
-    The law, the collision and, where they are known, the needed steps are those of the point. Where its damping
-    was solved for, e is kept by the damping in the contact's own units, which is enough where the law has a single
-    time scale, else by solving again.
+    The law and, where they are known, the needed steps are those of the point. Where its damping was solved for, e
+    is kept by the damping in the contact's own units, which is enough where the law has a single time scale, else
+    by solving again.
     """
     if name == RELAXATION_TIME:
-        return _needed_relaxation_time(point, dt, tol, law, collision, needed)
+        return _needed_relaxation_time(point, dt, tol, law, needed)
     config, model = point.config, law.model
     e = None if point.solved is None else float(config.scalars["e"])
     unknown, path, value = _seek(config, law, name)
@@ -611,18 +618,18 @@ def needed_parameter(
     def damping_of(impact: Impacts) -> float:
         return float(impact.dimensionless(model, model.damping)[0])
 
-    def collide_at(value: float) -> tuple[Config, FixedStepLaw, dict[str, float]]:
+    def collide_at(value: float) -> tuple[Config, FixedStepLaw]:
         changed = replace(config, scalars={**config.scalars, path: value})
         if e is None:
-            return changed, *law_of(changed)
+            return changed, law_of(changed)
         damping = damping_of(build_impacts(Plan(changed).inputs, model, ()))
         scaled = float(changed.scalars[damping_path]) * (damping_of(base.impact) / damping if damping else 1.0)
         changed = replace(changed, scalars={**changed.scalars, damping_path: scaled})
-        law, collision = law_of(changed)
-        if abs(collision["e_out"] - e) < HELD_E:
-            return changed, law, collision
+        law = law_of(changed)
+        if abs(law.continuous["e_out"] - e) < HELD_E:
+            return changed, law
         changed = solve_damping(changed, e)
-        return changed, *law_of(changed)
+        return changed, law_of(changed)
 
     slope = 0.0
     # e is what the tolerance is of
@@ -633,7 +640,7 @@ def needed_parameter(
         raise UsageError(f"{argument('parameter')}: {name} does not set the contact time of {model.key}")
     changed = config
     for _ in range(MAX_SECANTS):
-        needed = needed_steps(law, tol, collision["e_out"], MAX_SECANT_STEPS, needed)
+        needed = needed_steps(law, tol, MAX_SECANT_STEPS, needed)
         if needed is None:
             return None
         distance = math.log(law.contact_time / (needed.steps_per_contact * dt))
@@ -646,7 +653,7 @@ def needed_parameter(
                 companion="" if e is None else _named(model, float(changed.scalars[damping_path])),
                 dt=dt,
                 contact_time=law.contact_time,
-                peak_indentation=collision["peak_indentation"],
+                peak_indentation=law.continuous["peak_indentation"],
                 tol=tol,
                 relaxation_time=_relaxation_time(law),
             )
@@ -655,7 +662,7 @@ def needed_parameter(
             return None
         before, value = law.contact_time, value * math.exp(logarithm)
         try:
-            changed, law, collision = collide_at(value)
+            changed, law = collide_at(value)
         except UsageError:
             # no rebound there
             return None
@@ -664,12 +671,7 @@ def needed_parameter(
 
 
 def _needed_relaxation_time(
-    point: PointWithE,
-    dt: float,
-    tol: float,
-    law: FixedStepLaw,
-    collision: Mapping[str, float],
-    known: NeededSteps | None,
+    point: PointWithE, dt: float, tol: float, law: FixedStepLaw, known: NeededSteps | None
 ) -> NeededParameter | None:
     """Find the relaxation time of SAP, and the K with which it keeps e, from which it follows."""
     role = argument("parameter")
@@ -682,7 +684,7 @@ def _needed_relaxation_time(
             f"{role}: {RELAXATION_TIME} = C/K sets e at a given K, and not the contact time: expected "
             f"{argument('at', 0.8, key='e')} or another e < 1, which K and {RELAXATION_TIME} together keep"
         )
-    needed = needed_parameter(point, "K", dt, tol, law, collision, known)
+    needed = needed_parameter(point, "K", dt, tol, law, known)
     if needed is None:
         return None
     return replace(
@@ -752,11 +754,8 @@ def _takes_moduli(config: Config, model: ForceModel) -> bool:
 
 def fixed_step_law(
     config: Config, phases: int, scheme: str | None = None, *, of_friction: bool = False
-) -> tuple[FixedStepLaw, dict[str, float]]:
-    """Build the law and impact of a config without axes, and the outputs of the continuous law by name, in SI.
-
-    Its friction law is left out unless it is asked for.
-    """
+) -> FixedStepLaw:
+    """Build the law and impact of a config without axes; its friction law is left out unless it is asked for."""
     plan = Plan(config)
     model = config.models[0]
     impact = build_impacts(plan.inputs, model, ())
@@ -779,16 +778,15 @@ def fixed_step_law(
         names=(*CENTRAL_OUTPUTS, *(("beta", "friction_status") if continuous else ())),
         oblique=(continuous.pair, continuous.impact) if continuous else None,
     )
-    collision = {name: array.ravel()[0].item() for name, array in outputs.items()}
-    status = Status(collision["status"])
+    values = {name: array.ravel()[0].item() for name, array in outputs.items()}
+    status = Status(values["status"])
     if status != Status.OK:
         raise UsageError(f"{model.key} has no rebound at these inputs: {status.meaning}")
-    friction_status = FrictionStatus(collision.get("friction_status", FrictionStatus.OK))
+    friction_status = FrictionStatus(values.get("friction_status", FrictionStatus.OK))
     if friction_status >= FIRST_FAILURE and oblique is not None:
         raise UsageError(f"{oblique.pair.key} has no answer at these inputs: {friction_status.meaning}")
     wave_time = float(rayleigh_time_at(plan.inputs, ()).item()) if _takes_moduli(config, model) else math.nan
-    contact_time = collision["contact_time"]
-    return FixedStepLaw(model, impact, contact_time, phases, scheme, wave_time, oblique), collision
+    return FixedStepLaw(model, impact, values, phases, scheme, wave_time, oblique)
 
 
 def time_steps(contact_time: float, steps_per_contact: Sequence[float], dt: Sequence[float]) -> list[float]:
