@@ -71,7 +71,7 @@ def stored_stiffness(inputs: Inputs, law: Law) -> tuple[tuple[int, ...], Array] 
     return axes, K
 
 
-def factored_template(
+def table_template(
     result_template: xr.Dataset, table: TrajectoryTable, variables: Sequence[Variable]
 ) -> xr.Dataset:
     """Build the dataset of a factored file, with placeholder values, from the coordinates of the result."""

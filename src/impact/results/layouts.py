@@ -8,14 +8,7 @@ from typing import NamedTuple
 import xarray as xr
 
 from ..engine.plan import Plan
-from .factored import (
-    check_witnesses,
-    factored_template,
-    stored_stiffness,
-    stored_table,
-    table_values,
-    witness_variables,
-)
+from . import factored
 from .netcdf import RegionValues, stored_array
 from .schema import stored_variables
 from .summary import Summary, add_slab, summarize_table, summary_record
@@ -83,10 +76,10 @@ class FactoredLayout:
 
     def check(self, plan: Plan) -> None:
         for law in plan.models:
-            stored_stiffness(plan.inputs, law)
+            factored.stored_stiffness(plan.inputs, law)
 
     def template(self, result: xr.Dataset, plan: Plan, table: TrajectoryTable) -> xr.Dataset:
-        return factored_template(result, table, stored_variables(plan))
+        return factored.table_template(result, table, stored_variables(plan))
 
     def contents(
         self, result: xr.Dataset, plan: Plan, table: TrajectoryTable, on_slab: OnSlab, fill: FillSlab | None
@@ -103,7 +96,7 @@ class FactoredLayout:
                 add_slab(summary, table, slab)
 
         def values() -> Iterator[RegionValues]:
-            for stored in table_values(table, variables):
+            for stored in factored.table_values(table, variables):
                 yield stored
                 on_slab(0, summary.failed)
 
@@ -116,9 +109,9 @@ class FactoredLayout:
         # without xarray's indexing, which takes longer than to read a few values
         arrays = {name: stored_array(variable) for name, variable in stored.items() if name not in witnesses}
         sizes = {name: array.shape[0] for name, array in arrays.items()}
-        table = stored_table(dataset, sizes, lambda name, positions: arrays[name].read((positions,)))
-        quantities = witness_variables(dataset)
-        check_witnesses(table, quantities, dataset)
+        table = factored.stored_table(dataset, sizes, lambda name, positions: arrays[name].read((positions,)))
+        quantities = factored.witness_variables(dataset)
+        factored.check_witnesses(table, quantities, dataset)
         template = dataset.drop_vars(witnesses).drop_attrs(deep=False)
         described = {name: value for name, value in attributes.items() if name not in FACTORED_ATTRIBUTES}
         return lazy_dataset(template.assign_attrs(described), table, quantities)
