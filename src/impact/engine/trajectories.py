@@ -118,7 +118,7 @@ def law_axes(inputs: Inputs, law: PlanLaw, collapse: bool) -> tuple[int, ...]:
     """Find the axes on which a law and its fixed step depend; all of its axes without `collapse`."""
     if not collapse:
         return inputs.axes_of_law(*keys_of(law))
-    values, status = _values_at(inputs, law, _probe_index(inputs, law))
+    _, values, status = _values_at(inputs, law, _probe_index(inputs, law))
     return tuple(sorted(axes_of_arrays([status, *values.values()])))
 
 
@@ -168,15 +168,15 @@ def columns_at(inputs: Inputs, law: PlanLaw, axes: Sequence[int], index: Index) 
     """Build the problems of a law at cells, arrays that broadcast; only inputs along `axes` are checked."""
     model = model_of(law)
     checks = frozenset(check for check, varying in axes_of_checks(inputs, model).items() if varying <= {*axes})
-    values, own_status = _values_at(inputs, law, index)
+    impacts, values, own_status = _values_at(inputs, law, index)
     with np.errstate(all="ignore"):
-        status = check_inputs(model, build_impacts(inputs, model, index), checks)
+        status = check_inputs(model, impacts, checks)
     # in this order: that of trajectories follows from it
     return {"n": values.pop("n"), "status": np.where(status == STATUS_OK, own_status, status), **values}
 
 
-def _values_at(inputs: Inputs, law: PlanLaw, index: Index) -> tuple[Columns, NDArray[np.int8]]:
-    """Compute the exponent, the values of a law and its fixed step at cells, and the status by friction alone."""
+def _values_at(inputs: Inputs, law: PlanLaw, index: Index) -> tuple[Impacts, Columns, NDArray[np.int8]]:
+    """Build the impacts of a law at cells, with their problems, and the status by friction alone."""
     model = model_of(law)
     impacts, status = build_impacts(inputs, model, index), np.full((1,) * dimensions(index), STATUS_OK, np.int8)
     with np.errstate(all="ignore"):
@@ -186,7 +186,7 @@ def _values_at(inputs: Inputs, law: PlanLaw, index: Index) -> tuple[Columns, NDA
             oblique = build_oblique(inputs, impacts, index, pair.friction)
             values |= friction_values(pair, oblique)
             status = check_friction(pair, oblique)
-    return values, status
+    return impacts, values, status
 
 
 def probe_index(inputs: Inputs, swept_names: Iterable[str] = ()) -> Index:

@@ -425,7 +425,7 @@ def _derived_quantities(
     law: ForceModel, impacts: Impacts, values: Mapping[str, float], history: History | None
 ) -> dict[str, float]:
     """Compute DERIVED_QUANTITIES."""
-    quantities = {name: getattr(impacts, name)[0].item() for name in ("m1", "m2", "R1", "R2", "m")}
+    quantities = {name: getattr(impacts, name)[0].item() for name, *_ in INPUT_QUANTITIES}
     has_rebound = values["status"] in (Status.OK, Status.LIMIT)
     if has_rebound and law.unloading in (unload_to_residual, unload_with_stiffness):
         recovered = values["peak_indentation"] - values["permanent_indentation"]

@@ -256,14 +256,11 @@ def read_plan(
 def sweep_in_memory(plan: Plan, run: Run = DEFAULT_RUN) -> xr.Dataset:
     """Run a plan; a small result is in memory, a large one is computed when it is indexed."""
     check_labels(plan)
-    finished: dict[TrajectoryRange, Record] = {}
-    counter = ProgressCounter.start(plan.ranges, plan.points, run)
     try:
-        integrate(plan, plan.ranges, finished.__setitem__, counter, run)
+        table, _ = _integrate_in_memory(plan, run)
         run.check_stop()
     except UnfinishedError:
         raise UnfinishedError("nothing was written") from None
-    table = table_of_ranges(plan, finished.__getitem__)
     dataset = lazy_dataset(dataset_template(plan), table, stored_variables(plan))
     return in_memory(dataset) if dataset.nbytes <= MAX_LOADED_BYTES else dataset
 
@@ -280,11 +277,8 @@ def sweep_into(
     # slips take longer
     most = RANGE_TRAJECTORIES // 64 if plan.frictions else RANGE_TRAJECTORIES
     if plan.trajectories <= most and few and not os.path.lexists(folder):
-        finished: dict[TrajectoryRange, Record] = {}
         # so short that it is neither stopped nor reported
-        counter = ProgressCounter.start(plan.ranges, plan.points, DEFAULT_RUN)
-        integrate(plan, plan.ranges, finished.__setitem__, counter, DEFAULT_RUN, extension.find_reused)
-        table = table_of_ranges(plan, finished.__getitem__)
+        table, counter = _integrate_in_memory(plan, DEFAULT_RUN, extension.find_reused)
         try:
             return store_result(output, plan, table, counter, run, extension)
         except UnfinishedError:
@@ -307,6 +301,16 @@ def sweep_into(
             )
         checkpoint.remove_work_folder(folder)
     return outcome
+
+
+def _integrate_in_memory(
+    plan: Plan, run: Run, find_reused: FindReused = reuse_nothing
+) -> tuple[TrajectoryTable, ProgressCounter]:
+    """Integrate all ranges of a plan without a work folder."""
+    finished: dict[TrajectoryRange, Record] = {}
+    counter = ProgressCounter.start(plan.ranges, plan.points, run)
+    integrate(plan, plan.ranges, finished.__setitem__, counter, run, find_reused)
+    return table_of_ranges(plan, finished.__getitem__), counter
 
 
 def complete_ranges(
