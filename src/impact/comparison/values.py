@@ -19,7 +19,7 @@ from ..contact.variables import Variable
 from ..errors import UsageError
 from ..results import slabs
 from ..results.replay_command import inputs_of_model
-from ..results.schema import SLIP_INPUTS, columns_along, is_case, scale_of
+from ..results.schema import columns_along, inputs_of_scale, is_case, scale_of
 from .align import AlignedResult, Alignment
 from .verdict import VariableComparison
 
@@ -32,14 +32,6 @@ MAX_COMPARED_POINTS = 10**10
 MAX_RATIO_GROUPS = 2**14
 # |difference|/scale is that of a trajectory: |Delta v1_post|/v0 = (m/m1) |Delta e_out| <= |Delta e_out|
 DIMENSIONLESS_SCALES = ("v0", "the peak", "itself", "m v0^2/2")
-# coordinates that the scale of a point is computed from, if the result has them
-SCALE_INPUTS = {
-    "v0": ("v1", "v2"),
-    "m v0^2/2": ("v1", "v2", "m1", "m2"),
-    "the slip": ("v1", "v2", *SLIP_INPUTS),
-    "the spin": ("v1", "v2", *SLIP_INPUTS),
-    "m (v0^2 + g0^2)/2": ("v1", "v2", "m1", "m2", *SLIP_INPUTS),
-}
 
 
 def representative_regions(variables: Sequence[Variable], aligned: Alignment) -> dict[str, list[Region]]:
@@ -90,11 +82,11 @@ def _representative_dims(
         return {dim for dataset, name in present for dim in slabs.varying_dims(dataset, name)}
 
     scale: set[Hashable] = set()
-    for name in SCALE_INPUTS.get(variable.scale, ()):
+    for name in inputs_of_scale(variable):
         if name in aligned.baseline.coords:
             scale |= set(aligned.baseline.coords.variables[name].dims)
-    if variable.scale == "the peak" and "peak_indentation" in datasets[1]:
-        scale |= set(slabs.varying_dims(datasets[1], "peak_indentation"))
+        elif name in datasets[1]:
+            scale |= set(slabs.varying_dims(datasets[1], name))
     full = varying(variable.name) | scale
     candidates = [full]
     if variable.per_model and variable.has_tolerance:

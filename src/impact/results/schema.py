@@ -201,6 +201,22 @@ def scale_of(variable: Variable, read: Callable[[str], NDArray[Any]], *, has_pea
     return np.ones(())
 
 
+def inputs_of_scale(variable: Variable) -> set[str]:
+    """Name the values that the scale of an output is computed from.
+
+    >>> sorted(inputs_of_scale(OUTPUTS["v1_post"])), inputs_of_scale(OUTPUTS["peak_indentation"])
+    (['v1', 'v2'], {'peak_indentation'})
+    """
+    names: set[str] = set()
+
+    def read(name: str) -> NDArray[np.float64]:
+        names.add(name)
+        return np.ones(())
+
+    scale_of(variable, read, has_peak=True)
+    return names
+
+
 def _slip_before(read: Callable[[str], NDArray[np.float64]]) -> NDArray[np.float64]:
     """The size of the slip before oblique impacts [m/s], from those of their inputs that a result has."""
 
