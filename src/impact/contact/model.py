@@ -114,6 +114,8 @@ class About(TypedDict):
     domain_source: NotRequired[str]
     parameters: NotRequired[tuple[Parameter, ...]]
     exponent: NotRequired[float]
+    stiffness: NotRequired[Formula]
+    family: NotRequired[str]
 
 
 @dataclass(frozen=True, repr=False)

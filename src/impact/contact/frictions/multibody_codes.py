@@ -10,7 +10,7 @@ from ..fixed_step import MUJOCO_CONE
 from ..friction import FrictionLaw
 from ..model import Parameter
 from ..models.cited_sources import SIMBODY
-from ..models.multibody_codes import MUJOCO_DOI, MUJOCO_EVIDENCE, MUJOCO_REFERENCE
+from ..models.multibody_codes import MUJOCO_SOLREF, SIMBODY_HUNT_CROSSLEY as SIMBODY_FORCE
 from .parameters import limit
 
 DYNAMIC_FRICTION = Parameter(
@@ -51,13 +51,10 @@ SIMBODY_HUNT_CROSSLEY = FrictionLaw(
     title="Simbody and OpenSim HuntCrossleyForce (2010 to 2026)",
     year=2010,
     equation="f = μ(g) F sgn g,  μ(g) = min(y, 1)(μ_d + 2(μ − μ_d)/(1 + y²)) + μ_v |g|,  y = |g|/v_t",
-    reference="Sherman MA, Seth A, Delp SL (2011) Simbody: multibody dynamics for biomedical research. Procedia "
-    "IUTAM 2, 241",
-    doi="10.1016/j.piutam.2011.04.023",
+    reference=SIMBODY_FORCE.reference,
+    doi=SIMBODY_FORCE.doi,
     kind="regularized",
-    evidence=Evidence(
-        "seen", f"{SIMBODY}; also @178eb211", doi="simbody/simbody, CONTRIBUTING.md @f312d0dd (2026)"
-    ),
+    evidence=Evidence("seen", f"{SIMBODY}; also @178eb211", doi=SIMBODY_FORCE.evidence.doi),
     parameters=(
         Parameter(
             "v_t", "m/s", "transition velocity, the slip of the largest friction", default=0.01, least=1e-12
@@ -77,13 +74,13 @@ MUJOCO_ELLIPTIC = FrictionLaw(
     year=2014,
     equation="f = m b_t g/D,  |f| ≤ μ N,  N = F, where it slips N = max(0, F + μ m b_t |g|)/(1 + μ² D),  "
     "D = d m/m_t + (1 − d)/i,  with the impedance d and i = impratio",
-    reference=MUJOCO_REFERENCE,
+    reference=MUJOCO_SOLREF.reference,
     kind="cone",
-    doi=MUJOCO_DOI,
+    doi=MUJOCO_SOLREF.doi,
     evidence=Evidence(
         "seen",
         "google-deepmind/mujoco, src/engine/engine_core_constraint.c @00010f58",
-        doi=MUJOCO_EVIDENCE.doi,
+        doi=MUJOCO_SOLREF.evidence.doi,
         note="the closed form for one contact was derived from it, and agrees with runs of MuJoCo 4.0.0",
     ),
     parameters=(

@@ -17,8 +17,7 @@ JKR_1971 = ForceModel(
     title="Johnson, Kendall and Roberts, by Thornton and Ning",
     year=1971,
     equation="F = 4E* a³/(3R*) − √(8π Γ E* a³),  δ = a²/R* − √(2π Γ a/E*), from δ = 0 to the pull-off at δ = "
-    "−(3/4)"
-    "(π² Γ² R*/E*²)^(1/3)",
+    "−(3/4)(π² Γ² R*/E*²)^(1/3)",
     reference="Thornton C, Ning Z (1998) A theoretical model for the stick/bounce behaviour of adhesive, "
     "elastic-plastic spheres. Powder Technol. 99, 154; Johnson KL, Kendall K, Roberts AD (1971)",
     doi="10.1016/S0032-5910(98)00099-0",

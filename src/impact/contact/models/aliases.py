@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 from ..evidence import Evidence
 from ..model import ForceModel
@@ -11,22 +12,9 @@ from .dashpot import KELVIN_VOIGT
 from .hysteresis import EXACT_HYSTERESIS, FLORES_2011, HUNT_CROSSLEY_1975, LANKARANI_NIKRAVESH_1990
 
 
-def same_law(
-    law: ForceModel, key: str, *, title: str, year: int, reference: str, evidence: Evidence, doi: str = ""
-) -> ForceModel:
-    """Give a law another name."""
-    return replace(
-        law,
-        key=key,
-        title=title,
-        year=year,
-        reference=reference,
-        doi=doi,
-        evidence=evidence,
-        domain={},
-        domain_source="",
-        same_as=law.key,
-    )
+def same_law(law: ForceModel, key: str, *, doi: str = "", **about: Any) -> ForceModel:
+    """Give a law another name, with other fields that describe it; its domain is that of the first name alone."""
+    return replace(law, key=key, doi=doi, domain={}, domain_source="", same_as=law.key, **about)
 
 
 MARHEFKA_ORIN_1999 = same_law(

@@ -19,12 +19,9 @@ from .dashpot import dashpot
 
 def approach_dashpot(key: str, *, zeta: Formula, **about: Unpack[About]) -> ForceModel:
     """Make a law of a spring and a dashpot that acts on approach only, from the formula of its damping ratio."""
-    return replace(
-        dashpot(key, zeta=zeta, release="gap", **about),
-        unloading=spring,
-        oracle=lambda zeta: approach_restitution(zeta),
-        family="asymmetric",
-    )
+    about.setdefault("family", "asymmetric")
+    law = dashpot(key, zeta=zeta, release="gap", **about)
+    return replace(law, unloading=spring, oracle=lambda zeta: approach_restitution(zeta))
 
 
 JANKOWSKI_2006 = approach_dashpot(

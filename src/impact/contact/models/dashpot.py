@@ -45,6 +45,7 @@ def dashpot(key: str, *, zeta: Formula, release: Literal["gap", "force"], **abou
     >>> print(law.force(elastic=1.0, x=1.0, v=0.5, n=1.0, c=2.0))
     2.0
     """
+    about.setdefault("family", "dashpot")
     return ForceModel(
         key,
         **about,
@@ -59,7 +60,6 @@ def dashpot(key: str, *, zeta: Formula, release: Literal["gap", "force"], **abou
         oracle=DELIVERED_RESTITUTION[release],
         # with n = 3/2 the dashpot is proportional to the fourth root of the indentation
         coordinate_power=2 if about.get("exponent") == 1.0 else 4,
-        family="dashpot",
     )
 
 
@@ -151,10 +151,8 @@ ANAGNOSTOPOULOS_1988_NO_TENSION = with_release(
 
 TSUJI_REFERENCE = (
     "Tsuji Y, Tanaka T, Ishida T (1992) Lagrangian numerical simulation of plug flow of cohesionless particles in "
-    "a "
-    "horizontal pipe. Powder Technol. 71, 239; Antypov D, Elliott JA (2011) On an analytical solution for the "
-    "damped "
-    "Hertzian spring. EPL 94, 50004"
+    "a horizontal pipe. Powder Technol. 71, 239; Antypov D, Elliott JA (2011) On an analytical solution for the "
+    "damped Hertzian spring. EPL 94, 50004"
 )
 
 TSUJI_1992 = dashpot(

@@ -14,9 +14,10 @@ from .cited_sources import IMPACT_MATERIAL
 from .elastoplastic import E_OF_K
 
 
-def softer_poisson_ratio(nu1: Array, nu2: Array, Y1: Array, Y2: Array) -> Array:
+def softer_poisson_ratio(nu1: Array, nu2: Array, yield_strength1: Array, yield_strength2: Array) -> Array:
     """Poisson's ratio of the ball that yields; of two equally strong balls that of the one that yields first."""
-    return np.where(Y1 < Y2, nu1, np.where(Y1 > Y2, nu2, np.minimum(nu1, nu2)))
+    of_equal_strength = np.where(yield_strength1 > yield_strength2, nu2, np.minimum(nu1, nu2))
+    return np.where(yield_strength1 < yield_strength2, nu1, of_equal_strength)
 
 
 JACKSON_GREEN_2010 = ForceModel(
@@ -26,22 +27,18 @@ JACKSON_GREEN_2010 = ForceModel(
     equation="F = F_c w^(3/2) to w = 1.9, then F_c[exp(−w^(5/12)/4) w^(3/2) + (4H/(C Y))(1 − exp(−w^(5/9)/25)) "
     "w];  back F = Fₘ((δ − δₚ)/(δₘ − δₚ))^(3/2),  δₚ = 1.02 δₘ(1 − ((wₘ + 5.9)/6.9)^−0.54);  w = δ/δ_c",
     reference="Jackson RL, Green I (2005) A finite element study of elasto-plastic hemispherical contact against "
-    "a rigid "
-    "flat. J. Tribol. 127, 343, the loading; Jackson RL, Chusoipin I, Green I (2005), the residual; Jackson RL, "
-    "Green I, Marghitu DB (2010) Nonlinear Dyn. 60, 217",
+    "a rigid flat. J. Tribol. 127, 343, the loading; Jackson RL, Chusoipin I, Green I (2005), the residual; "
+    "Jackson RL, Green I, Marghitu DB (2010) Nonlinear Dyn. 60, 217",
     evidence=Evidence(
         "seen",
         "tmd-lab/microslip-rough-contact, SPHERE_PLASTIC_PRE2.m and test_plastic_contact_unload.m @21706045 "
         "(2022)",
         note="the year of Jackson, Chusoipin and Green was not seen; no loss below w = 1.9, where the fit of e in "
-        "the paper has one from w = 1 on: this is up to 0.04 "
-        "above that fit there, and within 0.009 of it beyond",
+        "the paper has one from w = 1 on: this is up to 0.04 above that fit there, and within 0.009 of it beyond",
     ),
     coefficients={
         "E": E_OF_K,
-        "nu": lambda nu1, nu2, yield_strength1, yield_strength2: softer_poisson_ratio(
-            nu1, nu2, yield_strength1, yield_strength2
-        ),
+        "nu": softer_poisson_ratio,
         "C": lambda nu: 1.295 * np.exp(0.736 * nu),
         "dc": lambda E, R_eff, Y_min, C: np.pi * C * Y_min / (2 * E) * (np.pi * C * Y_min / (2 * E)) * R_eff,
         "Fc": lambda K, dc: K * power(dc, 1.5),
@@ -90,9 +87,7 @@ KOGUT_ETSION_2005 = ForceModel(
     ),
     coefficients={
         "E": E_OF_K,
-        "nu": lambda nu1, nu2, yield_strength1, yield_strength2: softer_poisson_ratio(
-            nu1, nu2, yield_strength1, yield_strength2
-        ),
+        "nu": softer_poisson_ratio,
         # the hardness is 2.8 Y
         "dc": lambda E, R_eff, Y_min, nu: np.square(np.pi * (0.454 + 0.41 * nu) * 2.8 * Y_min / (2 * E)) * R_eff,
         "Fc": lambda K, dc: K * power(dc, 1.5),

@@ -26,7 +26,6 @@ from .dashpot import (
     thornton_zeta,
     with_release,
 )
-from .multibody_codes import of_code
 from .viscoelastic import KUWABARA_KONO_AT_SPEED
 
 TANGENT_DASHPOT = "F = K δ^(3/2) + 2 β √(m S) δ̇,  S = (3/2) K δ^(1/2)"
@@ -40,9 +39,7 @@ def in_code(
 ) -> ForceModel:
     """Make a law of the catalogue under the name that a code has for it, with the law's own rule for K."""
     evidence = Evidence("seen", source, note=note)
-    return of_code(
-        same_law(law, key, title=title, year=year, reference=reference, evidence=evidence), law.stiffness
-    )
+    return same_law(law, key, title=title, year=year, reference=reference, evidence=evidence, family="codes")
 
 
 def stiffness_by_speed(E_eff: Array, R_eff: Array, m: Array, vc: Array) -> Array:
@@ -72,20 +69,19 @@ LIGGGHTS_HERTZ_LIMIT = in_code(
     f"{LIGGGHTS}normal_model_hertz.h",
 )
 
-LIGGGHTS_HOOKE = of_code(
-    dashpot(
-        "liggghts-hooke",
-        title="LIGGGHTS hooke (3.0.0 to 3.8.0)",
-        year=2014,
-        equation=f"{LINEAR_DASHPOT},  {ZETA_BY_LOGARITHM}, to δ = 0;  {STIFFNESS_BY_SPEED}",
-        reference=f"{LIGGGHTS_REFERENCE} hooke, without the option viscous",
-        evidence=Evidence("seen", f"{LIGGGHTS}normal_model_hooke.h"),
-        parameters=CHARACTERISTIC_SPEED,
-        zeta=lambda e: gap_damping(e),
-        release="gap",
-        exponent=1.0,
-    ),
+LIGGGHTS_HOOKE = dashpot(
+    "liggghts-hooke",
+    title="LIGGGHTS hooke (3.0.0 to 3.8.0)",
+    year=2014,
+    equation=f"{LINEAR_DASHPOT},  {ZETA_BY_LOGARITHM}, to δ = 0;  {STIFFNESS_BY_SPEED}",
+    reference=f"{LIGGGHTS_REFERENCE} hooke, without the option viscous",
+    evidence=Evidence("seen", f"{LIGGGHTS}normal_model_hooke.h"),
+    parameters=CHARACTERISTIC_SPEED,
+    zeta=lambda e: gap_damping(e),
+    release="gap",
+    exponent=1.0,
     stiffness=stiffness_by_speed,
+    family="codes",
 )
 
 CHRONO_SMC_HOOKE = with_release(
@@ -132,23 +128,22 @@ CHRONO_HERTZ = in_code(
     "the multicore solver does not cut the tension off, as in tsuji-1992",
 )
 
-CHRONO_SMC_PLAINCOULOMB = of_code(
-    dashpot(
-        "chrono-smc-plaincoulomb",
-        title="Chrono SMC, PlainCoulomb (sequential core, 2016 to 2026)",
-        year=2016,
-        equation=f"{HERTZIAN_DASHPOT},  α = −√5 ln e/√(π² + ln² e), to F = 0;  K = (4/3) E* √(1 m)",
-        reference="Project Chrono, ChContactSMC",
-        evidence=Evidence(
-            "seen",
-            CHRONO,
-            note="its stiffness lacks the radius; the multicore solver does not cut the tension off",
-        ),
-        zeta=lambda e: gap_damping(e),
-        release="force",
-        exponent=1.5,
+CHRONO_SMC_PLAINCOULOMB = dashpot(
+    "chrono-smc-plaincoulomb",
+    title="Chrono SMC, PlainCoulomb (sequential core, 2016 to 2026)",
+    year=2016,
+    equation=f"{HERTZIAN_DASHPOT},  α = −√5 ln e/√(π² + ln² e), to F = 0;  K = (4/3) E* √(1 m)",
+    reference="Project Chrono, ChContactSMC",
+    evidence=Evidence(
+        "seen",
+        CHRONO,
+        note="its stiffness lacks the radius; the multicore solver does not cut the tension off",
     ),
+    zeta=lambda e: gap_damping(e),
+    release="force",
+    exponent=1.5,
     stiffness=lambda E_eff: 4 / 3 * E_eff,
+    family="codes",
 )
 
 # ---- YADE
@@ -157,18 +152,17 @@ HERTZ_MINDLIN = "YADE, Law2_ScGeom_MindlinPhys_Mindlin"
 MINDLIN_SOURCE = f"{YADE_2025}, HertzMindlin.cpp"
 CLAMPED_SOURCE = "YADE, pkg/dem/HertzMindlin.cpp, commit 45c86581d (September 2013)"
 
-YADE_EN = of_code(
-    dashpot(
-        "yade-en",
-        title="YADE HertzMindlin en (since 2023.02a)",
-        year=2023,
-        equation=THORNTON_EQUATION.replace("to F = 0", "β = 0 at e = 1, to F = 0"),
-        reference=f"{HERTZ_MINDLIN}, en, by (B6), (B7) and Table 2 of Thornton, Cummins and Cleary (2013)",
-        evidence=Evidence("seen", MINDLIN_SOURCE),
-        zeta=lambda e: np.where(e < 1.0, thornton_zeta(np.minimum(e, np.nextafter(1.0, 0.0))), 0.0),
-        release="force",
-        exponent=1.5,
-    )
+YADE_EN = dashpot(
+    "yade-en",
+    title="YADE HertzMindlin en (since 2023.02a)",
+    year=2023,
+    equation=THORNTON_EQUATION.replace("to F = 0", "β = 0 at e = 1, to F = 0"),
+    reference=f"{HERTZ_MINDLIN}, en, by (B6), (B7) and Table 2 of Thornton, Cummins and Cleary (2013)",
+    evidence=Evidence("seen", MINDLIN_SOURCE),
+    zeta=lambda e: np.where(e < 1.0, thornton_zeta(np.minimum(e, np.nextafter(1.0, 0.0))), 0.0),
+    release="force",
+    exponent=1.5,
+    family="codes",
 )
 YADE_EN_CLAMPED = in_code(
     TSUJI_1992_NO_TENSION,
@@ -195,19 +189,18 @@ YADE_EN_AT_SPEED = in_code(
     MINDLIN_SOURCE,
 )
 
-YADE_BETAN = of_code(
-    dashpot(
-        "yade-betan",
-        title="YADE HertzMindlin betan, by the traditional formula (since September 2013)",
-        year=2013,
-        equation=f"{TANGENT_DASHPOT},  β = −ln e/√(π² + ln² e), to F = 0",
-        reference=f"{HERTZ_MINDLIN}, betan, which YADE leaves to the user, by the formula of a linear spring",
-        evidence=Evidence("seen", MINDLIN_SOURCE),
-        # 2 β √(3/2) is α
-        zeta=lambda e: np.sqrt(1.2) * gap_damping(e),
-        release="force",
-        exponent=1.5,
-    )
+YADE_BETAN = dashpot(
+    "yade-betan",
+    title="YADE HertzMindlin betan, by the traditional formula (since September 2013)",
+    year=2013,
+    equation=f"{TANGENT_DASHPOT},  β = −ln e/√(π² + ln² e), to F = 0",
+    reference=f"{HERTZ_MINDLIN}, betan, which YADE leaves to the user, by the formula of a linear spring",
+    evidence=Evidence("seen", MINDLIN_SOURCE),
+    # 2 β √(3/2) is α
+    zeta=lambda e: np.sqrt(1.2) * gap_damping(e),
+    release="force",
+    exponent=1.5,
+    family="codes",
 )
 YADE_BETAN_PULLING = with_release(
     YADE_BETAN,
@@ -217,21 +210,18 @@ YADE_BETAN_PULLING = with_release(
     year=2010,
     evidence=Evidence("seen", f"{CLAMPED_SOURCE}, whose removed lines pull"),
 )
-YADE_BETAN_DIRECT = of_code(
-    dashpot(
-        "yade-betan-direct",
-        title="YADE HertzMindlin betan (since September 2013)",
-        year=2013,
-        equation=f"{TANGENT_DASHPOT}, to F = 0",
-        reference=f"{HERTZ_MINDLIN}, betan",
-        evidence=Evidence("seen", MINDLIN_SOURCE),
-        parameters=(
-            Parameter("betan", "1", "damping ratio β of the tangent stiffness", least=0.0, is_damping=True),
-        ),
-        zeta=lambda betan: np.sqrt(1.2) * betan,
-        release="force",
-        exponent=1.5,
-    )
+YADE_BETAN_DIRECT = dashpot(
+    "yade-betan-direct",
+    title="YADE HertzMindlin betan (since September 2013)",
+    year=2013,
+    equation=f"{TANGENT_DASHPOT}, to F = 0",
+    reference=f"{HERTZ_MINDLIN}, betan",
+    evidence=Evidence("seen", MINDLIN_SOURCE),
+    parameters=(Parameter("betan", "1", "damping ratio β of the tangent stiffness", least=0.0, is_damping=True),),
+    zeta=lambda betan: np.sqrt(1.2) * betan,
+    release="force",
+    exponent=1.5,
+    family="codes",
 )
 
 VISCO_ELASTIC = "YADE, Law2_ScGeom_ViscElPhys_Basic"
@@ -267,18 +257,17 @@ MFIX = "soufiane92/MFiX-21.3.2, model/check_data/check_solids_dem.f and model/de
 MFIX_LSD = in_code(
     ANAGNOSTOPOULOS_1988, "mfix-lsd", "MFiX DEM, LSD (2016 to 21.3.2)", 2016, "MFiX, DES_COLL_MODEL LSD", MFIX
 )
-MFIX_HERTZ = of_code(
-    dashpot(
-        "mfix-hertz",
-        title="MFiX DEM, Hertzian (2014 to 21.3.2)",
-        year=2014,
-        equation=f"{HERTZIAN_DASHPOT},  α = −2 ln e/√(π² + ln² e), to δ = 0",
-        reference="MFiX, DES_COLL_MODEL HERTZIAN, whose α has 2 in the place of √5",
-        evidence=Evidence("seen", MFIX),
-        zeta=lambda e: 2 / np.sqrt(5.0) * gap_damping(e),
-        release="gap",
-        exponent=1.5,
-    )
+MFIX_HERTZ = dashpot(
+    "mfix-hertz",
+    title="MFiX DEM, Hertzian (2014 to 21.3.2)",
+    year=2014,
+    equation=f"{HERTZIAN_DASHPOT},  α = −2 ln e/√(π² + ln² e), to δ = 0",
+    reference="MFiX, DES_COLL_MODEL HERTZIAN, whose α has 2 in the place of √5",
+    evidence=Evidence("seen", MFIX),
+    zeta=lambda e: 2 / np.sqrt(5.0) * gap_damping(e),
+    release="gap",
+    exponent=1.5,
+    family="codes",
 )
 
 # ---- Kratos
@@ -286,46 +275,43 @@ MFIX_HERTZ = of_code(
 # sphere_strategy.py replaces an e below the first by it, and has no damping above the second
 KRATOS_MIN_E, KRATOS_MAX_E = 0.001, 0.999
 
-KRATOS_HERTZ = of_code(
-    dashpot(
-        "kratos-hertz",
-        title="Kratos DEM, Hertz with viscous damping (law files of 2015)",
-        year=2015,
-        equation=THORNTON_EQUATION.replace("to F = 0", "e from 0.001, β = 0 above e = 0.999, to F = 0"),
-        reference="Kratos DEM, DEM_D_Hertz_viscous_Coulomb",
-        evidence=Evidence(
-            "seen",
-            f"{KRATOS}, custom_constitutive/DEM_D_Hertz_viscous_Coulomb_CL.cpp @72b6f58f and "
-            "python_scripts/sphere_strategy.py @4ddf9200",
-            note="when the damping of e was added was not seen; the law file @03f57bf0 has δ², by a slip",
-        ),
-        zeta=lambda e: np.where(e <= KRATOS_MAX_E, thornton_zeta(np.clip(e, KRATOS_MIN_E, KRATOS_MAX_E)), 0.0),
-        release="force",
-        exponent=1.5,
-    )
-)
-KRATOS_LINEAR = of_code(
-    dashpot(
-        "kratos-linear",
-        title="Kratos DEM, linear with viscous damping (law files of 2015)",
-        year=2015,
-        equation=f"{LINEAR_DASHPOT},  e = exp(−2 ζ acos(ζ)/√(1 − ζ²)), e from 0.001, ζ = 0 above e = 0.999, "
-        "to F = 0;  K = 1.432 π 0.31225 E* R*, against a wall without 1.432",
-        reference="Kratos DEM, DEM_D_Linear_viscous_Coulomb",
-        evidence=Evidence(
-            "seen",
-            f"{KRATOS}, custom_constitutive/DEM_D_Linear_viscous_Coulomb_CL.cpp @013f9253 and "
-            "python_scripts/sphere_strategy.py @4ddf9200",
-            note="Kratos finds ζ by bisection to 1e-4, this law exactly; when the damping of e was added was not "
-            "seen",
-        ),
-        zeta=lambda e: np.where(e <= KRATOS_MAX_E, force_damping(np.maximum(e, KRATOS_MIN_E)), 0.0),
-        release="force",
-        exponent=1.0,
+KRATOS_HERTZ = dashpot(
+    "kratos-hertz",
+    title="Kratos DEM, Hertz with viscous damping (law files of 2015)",
+    year=2015,
+    equation=THORNTON_EQUATION.replace("to F = 0", "e from 0.001, β = 0 above e = 0.999, to F = 0"),
+    reference="Kratos DEM, DEM_D_Hertz_viscous_Coulomb",
+    evidence=Evidence(
+        "seen",
+        f"{KRATOS}, custom_constitutive/DEM_D_Hertz_viscous_Coulomb_CL.cpp @72b6f58f and "
+        "python_scripts/sphere_strategy.py @4ddf9200",
+        note="when the damping of e was added was not seen; the law file @03f57bf0 has δ², by a slip",
     ),
+    zeta=lambda e: np.where(e <= KRATOS_MAX_E, thornton_zeta(np.clip(e, KRATOS_MIN_E, KRATOS_MAX_E)), 0.0),
+    release="force",
+    exponent=1.5,
+    family="codes",
+)
+KRATOS_LINEAR = dashpot(
+    "kratos-linear",
+    title="Kratos DEM, linear with viscous damping (law files of 2015)",
+    year=2015,
+    equation=f"{LINEAR_DASHPOT},  e = exp(−2 ζ acos(ζ)/√(1 − ζ²)), e from 0.001, ζ = 0 above e = 0.999, "
+    "to F = 0;  K = 1.432 π 0.31225 E* R*, against a wall without 1.432",
+    reference="Kratos DEM, DEM_D_Linear_viscous_Coulomb",
+    evidence=Evidence(
+        "seen",
+        f"{KRATOS}, custom_constitutive/DEM_D_Linear_viscous_Coulomb_CL.cpp @013f9253 and "
+        "python_scripts/sphere_strategy.py @4ddf9200",
+        note="Kratos finds ζ by bisection to 1e-4, this law exactly; when the damping of e was added was not seen",
+    ),
+    zeta=lambda e: np.where(e <= KRATOS_MAX_E, force_damping(np.maximum(e, KRATOS_MIN_E)), 0.0),
+    release="force",
+    exponent=1.0,
     stiffness=lambda E_eff, R_eff, R1, R2: (
         np.where(np.isinf(R1) | np.isinf(R2), 1.0, 1.432) * np.pi * 0.31225 * E_eff * R_eff
     ),
+    family="codes",
 )
 
 # ---- MercuryDPM and DEMLab
@@ -341,20 +327,19 @@ MERCURYDPM_LINEAR = in_code(
     "its first year was not seen",
 )
 
-DEMLAB_TTI = of_code(
-    dashpot(
-        "demlab-tti",
-        title="DEMLab TTI (2021 to 2024)",
-        year=2021,
-        equation=f"{HERTZIAN_DASHPOT},  α = −2.2664 ln e/√(10.1354 + ln² e), to F = 0",
-        reference="Rangel R, DEMLab, contact law of Tsuji, Tanaka and Ishida with remove_cohesion, its default",
-        evidence=Evidence(
-            "seen",
-            DEMLAB_VISCOELASTIC,
-            note="its first year was not seen",
-        ),
-        zeta=lambda e: 2.2664 / np.sqrt(5.0) / np.sqrt(1.0 + 10.1354 / np.square(np.log(e))),
-        release="force",
-        exponent=1.5,
-    )
+DEMLAB_TTI = dashpot(
+    "demlab-tti",
+    title="DEMLab TTI (2021 to 2024)",
+    year=2021,
+    equation=f"{HERTZIAN_DASHPOT},  α = −2.2664 ln e/√(10.1354 + ln² e), to F = 0",
+    reference="Rangel R, DEMLab, contact law of Tsuji, Tanaka and Ishida with remove_cohesion, its default",
+    evidence=Evidence(
+        "seen",
+        DEMLAB_VISCOELASTIC,
+        note="its first year was not seen",
+    ),
+    zeta=lambda e: 2.2664 / np.sqrt(5.0) / np.sqrt(1.0 + 10.1354 / np.square(np.log(e))),
+    release="force",
+    exponent=1.5,
+    family="codes",
 )

@@ -6,6 +6,7 @@ from typing import Unpack
 
 import numpy as np
 
+from ...array_types import Array
 from ..closed_forms.hysteresis import delivered_restitution, exact_damping_ratio
 from ..evidence import Evidence
 from ..force_expressions import damped
@@ -35,6 +36,7 @@ def hysteresis(key: str, *, chi: Formula, **about: Unpack[About]) -> ForceModel:
     >>> law.force(elastic=1.0, v=0.5, v0=1.0, chi=1.0)
     1.5
     """
+    about.setdefault("family", "hysteresis")
     return ForceModel(
         key,
         **about,
@@ -42,8 +44,12 @@ def hysteresis(key: str, *, chi: Formula, **about: Unpack[About]) -> ForceModel:
         coefficients={"chi": chi},
         oracle=delivered_restitution,
         velocity_coordinate="log",
-        family="hysteresis",
     )
+
+
+def flores_chi(e: Array) -> Array:
+    """χ [-] of Flores and others (2011), 8(1 − e)/(5e)."""
+    return np.asarray(np.divide(8.0 * (1.0 - e), 5.0 * e))
 
 
 HUNT_CROSSLEY_1975 = hysteresis(
@@ -77,8 +83,7 @@ LEE_WANG_1983 = hysteresis(
     year=1983,
     equation="F = K δⁿ (1 + χ δ̇/v₀),  χ = 3(1 − e)/4  (21)",
     reference="Lee TW, Wang AC (1983) On the dynamics of intermittent-motion mechanisms, part 1: Dynamic model "
-    "and "
-    "response. J. Mech. Transm. Autom. Des. 105, 534",
+    "and response. J. Mech. Transm. Autom. Des. 105, 534",
     evidence=Evidence("seen", f"{GHARIB_HURMUZLU}, equation (21); {DYS}", note="the paper's title was not seen"),
     chi=lambda e: 0.75 * (1 - e),
 )
@@ -160,7 +165,7 @@ FLORES_2011 = hysteresis(
     evidence=Evidence(
         "seen", f"{DYS}; {MBDYN}", doi="ModiaSim/Modia3D.jl, docs/src/internal/ContactForceLaw.md @a418027"
     ),
-    chi=lambda e: np.divide(8 * (1 - e), 5 * e),
+    chi=flores_chi,
 )
 
 GHARIB_HURMUZLU_2012 = hysteresis(
@@ -188,9 +193,7 @@ HU_GUO_2015 = hysteresis(
     evidence=Evidence(
         "disputed",
         "3(1 − e)/(2e) in a Python port of Multi_Con_250812.m, a wheel-rail code whose repository is not known, "
-        "and by "
-        "the slope at e = 1; "
-        f"3(1 − e)/(4e) in {DYS}",
+        f"and by the slope at e = 1; 3(1 − e)/(4e) in {DYS}",
         doi="the address of a page whose title was not shown",
         note="the formula of the paper was not seen",
     ),

@@ -16,6 +16,7 @@ import numpy as np
 from ...array_types import Array
 from ..evidence import Evidence
 from ..model import ForceModel, Parameter
+from .aliases import same_law
 from .dashpot import (
     ANAGNOSTOPOULOS_1988,
     ANAGNOSTOPOULOS_1988_NO_TENSION,
@@ -57,7 +58,7 @@ def renamed(pulling: ForceModel, limited: ForceModel) -> MakeLaw:
     laws = {"gap": pulling, "force": limited}
 
     def make(key: str, *, release: str, **about: Any) -> ForceModel:
-        return replace(laws[release], key=key, doi="", domain={}, same_as=laws[release].key, **about)
+        return same_law(laws[release], key, **about)
 
     return make
 
@@ -82,7 +83,7 @@ def with_and_without_limit(
         ("gap", "", option, "δ = 0", since, year),
         ("force", "-limit", f"{option}, limit_damping", "F = 0", limited, max(year, LIMIT_YEAR)),
     ):
-        law = make(
+        yield make(
             key + suffix,
             release=release,
             title=f"LAMMPS {keywords} ({releases})",
@@ -90,14 +91,14 @@ def with_and_without_limit(
             equation=f"{equation}, to {end}",
             reference="LAMMPS, pair style granular",
             evidence=Evidence("seen", source, note=note),
+            family="codes",
         )
-        yield replace(law, family="codes")
 
 
 def mass_velocity_hertz(key: str, *, release: str, **about: Any) -> ForceModel:
     """Make the law F = K δ^(3/2) + γ m δ̇; with release "force" it is that of Lee and Herrmann."""
     if release == "force":
-        return replace(LEE_HERRMANN_1993, key=key, doi="", same_as=LEE_HERRMANN_1993.key, **about)
+        return same_law(LEE_HERRMANN_1993, key, **about)
     return drag(
         key,
         c=lambda gamma, m: gamma * m,

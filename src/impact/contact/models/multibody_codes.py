@@ -12,7 +12,6 @@ import numpy as np
 from ...array_types import Array
 from ..closed_forms.dashpot import force_restitution, limited_restitution
 from ..evidence import Evidence
-from ..formula_calls import Formula
 from ..model import ForceModel, Parameter
 from ..powers import power, powers
 from .aliases import same_law
@@ -25,15 +24,11 @@ from .hysteresis import (
     GONTHIER_2004,
     HUNT_CROSSLEY_1975,
     LANKARANI_NIKRAVESH_1990,
+    flores_chi,
     hysteresis,
 )
 
 LINEAR_DAMPING = "F = K δⁿ (1 + χ δ̇/v₀)"
-
-
-def of_code(law: ForceModel, stiffness: Formula | None = None) -> ForceModel:
-    """Make a law in the family "codes", with the code's rule for K."""
-    return replace(law, family="codes", stiffness=stiffness)
 
 
 def springs_in_series(a: Array, b: Array) -> Array:
@@ -45,11 +40,6 @@ def smooth_step(t: Array) -> Array:
     """Compute the cubic from 0 at t = 0 to 1 at t = 1, with zero slope at both; 1 beyond."""
     t = np.minimum(t, 1.0)
     return t * t * (3.0 - 2.0 * t)
-
-
-def flores_chi(e: Array) -> Array:
-    """χ [-] of Flores and others (2011), 8(1 − e)/(5e)."""
-    return np.asarray(np.divide(8.0 * (1.0 - e), 5.0 * e))
 
 
 ADAMS_IMPACT = ForceModel(
@@ -81,17 +71,16 @@ RECURDYN_EVIDENCE = Evidence(
     note="its first year was not seen",
 )
 
-RECURDYN = of_code(
-    hysteresis(
-        "recurdyn",
-        title="RecurDyn",
-        year=2000,
-        equation=f"{LINEAR_DAMPING},  χ = c v₀/K",
-        reference="FunctionBay RecurDyn, standard contact, with the damping exponents m₂ = 1 and m₃ = m₁",
-        evidence=RECURDYN_EVIDENCE,
-        parameters=(Parameter("c", "N s/m^(n+1)", "damping coefficient", least=0.0, is_damping=True),),
-        chi=lambda c, v0, K: c * v0 / K,
-    )
+RECURDYN = hysteresis(
+    "recurdyn",
+    title="RecurDyn",
+    year=2000,
+    equation=f"{LINEAR_DAMPING},  χ = c v₀/K",
+    reference="FunctionBay RecurDyn, standard contact, with the damping exponents m₂ = 1 and m₃ = m₁",
+    evidence=RECURDYN_EVIDENCE,
+    parameters=(Parameter("c", "N s/m^(n+1)", "damping coefficient", least=0.0, is_damping=True),),
+    chi=lambda c, v0, K: c * v0 / K,
+    family="codes",
 )
 
 RECURDYN_EXPONENTS = ForceModel(
@@ -135,50 +124,49 @@ def simbody_dissipation(c1: Array, c2: Array, E1: Array, E2: Array, nu1: Array, 
 SIMBODY_REFERENCE = (
     "Sherman MA, Seth A, Delp SL (2011) Simbody: multibody dynamics for biomedical research. Procedia IUTAM 2, 241"
 )
+SIMBODY_DOI = "10.1016/j.piutam.2011.04.023"
 SIMBODY_EVIDENCE = Evidence("seen", SIMBODY, doi="simbody/simbody, CONTRIBUTING.md @f312d0dd (2026)")
 
-SIMBODY_HUNT_CROSSLEY = of_code(
-    hysteresis(
-        "simbody-hunt-crossley",
-        title="Simbody and OpenSim HuntCrossleyForce (2010 to 2026)",
-        year=2010,
-        equation="F = K δ^(3/2) (1 + χ δ̇/v₀),  χ = (3/2) c v₀",
-        reference=SIMBODY_REFERENCE,
-        doi="10.1016/j.piutam.2011.04.023",
-        evidence=SIMBODY_EVIDENCE,
-        parameters=(
-            Parameter(
-                "c",
-                "s/m",
-                "dissipation of the pair, the slope of e over a small speed",
-                least=0.0,
-                is_damping=True,
-            ),
+SIMBODY_HUNT_CROSSLEY = hysteresis(
+    "simbody-hunt-crossley",
+    title="Simbody and OpenSim HuntCrossleyForce (2010 to 2026)",
+    year=2010,
+    equation="F = K δ^(3/2) (1 + χ δ̇/v₀),  χ = (3/2) c v₀",
+    reference=SIMBODY_REFERENCE,
+    doi=SIMBODY_DOI,
+    evidence=SIMBODY_EVIDENCE,
+    parameters=(
+        Parameter(
+            "c",
+            "s/m",
+            "dissipation of the pair, the slope of e over a small speed",
+            least=0.0,
+            is_damping=True,
         ),
-        exponent=1.5,
-        chi=lambda c, v0: 1.5 * c * v0,
     ),
+    exponent=1.5,
+    chi=lambda c, v0: 1.5 * c * v0,
     stiffness=simbody_stiffness,
+    family="codes",
 )
 
-SIMBODY_HUNT_CROSSLEY_MIXED = of_code(
-    hysteresis(
-        "simbody-hunt-crossley-mixed",
-        title="Simbody and OpenSim HuntCrossleyForce, two materials (2010 to 2026)",
-        year=2010,
-        equation="F = K δ^(3/2) (1 + χ δ̇/v₀),  χ = (3/2) c v₀,  c = (c₁ k₂ + c₂ k₁)/(k₁ + k₂),  "
-        "k = (E/(1 − ν²))^(2/3)",
-        reference=SIMBODY_REFERENCE,
-        doi="10.1016/j.piutam.2011.04.023",
-        evidence=SIMBODY_EVIDENCE,
-        parameters=(
-            Parameter("c1", "s/m", "dissipation of the material of ball 1", least=0.0, is_damping=True),
-            Parameter("c2", "s/m", "dissipation of the material of ball 2", least=0.0),
-        ),
-        exponent=1.5,
-        chi=lambda c1, c2, E1, E2, nu1, nu2, v0: 1.5 * simbody_dissipation(c1, c2, E1, E2, nu1, nu2) * v0,
+SIMBODY_HUNT_CROSSLEY_MIXED = hysteresis(
+    "simbody-hunt-crossley-mixed",
+    title="Simbody and OpenSim HuntCrossleyForce, two materials (2010 to 2026)",
+    year=2010,
+    equation="F = K δ^(3/2) (1 + χ δ̇/v₀),  χ = (3/2) c v₀,  c = (c₁ k₂ + c₂ k₁)/(k₁ + k₂),  "
+    "k = (E/(1 − ν²))^(2/3)",
+    reference=SIMBODY_REFERENCE,
+    doi=SIMBODY_DOI,
+    evidence=SIMBODY_EVIDENCE,
+    parameters=(
+        Parameter("c1", "s/m", "dissipation of the material of ball 1", least=0.0, is_damping=True),
+        Parameter("c2", "s/m", "dissipation of the material of ball 2", least=0.0),
     ),
+    exponent=1.5,
+    chi=lambda c1, c2, E1, E2, nu1, nu2, v0: 1.5 * simbody_dissipation(c1, c2, E1, E2, nu1, nu2) * v0,
     stiffness=simbody_stiffness,
+    family="codes",
 )
 
 DRAKE_REFERENCE = (
@@ -195,45 +183,39 @@ DRAKE_EVIDENCE = Evidence(
     "law",
 )
 
-DRAKE_POINT_CONTACT = of_code(
-    hysteresis(
-        "drake-point-contact",
-        title="Drake, point contact (defaults since v1.36.0, December 2024)",
-        year=2019,
-        equation="F = K δ (1 + χ δ̇/v₀),  χ = d v₀",
-        reference=DRAKE_REFERENCE,
-        evidence=DRAKE_EVIDENCE,
-        parameters=(
-            Parameter(
-                "d", "s/m", "Hunt-Crossley dissipation of the pair", default=50.0, least=0.0, is_damping=True
-            ),
-            *POINT_STIFFNESS,
-        ),
-        exponent=1.0,
-        chi=lambda d, v0: d * v0,
+DRAKE_POINT_CONTACT = hysteresis(
+    "drake-point-contact",
+    title="Drake, point contact (defaults since v1.36.0, December 2024)",
+    year=2019,
+    equation="F = K δ (1 + χ δ̇/v₀),  χ = d v₀",
+    reference=DRAKE_REFERENCE,
+    evidence=DRAKE_EVIDENCE,
+    parameters=(
+        Parameter("d", "s/m", "Hunt-Crossley dissipation of the pair", default=50.0, least=0.0, is_damping=True),
+        *POINT_STIFFNESS,
     ),
+    exponent=1.0,
+    chi=lambda d, v0: d * v0,
     stiffness=lambda k1, k2: springs_in_series(k1, k2),
+    family="codes",
 )
 
-DRAKE_POINT_CONTACT_MIXED = of_code(
-    hysteresis(
-        "drake-point-contact-mixed",
-        title="Drake, point contact of two materials (defaults since v1.36.0, December 2024)",
-        year=2019,
-        equation="F = K δ (1 + χ δ̇/v₀),  χ = d v₀,  d = (k₂ d₁ + k₁ d₂)/(k₁ + k₂)",
-        reference=DRAKE_REFERENCE,
-        evidence=DRAKE_EVIDENCE,
-        parameters=(
-            Parameter(
-                "d1", "s/m", "Hunt-Crossley dissipation d₁ of ball 1", default=50.0, least=0.0, is_damping=True
-            ),
-            Parameter("d2", "s/m", "Hunt-Crossley dissipation d₂ of ball 2", default=50.0, least=0.0),
-            *POINT_STIFFNESS,
-        ),
-        exponent=1.0,
-        chi=lambda d1, d2, k1, k2, v0: (k2 * d1 + k1 * d2) / (k1 + k2) * v0,
+DRAKE_POINT_CONTACT_MIXED = hysteresis(
+    "drake-point-contact-mixed",
+    title="Drake, point contact of two materials (defaults since v1.36.0, December 2024)",
+    year=2019,
+    equation="F = K δ (1 + χ δ̇/v₀),  χ = d v₀,  d = (k₂ d₁ + k₁ d₂)/(k₁ + k₂)",
+    reference=DRAKE_REFERENCE,
+    evidence=DRAKE_EVIDENCE,
+    parameters=(
+        Parameter("d1", "s/m", "Hunt-Crossley dissipation d₁ of ball 1", default=50.0, least=0.0, is_damping=True),
+        Parameter("d2", "s/m", "Hunt-Crossley dissipation d₂ of ball 2", default=50.0, least=0.0),
+        *POINT_STIFFNESS,
     ),
+    exponent=1.0,
+    chi=lambda d1, d2, k1, k2, v0: (k2 * d1 + k1 * d2) / (k1 + k2) * v0,
     stiffness=lambda k1, k2: springs_in_series(k1, k2),
+    family="codes",
 )
 
 MODELICA_ELASTOGAP = ForceModel(
@@ -255,31 +237,26 @@ MODELICA_ELASTOGAP = ForceModel(
     family="codes",
 )
 
-MAPLESIM_LINEAR = of_code(
-    same_law(
-        KELVIN_VOIGT_NO_TENSION,
-        "maplesim-linear",
-        title="MapleSim, linear",
-        year=2015,
-        reference="MapleSim, contact of the linear spring and damper",
-        evidence=Evidence("seen", MAPLESIM_HELP, note="its first year was not seen"),
-    )
+MAPLESIM_LINEAR = same_law(
+    KELVIN_VOIGT_NO_TENSION,
+    "maplesim-linear",
+    title="MapleSim, linear",
+    year=2015,
+    reference="MapleSim, contact of the linear spring and damper",
+    evidence=Evidence("seen", MAPLESIM_HELP, note="its first year was not seen"),
+    family="codes",
 )
 
-MAPLESIM_LIMITED = ForceModel(
+MAPLESIM_LIMITED = replace(
+    MODELICA_ELASTOGAP,
     key="maplesim-linear-limited",
     title="MapleSim, linear with limited damper",
     year=2015,
     equation="F = max(0, K δ + min(d δ̇, K δ))",
     reference="MapleSim, contact of the linear spring with a limited damper, its default",
     evidence=Evidence("seen", MAPLESIM_HELP, note="its first year was not seen"),
-    parameters=(Parameter("d", "N s/m", "damping constant", least=0.0, is_damping=True),),
-    force=lambda elastic, v, d: elastic + np.minimum(d * v, elastic),
-    breakpoints=(lambda elastic, v, d: np.where(v > 0, elastic - d * v, np.nan),),
     oracle=lambda d, m, K: limited_restitution(d / (2 * np.sqrt(m * K))),
-    release="force",
     exponent=1.0,
-    family="codes",
 )
 
 MODIA3D_REFERENCE = (
@@ -289,46 +266,44 @@ MODIA3D_REFERENCE = (
 MODIA3D_DOI = "10.1145/3365984.3365986"
 SMALL_SPEED = Parameter("vs", "m/s", "speed v_s up to which e is reduced", default=0.01, least=1e-9)
 
-MODIA3D_PRESENT = of_code(
-    hysteresis(
-        "modia3d",
-        title="Modia3D (v0.6.0 to v0.12.3, since February 2022)",
-        year=2022,
-        equation="F = K δ^(3/2) (1 + χ δ̇/v₀),  χ = min(d v₀, 8(1 − ε)/(5ε)),  ε = e where v₀ > v_s, else 0",
-        reference=MODIA3D_REFERENCE,
-        doi=MODIA3D_DOI,
-        evidence=Evidence(
-            "seen",
-            f"{MODIA3D} @a418027 (v0.12.3, 2026)",
-            doi="ModiaSim/Modia3D.jl, docs/src/internal/ContactForceLaw.md @a418027",
-        ),
-        parameters=(SMALL_SPEED, Parameter("d", "s/m", "largest damping", default=2000.0, least=0.0)),
-        exponent=1.5,
-        chi=lambda e, v0, vs, d: np.minimum(d * v0, flores_chi(np.where(v0 > vs, e, 0.0))),
-    )
+MODIA3D_PRESENT = hysteresis(
+    "modia3d",
+    title="Modia3D (v0.6.0 to v0.12.3, since February 2022)",
+    year=2022,
+    equation="F = K δ^(3/2) (1 + χ δ̇/v₀),  χ = min(d v₀, 8(1 − ε)/(5ε)),  ε = e where v₀ > v_s, else 0",
+    reference=MODIA3D_REFERENCE,
+    doi=MODIA3D_DOI,
+    evidence=Evidence(
+        "seen",
+        f"{MODIA3D} @a418027 (v0.12.3, 2026)",
+        doi="ModiaSim/Modia3D.jl, docs/src/internal/ContactForceLaw.md @a418027",
+    ),
+    parameters=(SMALL_SPEED, Parameter("d", "s/m", "largest damping", default=2000.0, least=0.0)),
+    exponent=1.5,
+    chi=lambda e, v0, vs, d: np.minimum(d * v0, flores_chi(np.where(v0 > vs, e, 0.0))),
+    family="codes",
 )
 
-MODIA3D_EXPONENTIAL = of_code(
-    hysteresis(
-        "modia3d-exponential",
-        title="Modia3D (v0.4.0 to v0.5.2, 2019 to 2021)",
-        year=2019,
-        equation="F = K δ^(3/2) (1 + χ δ̇/v₀),  χ = min(d v₀, 8(1 − ε)/(5ε) v₀/r),  ε = e + (0.01 − e) "
-        "0.01^(v₀/v_s),  r = v₀ from v_s on, below it v_s/3 + (v₀²/v_s)(1 − v₀/(3 v_s))",
-        reference=MODIA3D_REFERENCE,
-        doi=MODIA3D_DOI,
-        evidence=Evidence(
-            "seen",
-            f"{MODIA3D} at v0.4.0 (2019) and v0.5.2 (2021)",
-            doi="ModiaSim/Modia3D.jl, docs/src/internal/ContactForceLaw.md @a418027",
-        ),
-        parameters=(SMALL_SPEED, Parameter("d", "s/m", "largest damping", default=1000.0, least=0.0)),
-        exponent=1.5,
-        chi=lambda e, v0, vs, d: np.minimum(
-            d * v0,
-            flores_chi(e + (0.01 - e) * np.exp(np.log(0.01) * v0 / vs)) * v0 / modia3d_regularized_speed(v0, vs),
-        ),
-    )
+MODIA3D_EXPONENTIAL = hysteresis(
+    "modia3d-exponential",
+    title="Modia3D (v0.4.0 to v0.5.2, 2019 to 2021)",
+    year=2019,
+    equation="F = K δ^(3/2) (1 + χ δ̇/v₀),  χ = min(d v₀, 8(1 − ε)/(5ε) v₀/r),  ε = e + (0.01 − e) "
+    "0.01^(v₀/v_s),  r = v₀ from v_s on, below it v_s/3 + (v₀²/v_s)(1 − v₀/(3 v_s))",
+    reference=MODIA3D_REFERENCE,
+    doi=MODIA3D_DOI,
+    evidence=Evidence(
+        "seen",
+        f"{MODIA3D} at v0.4.0 (2019) and v0.5.2 (2021)",
+        doi="ModiaSim/Modia3D.jl, docs/src/internal/ContactForceLaw.md @a418027",
+    ),
+    parameters=(SMALL_SPEED, Parameter("d", "s/m", "largest damping", default=1000.0, least=0.0)),
+    exponent=1.5,
+    chi=lambda e, v0, vs, d: np.minimum(
+        d * v0,
+        flores_chi(e + (0.01 - e) * np.exp(np.log(0.01) * v0 / vs)) * v0 / modia3d_regularized_speed(v0, vs),
+    ),
+    family="codes",
 )
 
 
@@ -337,21 +312,20 @@ def modia3d_regularized_speed(v0: Array, vs: Array) -> Array:
     return np.where(v0 >= vs, v0, v0 * (v0 / vs) * (1 - v0 / (3 * vs)) + vs / 3)
 
 
-CHRONO_SMC_FLORES = of_code(
-    hysteresis(
-        "chrono-smc-flores",
-        title="Chrono SMC, Flores (multicore, since 5.0.0, February 2020)",
-        year=2020,
-        equation="F = K δ^(3/2) (1 + χ δ̇/v₀),  χ = 8(1 − ε)/(5ε) v₀/v_c,  ε = max(e, 0.01)",
-        reference="Project Chrono, ChIterativeSolverMulticoreSMC.cpp; v_c is the characteristic speed, in its "
-        "MultiStep mode the larger of it and the speed at contact",
-        evidence=Evidence(
-            "seen", CHRONO_MULTICORE, note="the sequential core has no Flores law and takes that of Hooke instead"
-        ),
-        parameters=(Parameter("vc", "m/s", "characteristic speed v_c", least=1e-9),),
-        exponent=1.5,
-        chi=lambda e, v0, vc: flores_chi(np.maximum(e, 0.01)) * v0 / vc,
-    )
+CHRONO_SMC_FLORES = hysteresis(
+    "chrono-smc-flores",
+    title="Chrono SMC, Flores (multicore, since 5.0.0, February 2020)",
+    year=2020,
+    equation="F = K δ^(3/2) (1 + χ δ̇/v₀),  χ = 8(1 − ε)/(5ε) v₀/v_c,  ε = max(e, 0.01)",
+    reference="Project Chrono, ChIterativeSolverMulticoreSMC.cpp; v_c is the characteristic speed, in its "
+    "MultiStep mode the larger of it and the speed at contact",
+    evidence=Evidence(
+        "seen", CHRONO_MULTICORE, note="the sequential core has no Flores law and takes that of Hooke instead"
+    ),
+    parameters=(Parameter("vc", "m/s", "characteristic speed v_c", least=1e-9),),
+    exponent=1.5,
+    chi=lambda e, v0, vc: flores_chi(np.maximum(e, 0.01)) * v0 / vc,
+    family="codes",
 )
 
 MUJOCO_REFERENCE = (
@@ -436,16 +410,15 @@ SIMSCAPE_CONTACT = ForceModel(
 
 def in_mbdyn(law: ForceModel, key: str, formulation: str) -> ForceModel:
     """Make a law of the catalogue under its name in MBDyn."""
-    return of_code(
-        same_law(
-            law,
-            key,
-            title=f"MBDyn continuous contact, {formulation} (since 1.5.0)",
-            year=2015,
-            reference=f"MBDyn, module-cont-contact, law continuous contact, formulation {formulation}; no damping "
-            "at a speed of contact up to EpsPrimeTol, by default 1e-6",
-            evidence=Evidence("seen", MBDYN, note="its first year was not seen"),
-        )
+    return same_law(
+        law,
+        key,
+        title=f"MBDyn continuous contact, {formulation} (since 1.5.0)",
+        year=2015,
+        reference=f"MBDyn, module-cont-contact, law continuous contact, formulation {formulation}; no damping "
+        "at a speed of contact up to EpsPrimeTol, by default 1e-6",
+        evidence=Evidence("seen", MBDYN, note="its first year was not seen"),
+        family="codes",
     )
 
 
@@ -455,38 +428,34 @@ MBDYN_LANKARANI_NIKRAVESH = in_mbdyn(LANKARANI_NIKRAVESH_1990, "mbdyn-lankarani-
 
 CARVALHO_CHI, GONTHIER_CHI = (law.coefficients["chi"] for law in (CARVALHO_MARTINS_2019, GONTHIER_2004))
 
-EXUDYN_CARVALHO_GONTHIER = of_code(
-    hysteresis(
-        "exudyn-carvalho-gonthier",
-        title="EXUDYN ObjectContactSphereSphere, impactModel 2 (1.13.6)",
-        year=2025,
-        equation="F = K δⁿ (1 + χ δ̇/v₀),  χ = (3/2)(1 − e)(11 − e)/(1 + 9e) for e > 1/3, else (1 − e²)/e",
-        reference="EXUDYN, ObjectContactSphereSphere, which has carvalho-martins-2019 and gonthier-2004; v₀ is at "
-        "least minimumImpactVelocity",
-        evidence=Evidence("seen", EXUDYN, note="its first year was not seen"),
-        # both have 8/3 at e = 1/3
-        chi=lambda e: np.where(e > 1 / 3, np.asarray(CARVALHO_CHI(e)), np.asarray(GONTHIER_CHI(e))),
-    )
+EXUDYN_CARVALHO_GONTHIER = hysteresis(
+    "exudyn-carvalho-gonthier",
+    title="EXUDYN ObjectContactSphereSphere, impactModel 2 (1.13.6)",
+    year=2025,
+    equation="F = K δⁿ (1 + χ δ̇/v₀),  χ = (3/2)(1 − e)(11 − e)/(1 + 9e) for e > 1/3, else (1 − e²)/e",
+    reference="EXUDYN, ObjectContactSphereSphere, which has carvalho-martins-2019 and gonthier-2004; v₀ is at "
+    "least minimumImpactVelocity",
+    evidence=Evidence("seen", EXUDYN, note="its first year was not seen"),
+    # both have 8/3 at e = 1/3
+    chi=lambda e: np.where(e > 1 / 3, np.asarray(CARVALHO_CHI(e)), np.asarray(GONTHIER_CHI(e))),
+    family="codes",
 )
 
-NEWTON_SEMI_IMPLICIT = of_code(
-    approach_dashpot(
-        "newton-semi-implicit",
-        title="Newton SolverSemiImplicit and SolverFeatherstone (1.8.0); warp.sim",
-        year=2025,
-        equation="F = K δ + k_d δ̇, then F = K δ;  e = exp(−ζ acos(ζ)/√(1 − ζ²)),  ζ = k_d/(2 √(K m))",
-        reference="Newton, eval_body_contact; K and k_d are the means of ke and kd of both shapes",
-        evidence=Evidence(
-            "seen",
-            "newton 1.8.0, newton/_src/solvers/semi_implicit/kernels_contact.py",
-            note="its year is that of the licence; of warp.sim a copy of its kernel was seen",
-        ),
-        parameters=(
-            Parameter(
-                "kd", "N s/m", "damping on approach, the mean of kd of both shapes", least=0.0, is_damping=True
-            ),
-        ),
-        zeta=lambda kd, m, K: kd / (2 * np.sqrt(m * K)),
-        exponent=1.0,
-    )
+NEWTON_SEMI_IMPLICIT = approach_dashpot(
+    "newton-semi-implicit",
+    title="Newton SolverSemiImplicit and SolverFeatherstone (1.8.0); warp.sim",
+    year=2025,
+    equation="F = K δ + k_d δ̇, then F = K δ;  e = exp(−ζ acos(ζ)/√(1 − ζ²)),  ζ = k_d/(2 √(K m))",
+    reference="Newton, eval_body_contact; K and k_d are the means of ke and kd of both shapes",
+    evidence=Evidence(
+        "seen",
+        "newton 1.8.0, newton/_src/solvers/semi_implicit/kernels_contact.py",
+        note="its year is that of the licence; of warp.sim a copy of its kernel was seen",
+    ),
+    parameters=(
+        Parameter("kd", "N s/m", "damping on approach, the mean of kd of both shapes", least=0.0, is_damping=True),
+    ),
+    zeta=lambda kd, m, K: kd / (2 * np.sqrt(m * K)),
+    exponent=1.0,
+    family="codes",
 )

@@ -23,6 +23,7 @@ def drag(
     **about: Unpack[About],
 ) -> ForceModel:
     """Make a law of the form F = K δⁿ + c δ^q δ̇."""
+    about.setdefault("family", "rate-dependent")
     return ForceModel(
         key,
         **about,
@@ -31,7 +32,6 @@ def drag(
         release=release,
         velocity_coordinate="force",
         coordinate_power=coordinate_power,
-        family="rate-dependent",
     )
 
 
@@ -63,8 +63,7 @@ LEE_HERRMANN_1993 = drag(
     year=1993,
     equation="F = K δ^(3/2) + γ m δ̇, to F = 0",
     reference="Lee J, Herrmann HJ (1993) Angle of repose and angle of marginal stability: molecular dynamics of "
-    "granular "
-    "particles. J. Phys. A 26, 373",
+    "granular particles. J. Phys. A 26, 373",
     doi="10.1088/0305-4470/26/2/021",
     evidence=Evidence("seen", DEMLAB_VISCOELASTIC, doi=DEMLAB_VISCOELASTIC),
     parameters=(Parameter("gamma", "1/s", "damping γ per effective mass", least=0.0, is_damping=True),),
@@ -79,17 +78,14 @@ KUWABARA_KONO_AT_SPEED = drag(
     title="Kuwabara and Kono, for a restitution at a speed",
     year=2011,
     equation="F = K(δ^(3/2) + (3/2) A δ^(1/2) δ̇), to F = 0,  A = (2/3) w² v_e^(−1/5) (K/m)^(−2/5),  e = P(w), "
-    "the Padé "
-    "form [3/6]",
+    "the Padé form [3/6]",
     reference="Müller P, Pöschel T (2011) Phys. Rev. E 84, 021302; Brilliantov NV, Spahn F, Hertzsch JM, Pöschel "
-    "T "
-    "(1996) Model for collisions in granular gases. Phys. Rev. E 53, 5382",
+    "T (1996) Model for collisions in granular gases. Phys. Rev. E 53, 5382",
     doi="10.1103/PhysRevE.84.021302",
     evidence=Evidence(
         "seen",
         "c61292558/yade4deepin, a copy of YADE 2025.2.0, pkg/dem/HertzMindlin.cpp @f1486c0 (2025); the form P "
-        "also in "
-        "the self tests of MercuryDPM (2023)",
+        "also in the self tests of MercuryDPM (2023)",
         doi="kuwt/MercuryDPM_fork, HertzianBSHPViscoelasticInteraction @e548763b (2023)",
         note="delivers e at the speed v_e to 7e-4",
     ),
