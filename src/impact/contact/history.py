@@ -151,7 +151,10 @@ def integrate_slip(
     values = {name: np.broadcast_to(value, 1) for name, value in values.items()}
     recorded = record_friction(pair, float(impacts.n[0]), values, rtol=rtol, max_steps=max_steps)
     steps = tuple(step for part in recorded for step in part.steps)
-    grid = times if times is not None or not steps else _slip_times(recorded)
+    grid: int | Array | None = times
+    if times is None and steps:
+        numbers, fractions = _fractions(steps)
+        grid = np.maximum.accumulate(Step.each(steps, numbers).at(fractions)[TIME_ROW])
     history = integrate_history(model, impacts, rtol=rtol, max_steps=max_steps, times=grid)
     if history is None:
         return None, None
@@ -162,13 +165,6 @@ def integrate_slip(
     # without slip or friction nothing is integrated
     impulse = np.nan_to_num(result.sliding_impulse).item()
     return history, _coulomb_history(history, oblique, bool(values[LIMIT_POSITIVE][0]), impulse)
-
-
-def _slip_times(recorded: Sequence[RecordedSlip]) -> Array:
-    """Sample the times of joint steps in the contact's own unit."""
-    steps = [step for part in recorded for step in part.steps]
-    numbers, fractions = _fractions(steps)
-    return np.maximum.accumulate(Step.each(steps, numbers).at(fractions)[TIME_ROW])
 
 
 def _slip_history(

@@ -23,8 +23,7 @@ from ..ode.problem import Params
 from .model import ForceModel
 from .motion import MotionLaw
 from .records import CollisionResult
-from .simulate import integrate_collisions
-from .velocity_coordinates import is_strong
+from .simulate import distinct_problems, integrate_collisions
 
 DEGREE = 32
 NODES = chebyshev.chebpts2(DEGREE + 1)
@@ -353,15 +352,11 @@ class InterpolatedCollisions:
         count = table.shape[1]
         never = np.zeros(count, bool) if never is None else never
         law_values = dict(zip(MotionLaw.of(self.model, n, False).names, table, strict=True))
-        strong = is_strong(self.model, law_values, count)
         collisions = CollisionResult.blank(count)
-        for is_strongly_damped in (False, True):
-            part = strong == is_strongly_damped
-            if part.any():
-                law = MotionLaw.of(self.model, n, is_strongly_damped)
-                never_separates = never[part]
-                integrated = integrate_collisions(
-                    law, tuple(table[:, part]), never_separates.size, never_separates=never_separates, **settings
-                )
-                collisions.put(part, integrated)
+        for problems in distinct_problems(self.model, n, law_values, np.ones(count, bool), collapse=False):
+            never_separates = never[problems.rows]
+            integrated = integrate_collisions(
+                problems.law, problems.params, never_separates.size, never_separates=never_separates, **settings
+            )
+            collisions.put(problems.rows, integrated)
         return collisions

@@ -255,10 +255,9 @@ class ForceModel:
         are_parameters = isinstance(self.parameters, tuple) and all(
             isinstance(parameter, Parameter) for parameter in self.parameters
         )
-        is_evidence = isinstance(self.evidence, Evidence)
         allowed = {
             "evidence": (
-                is_evidence,
+                isinstance(self.evidence, Evidence),
                 'an impact.Evidence, such as Evidence("derived", "our report, equation (3)")',
             ),
             "release": (self.release in ("gap", "force"), '"gap" or "force"'),

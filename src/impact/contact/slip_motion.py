@@ -194,13 +194,9 @@ class Track:
     @classmethod
     def of(cls, n: int) -> Track:
         """Begin n trajectories."""
-        arrays: dict[str, Any] = {name: np.zeros(n) for name in cls.__annotations__}
-        flags = {
-            "modes": np.zeros(n, np.int8),
-            "changes": np.zeros(n, np.int32),
-        }
-        flags |= {"touches": np.zeros(n, bool), "is_slow": np.zeros(n, bool)}
-        return cls(**{**arrays, **flags, "sign": np.ones(n), "v": np.ones(n), "slip": np.ones(n)})
+        dtypes: dict[str, Any] = {"touches": bool, "is_slow": bool, "modes": np.int8, "changes": np.int32}
+        arrays: dict[str, Any] = {name: np.zeros(n, dtypes.get(name, float)) for name in cls.__annotations__}
+        return cls(**{**arrays, "sign": np.ones(n), "v": np.ones(n), "slip": np.ones(n)})
 
     def add_impulse(self, index: NDArray[np.intp], columns: Columns, v: Array, slip: Array) -> None:
         """Complete the impulses, and the work against the limit, up to velocities v and Gamma.
@@ -245,7 +241,8 @@ class Track:
 class Local(NamedTuple):
     """The state of friction at a point of a trajectory, over G0; rates are those in smooth time.
 
-    `spring_force` is phi_e, `trial` the force that the limit caps, `drag` is c' x^q Gamma.
+    `spring_force` is phi_e, `trial` the force that the limit caps, `drag` is c' x^q Gamma, and `capped_drag` its
+    part that the limit caps together with the spring.
     """
 
     N: Array
@@ -254,6 +251,7 @@ class Local(NamedTuple):
     weight: Array
     spring_force: Array
     drag: Array
+    capped_drag: Array
     trial: Array
 
 
@@ -408,7 +406,7 @@ class SlipPhase:
         if form.has_dashpot and form.is_total:
             spring_force = spring_force - np.where(columns.mode == 0.0, 0.0, capped_drag)
         trial = drag if form.kind == "dashpot" else spring_force + capped_drag
-        return Local(N, columns.share * d_force, d_force, k[TIME_ROW], spring_force, drag, trial)
+        return Local(N, columns.share * d_force, d_force, k[TIME_ROW], spring_force, drag, capped_drag, trial)
 
     def _rate_of_force(self, y: Array, k: Array, params: Params) -> Array:
         """Compute the rate of the normal force by a difference quotient."""
@@ -546,8 +544,7 @@ class SlipPhase:
         # a held force that goes through zero is at the limit of both slip and stick from there
         new = np.where(turned & (np.abs(old) == 2.0) & (other.share != 0.0), 0.0, new)
         new = self._held_mode(~turned & (old != 0.0), np.abs(old) == 2.0, np.sign(old), new, y, params)
-        capped_drag = local.drag if self.form.is_total else NO_FORCE
-        spring_force = np.where(~turned & (old == 0.0), direction * local.N - capped_drag, spring_force)
+        spring_force = np.where(~turned & (old == 0.0), direction * local.N - local.capped_drag, spring_force)
         return self._enter(index, old, new, sign, local.spring_force, spring_force, y, params)
 
     def _without_force(self, columns: Columns) -> Mask:
@@ -587,9 +584,7 @@ class SlipPhase:
         z = np.where(columns.root > 0.0, force / scale, 0.0)
         y = y.copy()
         y[SPRING_ROW] = np.where(new == 0.0, z, y[SPRING_ROW])
-        changed = columns.changed(new, sign)
-        end = self.first + len(changed)
-        return y, (*params[: self.first], *changed, *params[end:])
+        return y, self._replaced(params, columns.changed(new, sign))
 
     # ---- the modes -2 and 2, in which a spring at its limit determines the slip
 
@@ -670,11 +665,10 @@ class SlipPhase:
         local = self.local(y, k, params)
         if not self.form.has_modes:
             return self._enter(index, old, old, sign, force_before, force_before, y, params)
-        capped_drag = local.drag if self.form.is_total else NO_FORCE
-        trial = local.drag if self.form.kind == "dashpot" else force_before + capped_drag
+        trial = local.drag if self.form.kind == "dashpot" else force_before + local.capped_drag
         at_limit = np.abs(trial) >= local.N * (1.0 - CAP_TOLERANCE) - MARGIN_TOLERANCE / columns.G0
         direction = np.where(trial < 0.0, -1.0, 1.0)
-        spring_force = np.where(at_limit, direction * local.N - capped_drag, force_before)
+        spring_force = np.where(at_limit, direction * local.N - local.capped_drag, force_before)
         rate = self.trial_rate(y, k, columns, local, spring_force, direction * local.N)
         if self.form.kind == "dashpot":
             new = np.where(at_limit, direction, 0.0)
@@ -709,25 +703,23 @@ class SlipPhase:
             * START_S ** (self.law.model.coordinate_power * (kp + 1.0))
             / (kp + 1.0 - self.memory * kp)
         )
-        capped_drag = local.drag if self.form.is_total else NO_FORCE
-        trial = local.drag if form.kind == "dashpot" else spring_force + capped_drag
+        trial = local.drag if form.kind == "dashpot" else spring_force + local.capped_drag
         below = trial < local.N
-        spring_force = np.where(below, 0.0, local.N - capped_drag)
+        spring_force = np.where(below, 0.0, local.N - local.capped_drag)
         if form.kind == "dashpot":
             new = np.where(below, 0.0, 1.0)
         else:
             growth = self._growth_at_contact(y, params)
             if self.form.is_total and kp * self.memory == form.damping_power > 0.0:
                 # the leading powers cancel
-                growth = np.where(capped_drag >= local.N, columns.root**2 * columns.G0 - 1.0, growth)
+                growth = np.where(local.capped_drag >= local.N, columns.root**2 * columns.G0 - 1.0, growth)
             new = np.where(below, 0.0, np.where(growth > 0.0, 1.0, 0.0))
             if self.form.is_total and self.memory == 1.0 and form.damping_power < kp:
                 self.track.is_slow[index] = is_slow = local.drag > local.N
                 new = np.where(is_slow, -1.0, new)
         self.track.touches[index] = (new != 0.0) | ~below
-        near, params = self._enter(index, new, new, sign, np.zeros(n), spring_force, near, params)
-        # at s = 0 itself the share of the spring in the limit is 0/0
-        return near, params
+        # not at s = 0 itself, where the share of the spring in the limit is 0/0
+        return self._enter(index, new, new, sign, np.zeros(n), spring_force, near, params)
 
     def _rows_near_contact(self, y: Array, params: Params, s: float) -> Array:
         """Make rows at an indentation so small that the velocities are those at first contact."""
@@ -743,8 +735,7 @@ class SlipPhase:
         ahead, behind = (self.rates(near[:N_COMPONENTS] + step, params)[-1] for step in (small, -small))
         dN: Array = columns.share * (ahead - behind) / (2.0 * RATE_STEP * RATE_S)
         local = self.local(near, k, params)
-        spring_force = local.N - (local.drag if self.form.is_total else NO_FORCE)
-        return self.trial_rate(near, k, columns, local, spring_force, local.N) - dN
+        return self.trial_rate(near, k, columns, local, local.N - local.capped_drag, local.N) - dN
 
     def finish(self, y: Array, params: Params) -> None:
         """Note the state of friction at the end of a part, from its rows; complete the rows."""

@@ -27,14 +27,6 @@ DAMPING_SERIES = (
 )  # fmt: skip
 
 
-def _polynomial(coefficients: tuple[float, ...], x: Array) -> Array:
-    """The polynomial at x, by Horner's scheme; coefficients from the zeroth power on."""
-    total = np.zeros_like(x)
-    for coefficient in reversed(coefficients):
-        total = total * x + coefficient
-    return total
-
-
 def delivered_restitution(chi: Array | float) -> Array:
     """The restitution that F = K δⁿ (1 + χ δ̇/v₀) delivers, independent of K, n, m and v₀.
 
@@ -55,7 +47,7 @@ def delivered_restitution(chi: Array | float) -> Array:
         slope = np.expm1(-(z + t))
         z = z + (z + slope) / slope
     e = np.where(np.isinf(chi), 0.0, z / inner)
-    e[small] = _polynomial(RESTITUTION_SERIES, chi[small])
+    e[small] = np.polyval(RESTITUTION_SERIES[::-1], chi[small])
     return e
 
 
@@ -79,7 +71,7 @@ def exact_damping_ratio(e: Array | float) -> Array:
         value = inner * chi - 1.0 + (1.0 + chi) * decay
         chi = chi - value / (inner - decay * (inner + (1.0 + inner) * chi))
     chi = np.where(e == 0.0, np.inf, np.where(e > 0.0, chi, np.nan))
-    chi[near_one] = _polynomial(DAMPING_SERIES, 1.0 - e[near_one])
+    chi[near_one] = np.polyval(DAMPING_SERIES[::-1], 1.0 - e[near_one])
     return chi
 
 
@@ -87,7 +79,7 @@ def _work_to_peak(chi: Array) -> Array:
     """xₘ^(n+1)/(n+1), the elastic work up to the peak over m v₀²: (χ − ln(1 + χ))/χ²."""
     small = chi < WORK_SERIES_BELOW_CHI
     safe = np.where(small | np.isinf(chi), 1.0, chi)
-    series = _polynomial((1 / 2, -1 / 3, 1 / 4, -1 / 5, 1 / 6, -1 / 7, 1 / 8, -1 / 9), np.where(small, chi, 0.0))
+    series = np.polyval((-1 / 9, 1 / 8, -1 / 7, 1 / 6, -1 / 5, 1 / 4, -1 / 3, 1 / 2), np.where(small, chi, 0.0))
     integral = np.where(small, series, (safe - np.log1p(safe)) / integer_power(safe, 2))
     return np.where(np.isinf(chi), 0.0, integral)
 

@@ -83,17 +83,14 @@ THORNTON_POLYNOMIAL = (
 THORNTON_EQUATION = (
     "F = K δ^(3/2) + 2 β √(m S) δ̇,  S = (3/2) K δ^(1/2),  β = √(1/(1 − (1 + e)² exp(e p(e))) − 1), to F = 0"
 )
-KELVIN_VOIGT_REFERENCE = (
-    "Cundall PA, Strack ODL (1979) A discrete numerical model for granular assemblies. Géotechnique 29, 47; "
-    "Goldsmith W (1960) Impact. Arnold, London"
-)
 
 KELVIN_VOIGT = dashpot(
     "kelvin-voigt",
     title="Kelvin and Voigt",
     year=1960,
     equation="F = K δ + C δ̇, to δ = 0",
-    reference=KELVIN_VOIGT_REFERENCE,
+    reference="Cundall PA, Strack ODL (1979) A discrete numerical model for granular assemblies. Géotechnique "
+    "29, 47; Goldsmith W (1960) Impact. Arnold, London",
     doi="10.1680/geot.1979.29.1.47",
     evidence=Evidence(
         "seen",
@@ -114,16 +111,12 @@ KELVIN_VOIGT_NO_TENSION = with_release(
     evidence=Evidence("seen", MAPLESIM_HELP, doi=DEMLAB_VISCOELASTIC),
 )
 
-ANAGNOSTOPOULOS_REFERENCE = (
-    "Anagnostopoulos SA (1988) Pounding of buildings in series during earthquakes. EESD 16, 443"
-)
-
 ANAGNOSTOPOULOS_1988 = dashpot(
     "anagnostopoulos-1988",
     title="Anagnostopoulos",
     year=1988,
     equation=f"{LINEAR_DASHPOT},  {ZETA_BY_LOGARITHM}, to δ = 0",
-    reference=ANAGNOSTOPOULOS_REFERENCE,
+    reference="Anagnostopoulos SA (1988) Pounding of buildings in series during earthquakes. EESD 16, 443",
     doi="10.1002/eqe.4290160311",
     evidence=Evidence(
         "seen",
@@ -149,18 +142,14 @@ ANAGNOSTOPOULOS_1988_NO_TENSION = with_release(
     ),
 )
 
-TSUJI_REFERENCE = (
-    "Tsuji Y, Tanaka T, Ishida T (1992) Lagrangian numerical simulation of plug flow of cohesionless particles in "
-    "a horizontal pipe. Powder Technol. 71, 239; Antypov D, Elliott JA (2011) On an analytical solution for the "
-    "damped Hertzian spring. EPL 94, 50004"
-)
-
 TSUJI_1992 = dashpot(
     "tsuji-1992",
     title="Tsuji, Tanaka and Ishida",
     year=1992,
     equation=f"{HERTZIAN_DASHPOT},  α = −√5 ln e/√(π² + ln² e), to δ = 0",
-    reference=TSUJI_REFERENCE,
+    reference="Tsuji Y, Tanaka T, Ishida T (1992) Lagrangian numerical simulation of plug flow of cohesionless "
+    "particles in a horizontal pipe. Powder Technol. 71, 239; Antypov D, Elliott JA (2011) On an analytical "
+    "solution for the damped Hertzian spring. EPL 94, 50004",
     doi="10.1016/0032-5910(92)88030-L",
     evidence=Evidence(
         "seen",
@@ -226,9 +215,7 @@ THORNTON_CUMMINS_CLEARY_2013 = dashpot(
 
 def thornton_zeta(e: Array) -> Array:
     """ζ [-] of Thornton, Cummins and Cleary, whose β is √(5/6) ζ, since α = 2 β √(3/2); e of any shape."""
-    exponent = np.zeros_like(e)
-    for h in reversed(THORNTON_POLYNOMIAL):
-        exponent = e * (h + exponent)
+    exponent = e * np.polyval(THORNTON_POLYNOMIAL[::-1], e)
     beta = np.sqrt(1 / (1 - (1 + e) * (1 + e) * np.exp(exponent)) - 1)
     return np.asarray(2 * np.sqrt(1.5) * beta / np.sqrt(5.0))
 

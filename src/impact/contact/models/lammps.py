@@ -47,10 +47,7 @@ MakeLaw = Callable[..., ForceModel]
 
 def tsuji_polynomial(e: Array) -> Array:
     """Compute the polynomial p(e) by which LAMMPS computes α [-], without the factor √2; e of any shape."""
-    total = np.zeros_like(e)
-    for coefficient in reversed(TSUJI_POLYNOMIAL):
-        total = total * e + coefficient
-    return total
+    return np.polyval(TSUJI_POLYNOMIAL[::-1], e)
 
 
 def renamed(pulling: ForceModel, limited: ForceModel) -> MakeLaw:

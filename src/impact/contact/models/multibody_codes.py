@@ -28,8 +28,6 @@ from .hysteresis import (
     hysteresis,
 )
 
-LINEAR_DAMPING = "F = K δⁿ (1 + χ δ̇/v₀)"
-
 
 def springs_in_series(a: Array, b: Array) -> Array:
     """Compute the stiffness of two springs in series."""
@@ -75,7 +73,7 @@ RECURDYN = hysteresis(
     "recurdyn",
     title="RecurDyn",
     year=2000,
-    equation=f"{LINEAR_DAMPING},  χ = c v₀/K",
+    equation="F = K δⁿ (1 + χ δ̇/v₀),  χ = c v₀/K",
     reference="FunctionBay RecurDyn, standard contact, with the damping exponents m₂ = 1 and m₃ = m₁",
     evidence=RECURDYN_EVIDENCE,
     parameters=(Parameter("c", "N s/m^(n+1)", "damping coefficient", least=0.0, is_damping=True),),
