@@ -144,11 +144,6 @@ class Solution:
     recorded: tuple[Step, ...] = ()
 
     @classmethod
-    def empty(cls, n: int, rows: int = 4) -> Solution:
-        """Arrays for n trajectories, to be filled."""
-        return cls(np.empty((rows, n)), np.empty(n), np.empty(n, np.int32), np.empty(n, np.int8))
-
-    @classmethod
     def blank(cls, n: int, rows: int = 4) -> Solution:
         """n trajectories without values: NaN, no steps, RUNNING."""
         unknown = np.full((rows, n), np.nan)

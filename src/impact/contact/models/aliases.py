@@ -7,7 +7,7 @@ from typing import Any
 
 from ..evidence import Evidence
 from ..model import ForceModel
-from .cited_sources import OPENSEES_HERTZDAMP, RIGID_BODY_DYNAMICS
+from .cited_sources import OPENSEES_HERTZDAMP
 from .dashpot import KELVIN_VOIGT
 from .hysteresis import EXACT_HYSTERESIS, FLORES_2011, HUNT_CROSSLEY_1975, LANKARANI_NIKRAVESH_1990
 
@@ -27,7 +27,7 @@ MARHEFKA_ORIN_1999 = same_law(
     doi="10.1109/3468.798060",
     evidence=Evidence(
         "seen",
-        RIGID_BODY_DYNAMICS,
+        "JuliaRobotics/RigidBodyDynamics.jl, src/contact.jl @d6df4ebe (2024)",
         doi="superAngGao/robot_simulator, docs/restitution_impedance_research_2026-04-07.md @cc6a33f (2026)",
     ),
 )

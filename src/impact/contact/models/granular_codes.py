@@ -10,7 +10,7 @@ from ..evidence import Evidence
 from ..model import ForceModel, Parameter
 from ..powers import power
 from .aliases import same_law
-from .cited_sources import CHRONO, DEMLAB_VISCOELASTIC, KRATOS, LETHE, LIGGGHTS, YADE_2025
+from .cited_sources import CHRONO, DEMLAB_VISCOELASTIC, KRATOS, LIGGGHTS, YADE_2025
 from .dashpot import (
     ANAGNOSTOPOULOS_1988,
     HERTZIAN_DASHPOT,
@@ -105,6 +105,10 @@ LIGGGHTS_HOOKE_LIMIT = in_code(
 
 # ---- Lethe
 
+LETHE = (
+    "chaos-polymtl/lethe, include/dem/particle_particle_contact_force.h @0092035b and effective_properties.h "
+    "@8bf81c3b, doc/source/theory/dem/dem.rst @023e4352"
+)
 LETHE_LAWS = tuple(
     in_code(
         law, key, f"Lethe, {method} (2026)", 2020, "Lethe, particle particle contact force method", LETHE,

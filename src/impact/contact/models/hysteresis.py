@@ -13,7 +13,7 @@ from ..force_expressions import damped
 from ..formula_calls import Formula
 from ..model import About, ForceModel
 from ..powers import power
-from .cited_sources import DYS, GHARIB_HURMUZLU, MBDYN, MBDYN_BIBLIOGRAPHY, OPENSEES_HERTZDAMP, RAILWAY
+from .cited_sources import DYS, GHARIB_HURMUZLU, MBDYN, OPENSEES_HERTZDAMP, RAILWAY
 
 
 def hysteresis(key: str, *, chi: Formula, **about: Unpack[About]) -> ForceModel:
@@ -62,7 +62,11 @@ HUNT_CROSSLEY_1975 = hysteresis(
     domain_source="Zhang and Sharf, quoted by Gharib and Hurmuzlu 2012",
     domain={"e": (0.95, 1.0)},
     doi="10.1115/1.3423596",
-    evidence=Evidence("seen", f"{GHARIB_HURMUZLU}, equation (19)", doi=MBDYN_BIBLIOGRAPHY),
+    evidence=Evidence(
+        "seen",
+        f"{GHARIB_HURMUZLU}, equation (19)",
+        doi="Rahuldrabit/MBDyn, manual/mybib.bib @db248e0 (2025)",
+    ),
     chi=lambda e: 1.5 * (1 - e),
 )
 

@@ -16,7 +16,7 @@ from ..model import ForceModel, Parameter
 from ..powers import power, powers
 from .aliases import same_law
 from .asymmetric import approach_dashpot
-from .cited_sources import CHRONO_MULTICORE, DRAKE, EXUDYN, MAPLESIM_HELP, MBDYN, MODIA3D, MUJOCO, SIMBODY
+from .cited_sources import MAPLESIM_HELP, MBDYN, SIMBODY
 from .dashpot import KELVIN_VOIGT_NO_TENSION
 from .hysteresis import (
     CARVALHO_MARTINS_2019,
@@ -176,7 +176,8 @@ POINT_STIFFNESS = (
 )
 DRAKE_EVIDENCE = Evidence(
     "seen",
-    DRAKE,
+    "RobotLocomotion/drake, multibody/plant/contact_model_doxygen.h and geometry/scene_graph_config.h @be259df724 "
+    "(2026)",
     note="of the discrete approximations TAMSI, SIMILAR and LAGGED in the limit of small steps; SAP has another "
     "law",
 )
@@ -261,6 +262,7 @@ MODIA3D_REFERENCE = (
     "Neumayr A, Otter M (2019) Collision handling with elastic response calculation and zero-crossing functions. "
     "EOOLT '19, 57"
 )
+MODIA3D = "ModiaSim/Modia3D.jl, src/Composition/responseCalculation/elasticCollisionResponse.jl"
 MODIA3D_DOI = "10.1145/3365984.3365986"
 SMALL_SPEED = Parameter("vs", "m/s", "speed v_s up to which e is reduced", default=0.01, least=1e-9)
 
@@ -318,7 +320,9 @@ CHRONO_SMC_FLORES = hysteresis(
     reference="Project Chrono, ChIterativeSolverMulticoreSMC.cpp; v_c is the characteristic speed, in its "
     "MultiStep mode the larger of it and the speed at contact",
     evidence=Evidence(
-        "seen", CHRONO_MULTICORE, note="the sequential core has no Flores law and takes that of Hooke instead"
+        "seen",
+        "projectchrono/chrono, src/chrono_multicore/solver/ChIterativeSolverMulticoreSMC.cpp @7689fbc02d (2026)",
+        note="the sequential core has no Flores law and takes that of Hooke instead",
     ),
     parameters=(Parameter("vc", "m/s", "characteristic speed v_c", least=1e-9),),
     exponent=1.5,
@@ -333,7 +337,7 @@ MUJOCO_REFERENCE = (
 MUJOCO_DOI = "10.1109/ICRA.2014.6907751"
 MUJOCO_EVIDENCE = Evidence(
     "seen",
-    MUJOCO,
+    "google-deepmind/mujoco, doc/modeling.rst and src/engine/engine_core_constraint.c @a7255075b (2026)",
     doi="google-deepmind/mujoco, python/LQR.ipynb @a7255075b",
     note="for a constant impedance, which the default solimp is not, and in the limit of small time steps",
 )
@@ -433,7 +437,11 @@ EXUDYN_CARVALHO_GONTHIER = hysteresis(
     equation="F = K δⁿ (1 + χ δ̇/v₀),  χ = (3/2)(1 − e)(11 − e)/(1 + 9e) for e > 1/3, else (1 − e²)/e",
     reference="EXUDYN, ObjectContactSphereSphere, which has carvalho-martins-2019 and gonthier-2004; v₀ is at "
     "least minimumImpactVelocity",
-    evidence=Evidence("seen", EXUDYN, note="its first year was not seen"),
+    evidence=Evidence(
+        "seen",
+        "jgerstmayr/EXUDYN, main/src/Objects/CObjectContactSphereSphere.cpp @e44aca1b (2026)",
+        note="its first year was not seen",
+    ),
     # both have 8/3 at e = 1/3
     chi=lambda e: np.where(e > 1 / 3, np.asarray(CARVALHO_CHI(e)), np.asarray(GONTHIER_CHI(e))),
     family="codes",

@@ -119,7 +119,7 @@ def integrate_compiled(
         strength = np.ones(n)
     if form.ending == END_AT_GAP and motion.may_be_overdamped(law.model):
         bound = motion.overdamped_speed(strength, law.n, form.drag / form.coordinate_power)
-    solution = Solution.empty(n)
+    solution = Solution.blank(n)
     rows = (np.ascontiguousarray(start), np.ascontiguousarray(strength), np.ascontiguousarray(bound))
     kernel(form)(
         *rows,
