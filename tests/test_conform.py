@@ -21,7 +21,7 @@ import impact
 from impact.conformance.adapters import FACTS
 from impact.conformance.checks import checks_of
 from impact.conformance.registry import ENGINES
-from impact.conformance.suite import QUESTION_KEYS, collisions, read_suite
+from impact.conformance.suite import QUESTION_KEYS, read_suite
 from impact.errors import ResultError, UsageError
 from impact.results.board import CHECKS
 
@@ -30,6 +30,7 @@ from .conftest import ROOT, Run
 EXAMPLES = ROOT / "docs" / "conform"
 Values = dict[str, Any]
 Engine = Callable[[Values], Values]
+COLLISIONS = [trial.question for trial in read_suite().values()]
 
 
 def load_rigid() -> Engine:
@@ -189,12 +190,12 @@ def test_the_set_is_what_its_specification_says() -> None:
     small, large = (trials[f"scale-{size}-stick"].question["R1"] for size in ("1mm", "1m"))
     assert (small, large) == (1e-3, 1.0)
     assert all(
-        question["v1"] == question["v2"] for question in collisions() if str(question["id"]).startswith("rest")
+        question["v1"] == question["v2"] for question in COLLISIONS if str(question["id"]).startswith("rest")
     )
 
 
 def test_a_collision_is_the_mapping_of_the_protocol() -> None:
-    for question in collisions():
+    for question in COLLISIONS:
         assert tuple(question) == QUESTION_KEYS
         assert json.loads(json.dumps(question)) == question
     assert {check for trial in read_suite().values() for check in checks_of(trial, read_suite())} == {
@@ -207,7 +208,7 @@ def test_a_released_set_never_changes() -> None:
     """Its collisions have these numbers in all versions of the program."""
     import hashlib
 
-    text = json.dumps([[f"{v:.9g}" if isinstance(v, float) else v for v in c.values()] for c in collisions()])
+    text = json.dumps([[f"{v:.9g}" if isinstance(v, float) else v for v in c.values()] for c in COLLISIONS])
     assert hashlib.sha256(text.encode()).hexdigest().startswith("931cdc9a")
 
 
@@ -270,7 +271,7 @@ def test_what_an_engine_cannot_do_is_counted_and_not_failed() -> None:
     assert board.passed
     assert data["summary"]["failed"] == 0
     of_walls = [check for check in data["checks"] if check["status"] == "not_supported"]
-    assert {check["id"] for check in of_walls} == {c["id"] for c in collisions() if c["m2"] is None}
+    assert {check["id"] for check in of_walls} == {c["id"] for c in COLLISIONS if c["m2"] is None}
     assert data["summary"]["not_supported"] == len(of_walls)
     assert all(math.isnan(check["delivered"]) for check in of_walls)
 
@@ -515,7 +516,7 @@ def test_the_page_has_the_examples_and_names_every_check() -> None:
     page = (ROOT / "docs" / "conform.md").read_text(encoding="utf-8")
     for name in ("rigid.py", "rigid.c"):
         assert (EXAMPLES / name).read_text(encoding="utf-8") in page
-    assert f"the same {len(collisions())} impacts" in page
+    assert f"the same {len(COLLISIONS)} impacts" in page
     named = {*CHECKS, *QUESTION_KEYS, *FACTS}
     assert [name for name in named if f"`{name}`" not in page] == []
 

@@ -83,15 +83,6 @@ def read_suite(name: str = DEFAULT_SUITE) -> Mapping[str, Trial]:
     return trials
 
 
-def collisions(suite: str = DEFAULT_SUITE) -> list[Question]:
-    """List the collisions of a set as mappings of the adapter protocol.
-
-    >>> collisions()[0]["id"], len({collision["id"] for collision in collisions()}) == len(collisions())
-    ('normal-e90-slow-equal', True)
-    """
-    return [trial.question for trial in read_suite(suite).values()]
-
-
 def _question(values: Mapping[str, Any]) -> Question:
     """Compute the moments of inertia; a wall has no mass and no radius."""
     question = dict(values)

@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..array_types import Array
+from ..array_types import Array, Mask
 from ..errors import ModelError
 from . import fixed_step_slip
 from .closed_forms.dashpot import gap_damping
@@ -31,7 +31,6 @@ from .rigid import ObliqueImpacts
 from .slip_motion import FrictionKind, TangentialForm
 from .status import FrictionStatus
 
-Mask = NDArray[np.bool_]
 # how the stiffness of the tangential spring is chosen, where the user sets no kt_over_kn: a constant k_t;
 # Mindlin's 8 G* a, or k_t sqrt(x); as LIGGGHTS does, 8 G* a for n = 3/2 and K for n = 1; as Kratos does, 4 G*/E*
 # times that of the contact; k_t times the radius of the contact in metres

@@ -118,15 +118,6 @@ class Interval:
         """The values of the variable at the nodes, ascending, and between them; shape (DEGREE + 1 + checks,)."""
         return from_unit(np.concatenate([NODES, CHECKS]), self.lower, self.upper)
 
-    @property
-    def is_divisible(self) -> bool:
-        """Whether parts may be accurate: the interval is not, and the function has values in it."""
-        if self.is_accurate or self.values is None:
-            return False
-        is_finite = np.isfinite(self.values)
-        # what fails in most of it, or near its ends, is not worth many divisions
-        return bool(is_finite.all() or (is_finite.mean() > 0.5 and self.divisions < MAX_DIVISIONS))
-
     def tried(self, values: Array, floors: Array) -> Interval:
         """Interpolate the values of the function at all nodes."""
         at_nodes, between = np.split(values, [DEGREE + 1])
@@ -265,7 +256,12 @@ class Interpolant:
         return bool(divided)
 
     def _is_divided(self, interval: Interval) -> bool:
-        if interval.values is None or interval.divisions >= self.max_divisions or not interval.is_divisible:
+        """Whether an interval is not accurate, but its parts may be, and are needed."""
+        if interval.values is None or interval.is_accurate or interval.divisions >= self.max_divisions:
+            return False
+        is_finite = np.isfinite(interval.values)
+        # what fails in most of it, or near its ends, is not worth many divisions
+        if not (is_finite.all() or (is_finite.mean() > 0.5 and interval.divisions < MAX_DIVISIONS)):
             return False
         return self.is_needed is None or self.is_needed(interval.values)
 

@@ -24,6 +24,11 @@ print("omega2 =", omega2)
 """
 
 
+def keyword_arguments(values: Parameters) -> str:
+    """Write the keyword arguments of a call in Python, with all digits."""
+    return ", ".join(f"{name}={value!r}" for name, value in values.items())
+
+
 @dataclass(frozen=True)
 class Collision:
     """A collision of two balls, or of a ball and a plane wall, on a line, as a code simulates it; all in SI.

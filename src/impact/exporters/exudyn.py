@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .code import Code, Collision, Parameters
+from .code import Code, Collision, Parameters, keyword_arguments
 from .programs import python_package
 
 # impactModel of each law; linear damping is added to the other two where it is not 0
@@ -46,8 +46,7 @@ def parameters(collision: Collision) -> dict[str, float | str]:
 
 
 def lines(collision: Collision, parameters: Parameters) -> list[str]:
-    values = ", ".join(f"{name}={value!r}" for name, value in parameters.items())
-    return [f"contact = dict({values})", f"dt = {collision.dt!r}"]
+    return [f"contact = dict({keyword_arguments(parameters)})", f"dt = {collision.dt!r}"]
 
 
 def notes(collision: Collision) -> list[str]:

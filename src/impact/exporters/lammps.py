@@ -33,14 +33,6 @@ OPTIONS = {
     )
     for limit in ("", "-limit")
 }
-# the parameter that sets the strength of each damping
-STRENGTH = {
-    "coeff_restitution": "e",
-    "tsuji": "e",
-    "velocity": "C",
-    "mass_velocity": "gamma",
-    "viscoelastic": "eta",
-}
 # pull request 5113 with the factor √2 was last discussed on this day; releases since then have it
 ROOT_SINCE = "20260729"
 # the first releases with coeff_restitution and with limit_damping, by month
@@ -166,9 +158,9 @@ def law_for_version(key: str, version: str) -> str:
 
 def parameters(collision: Collision) -> dict[str, float | str]:
     """Write the numbers of pair_coeff; of hertz, k_n is K/√R*."""
-    spring, damping, _ = OPTIONS[collision.model.key]
-    strength = STRENGTH[damping]
-    last: dict[str, float | str] = {"e" if strength == "e" else "eta_n0": collision[strength]}
+    spring, _, _ = OPTIONS[collision.model.key]
+    constant = collision.model.damping
+    last: dict[str, float | str] = {"eta_n0": collision[constant]} if constant else {"e": collision["e"]}
     if takes_moduli(collision):
         of_normal = {"E": collision["E1"], **last, "nu": collision["nu1"]} | (
             {} if collision.has_one_material else {"E2": collision["E2"], "nu2": collision["nu2"]}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from ..formatting import number
-from .code import Code, Collision, Parameters
+from .code import Code, Collision, Parameters, keyword_arguments
 from .programs import python_package
 
 # the normal is along x, the tangent along y, so that spins are about z
@@ -68,8 +68,7 @@ def parameters(collision: Collision) -> dict[str, float | str]:
 
 
 def lines(collision: Collision, parameters: Parameters) -> list[str]:
-    values = ", ".join(f"{name}={value!r}" for name, value in parameters.items())
-    smooth = "" if collision.friction else ", mu=0"
+    values, smooth = keyword_arguments(parameters), "" if collision.friction else ", mu=0"
     return [f"contact = newton.ModelBuilder.ShapeConfig({values}{smooth})", f"dt = {collision.dt!r}"]
 
 

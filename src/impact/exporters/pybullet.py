@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from .code import Code, Collision, Parameters
+from .code import Code, Collision, Parameters, keyword_arguments
 from .programs import python_package
 
 # the normal is along x, the tangent along y, so that spins are about z
@@ -55,12 +55,11 @@ def parameters(collision: Collision) -> dict[str, float | str]:
 
 
 def lines(collision: Collision, parameters: Parameters) -> list[str]:
-    values = ", ".join(f"{name}={value!r}" for name, value in parameters.items())
     smooth = "angularDamping=0" if collision.friction else "lateralFriction=0"
     return [
         f"bullet.setTimeStep({collision.dt!r})",
         "bullet.setPhysicsEngineParameter(contactSlop=0)",
-        f"contact = dict({values}, restitution=0, contactProcessingThreshold=0)",
+        f"contact = dict({keyword_arguments(parameters)}, restitution=0, contactProcessingThreshold=0)",
         f"contact |= dict({smooth}, linearDamping=0, maxJointVelocity=1e9)",
     ]
 

@@ -6,7 +6,7 @@ import math
 import re
 
 from ..errors import UsageError
-from .code import Code, Collision, Parameters
+from .code import Code, Collision, Parameters, keyword_arguments
 from .programs import Program, printed_version
 
 LAWS = {
@@ -148,16 +148,17 @@ def lines(collision: Collision, parameters: Parameters) -> list[str]:
     angle = {"frictionAngle": remaining.pop("frictionAngle", 0)}
     second = {name: remaining.pop(f"{name}2") for name in ("young", "poisson") if f"{name}2" in remaining}
     if "kn" in remaining:
-        material, physics = f"ViscElMat({_arguments(remaining | angle)})", "Ip2_ViscElMat_ViscElMat_ViscElPhys()"
+        material = f"ViscElMat({keyword_arguments(remaining | angle)})"
+        physics = "Ip2_ViscElMat_ViscElMat_ViscElPhys()"
         law = "Law2_ScGeom_ViscElPhys_Basic()"
     else:
         elastic = {name: remaining.pop(name) for name in ("young", "poisson")}
-        material = f"FrictMat({_arguments(elastic | angle)})"
-        physics = f"Ip2_FrictMat_FrictMat_MindlinPhys({_arguments(remaining)})"
+        material = f"FrictMat({keyword_arguments(elastic | angle)})"
+        physics = f"Ip2_FrictMat_FrictMat_MindlinPhys({keyword_arguments(remaining)})"
         law = "Law2_ScGeom_MindlinPhys_Mindlin()"
     text = [f"material1 = O.materials.append({material})"]
     if second:
-        text.append(f"material2 = O.materials.append(FrictMat({_arguments(second | angle)}))")
+        text.append(f"material2 = O.materials.append(FrictMat({keyword_arguments(second | angle)}))")
     bounds, geometries = "Bo1_Sphere_Aabb()", "Ig2_Sphere_Sphere_ScGeom()"
     if collision.has_wall:
         bounds += ", Bo1_Wall_Aabb()"
@@ -172,10 +173,6 @@ def lines(collision: Collision, parameters: Parameters) -> list[str]:
         "]",
         f"O.dt = {collision.dt!r}",
     ]
-
-
-def _arguments(values: Parameters) -> str:
-    return ", ".join(f"{name}={value!r}" for name, value in values.items())
 
 
 def notes(collision: Collision) -> list[str]:

@@ -21,7 +21,7 @@ def approach_dashpot(key: str, *, zeta: Formula, **about: Unpack[About]) -> Forc
     """Make a law of a spring and a dashpot that acts on approach only, from the formula of its damping ratio."""
     about.setdefault("family", "asymmetric")
     law = dashpot(key, zeta=zeta, release="gap", **about)
-    return replace(law, unloading=spring, oracle=lambda zeta: approach_restitution(zeta))
+    return replace(law, unloading=spring, oracle=approach_restitution)
 
 
 JANKOWSKI_2006 = approach_dashpot(
@@ -58,7 +58,7 @@ EXACT_APPROACH_DASHPOT = approach_dashpot(
     "ζ²))",
     reference="the limit that Jankowski (2006) and Mahmoud and Jankowski (2011) approximate",
     evidence=Evidence("derived", "src/impact/contact/closed_forms/dashpot.py"),
-    zeta=lambda e: approach_damping(e),
+    zeta=approach_damping,
 )
 
 PANT_WIJEYEWICKREMA_2012 = ForceModel(
@@ -76,7 +76,7 @@ PANT_WIJEYEWICKREMA_2012 = ForceModel(
     coefficients={"chi": lambda e: np.divide(1.5 * (1 - e * e), e * e)},
     force=damped,
     unloading=spring,
-    oracle=lambda chi: approach_damped_restitution(chi),
+    oracle=approach_damped_restitution,
     velocity_coordinate="log",
     exponent=1.0,
     family="asymmetric",

@@ -22,8 +22,8 @@ from .cited_sources import CHRONO, DEMLAB_VISCOELASTIC, LIGGGHTS, MAPLESIM_HELP,
 
 # closed forms of the restitution, by where the contact ends
 DELIVERED_RESTITUTION: dict[str, Formula] = {
-    "gap": lambda zeta: gap_restitution(zeta),
-    "force": lambda zeta: force_restitution(zeta),
+    "gap": gap_restitution,
+    "force": force_restitution,
 }
 
 
@@ -124,7 +124,7 @@ ANAGNOSTOPOULOS_1988 = dashpot(
         doi="koreascience.or.kr, JAKO201832853252619, references",
         note="no source of the formula names the paper",
     ),
-    zeta=lambda e: gap_damping(e),
+    zeta=gap_damping,
     release="gap",
     exponent=1.0,
 )
@@ -157,7 +157,7 @@ TSUJI_1992 = dashpot(
         "Azeko2xo/woodem, pkg/dem/Hertz.cpp @f94485c (2015)",
         doi=DEMLAB_VISCOELASTIC,
     ),
-    zeta=lambda e: gap_damping(e),
+    zeta=gap_damping,
     release="gap",
     exponent=1.5,
 )
@@ -189,7 +189,7 @@ SCHWAGER_POSCHEL_2007 = dashpot(
         f"{YADE_2025}, ViscoelasticPM.cpp, after equation (21) of the paper, whose sign it corrects",
         doi=YADE_BIBLIOGRAPHY,
     ),
-    zeta=lambda e: force_damping(e),
+    zeta=force_damping,
     release="force",
     exponent=1.0,
 )
@@ -228,7 +228,7 @@ FENG_2026 = dashpot(
     reference="Feng YT (2026) Exact phase-space analytical solution for the power-law damped contact oscillator. "
     "arXiv:2603.27764",
     evidence=Evidence("seen", "arXiv:2603.27764"),
-    zeta=lambda e: gap_damping(e),
+    zeta=gap_damping,
     release="gap",
 )
 
@@ -239,6 +239,6 @@ EXACT_DASHPOT_NO_TENSION = dashpot(
     equation=f"{GENERAL_DASHPOT},  α = ζ √(2(n + 1)),  e = exp(−2 ζ acos(ζ)/√(1 − ζ²)), to F = 0",
     reference="Schwager T, Pöschel T (2007) Granul. Matter 9, 465, for n = 1; Feng YT (2026) arXiv:2603.27764",
     evidence=Evidence("derived", "src/impact/contact/closed_forms/dashpot.py"),
-    zeta=lambda e: force_damping(e),
+    zeta=force_damping,
     release="force",
 )

@@ -120,7 +120,7 @@ EXACT_HYSTERESIS = hysteresis(
         "factor v₀; of that entry only the end was seen, its authors are inferred; Zhang and Sharf (2004) were "
         "not seen",
     ),
-    chi=lambda e: exact_damping_ratio(e),
+    chi=exact_damping_ratio,
 )
 
 GONTHIER_2004 = hysteresis(

@@ -29,9 +29,9 @@ from .hysteresis import (
 )
 
 
-def springs_in_series(a: Array, b: Array) -> Array:
+def springs_in_series(k1: Array, k2: Array) -> Array:
     """Compute the stiffness of two springs in series."""
-    return a * b / (a + b)
+    return k1 * k2 / (k1 + k2)
 
 
 def smooth_step(t: Array) -> Array:
@@ -195,7 +195,7 @@ DRAKE_POINT_CONTACT = hysteresis(
     ),
     exponent=1.0,
     chi=lambda d, v0: d * v0,
-    stiffness=lambda k1, k2: springs_in_series(k1, k2),
+    stiffness=springs_in_series,
     family="codes",
 )
 
@@ -213,7 +213,7 @@ DRAKE_POINT_CONTACT_MIXED = hysteresis(
     ),
     exponent=1.0,
     chi=lambda d1, d2, k1, k2, v0: (k2 * d1 + k1 * d2) / (k1 + k2) * v0,
-    stiffness=lambda k1, k2: springs_in_series(k1, k2),
+    stiffness=springs_in_series,
     family="codes",
 )
 
