@@ -227,9 +227,10 @@ def related(rebound: Rebound, trial: Trial, base: Rebound) -> Delivered:
 
 
 def repeat(rebound: Rebound, again: Answer) -> Delivered:
-    """Count the numbers that differ in any bit if the same question is asked again."""
+    """Count the numbers that differ in any bit, or are missing, if the same question is asked again."""
     # the text of a NaN is always the same
-    return Delivered(0.0, float(sum(repr(rebound.answer[name]) != repr(again[name]) for name in rebound.answer)))
+    differ = (repr(value) != repr(again.get(name)) for name, value in rebound.answer.items())
+    return Delivered(0.0, float(sum(differ)))
 
 
 def step(coarse: Rebound, middle: Rebound, fine: Rebound) -> Delivered:

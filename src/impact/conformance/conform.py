@@ -183,12 +183,7 @@ def _judge(
         if rebound is None:
             return None
         if name == "repeat":
-            other = again[trial.id]
-            return (
-                checks.Delivered(0.0, float(len(rebound.answer)))
-                if other is None
-                else checks.repeat(rebound, other)
-            )
+            return checks.repeat(rebound, again[trial.id] or {})
         if name == "friction":
             return checks.friction(rebound, betas.get(trial.id))
         if name in checks.OF_AN_ANSWER:
