@@ -102,7 +102,7 @@ class StoredLaw:
 
 
 class About(TypedDict):
-    """The fields of a `ForceModel` that describe a law, besides its formulas."""
+    """The fields of a `ForceModel` that describe a law, besides the formulas of its motion."""
 
     title: str
     year: int

@@ -177,16 +177,11 @@ def _simulate_distinct(
     law_values = with_coefficients(model, with_units(values, n), count)
     status = check_coefficients(model, law_values, values, count)
     exact, chi = exact_restitution(model, law_values, count), chi_of(law_values, count)
-
-    def integrate_distinct(problems: DistinctProblems) -> CollisionResult:
-        never_separates = exact[problems.rows][problems.first] == 0.0
-        size = never_separates.size
-        return compute(problems.law, problems.params, size, never_separates=never_separates)
-
-    problems = distinct_problems(
-        model, n, law_values, status == STATUS_OK, collapse, separates_strong=separates_strong
-    )
-    parts = [(part.rows, integrate_distinct(part).take(part.row_of_impact)) for part in problems]
+    chosen, parts = status == STATUS_OK, []
+    for problems in distinct_problems(model, n, law_values, chosen, collapse, separates_strong=separates_strong):
+        never = exact[problems.rows][problems.first] == 0.0
+        distinct = compute(problems.law, problems.params, never.size, never_separates=never)
+        parts.append((problems.rows, distinct.take(problems.row_of_impact)))
     result = replace(CollisionResult.joined(count, status, parts), chi=chi, exact=exact)
     stopped = status == LIMIT
     if stopped.any():

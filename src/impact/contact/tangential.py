@@ -157,15 +157,11 @@ def _simulate_distinct(
     columns = (*given, *coefficient)
     chosen = (status == STATUS_OK) & ~given.is_trivial
     exact = exact_restitution(model, law_values, count)
-
-    def integrate_distinct(problems: simulate.DistinctProblems) -> TangentialResult:
+    parts = []
+    for problems in simulate.distinct_problems(model, n, law_values, chosen, collapse, columns):
         never_separates = exact[problems.rows][problems.first] == 0.0
-        return _integrate(form, problems, never_separates, rtol, max_steps, recorded)
-
-    parts = [
-        (problems.rows, integrate_distinct(problems).take(problems.row_of_impact))
-        for problems in simulate.distinct_problems(model, n, law_values, chosen, collapse, columns)
-    ]
+        distinct = _integrate(form, problems, never_separates, rtol, max_steps, recorded)
+        parts.append((problems.rows, distinct.take(problems.row_of_impact)))
     result = TangentialResult.joined(count, status, parts)
     if form.kind == "coulomb":
         # with infinite damping the balls stop at first contact
