@@ -16,15 +16,11 @@ from . import exits, options
 def calibrate(
     config: Annotated[Path, typer.Argument(help="A TOML file with \\[data] and { fit = \\[least, most] }.")],
     output: Annotated[
-        Path | None,
-        typer.Option(
-            "-o", "--output", help="The result file, or of its table .csv, .tex or .parquet. \\[default: none]"
-        ),
+        Path | None, options.output("The result file, or of its table .csv, .tex or .parquet. \\[default: none]")
     ] = None,
     overwrite: options.Overwrite = False,
     best: Annotated[
-        Path | None,
-        typer.Option("--best", metavar="FILE", help="Write the config of the best law with its parameters."),
+        Path | None, options.value("FILE", "Write the config of the best law with its parameters.")
     ] = None,
     model: Annotated[str | None, options.model("The law of --best, in place of the one that fits best.")] = None,
     sets: options.Set = None,

@@ -38,10 +38,7 @@ SubsetOption = Annotated[
     bool, typer.Option("--subset", help="Compare only the variables and points that both results have.")
 ]
 FormatOption = Annotated[Format, typer.Option("--format", help="Format of the verdict on stdout.")]
-PlotOption = Annotated[
-    Path | None,
-    typer.Option("--plot", metavar="FILE", help="Draw where the results differ: .png, .svg or .pdf."),
-]
+PlotOption = Annotated[Path | None, options.value("FILE", "Draw where the results differ: .png, .svg or .pdf.")]
 
 
 def compare(

@@ -24,7 +24,7 @@ def init(
 
 
 def schema(
-    output: Annotated[Path | None, typer.Option("-o", "--output", help="The file. \\[default: stdout]")] = None,
+    output: Annotated[Path | None, options.output("The file. \\[default: stdout]")] = None,
     overwrite: options.Overwrite = False,
 ) -> None:
     """Print the JSON Schema of a config, for completion and validation in editors."""

@@ -22,35 +22,24 @@ def conform(
     ] = None,
     adapter: Annotated[
         list[str] | None,
-        typer.Option(
-            "--adapter",
-            metavar="WORDS",
-            help='An adapter of an engine, FILE.py:FUNCTION or "PROGRAM ARGUMENTS"; may be repeated.',
+        options.value(
+            "WORDS", 'An adapter of an engine, FILE.py:FUNCTION or "PROGRAM ARGUMENTS"; may be repeated.'
         ),
     ] = None,
-    suite: Annotated[
-        str, typer.Option("--suite", metavar="NAME", help="The set of collisions.")
-    ] = "conformance-1",
-    only: Annotated[
-        list[str] | None,
-        typer.Option("--only", metavar="ID", help="Judge only this collision; may be repeated."),
-    ] = None,
+    suite: Annotated[str, options.value("NAME", "The set of collisions.")] = "conformance-1",
+    only: Annotated[list[str] | None, options.value("ID", "Judge only this collision; may be repeated.")] = None,
     tol: Annotated[
         list[NamedValue] | None,
         options.tolerance(
             "[CHECK=]VALUE", "Tolerance of all checks or of one, such as momentum=1e-6 or 5%; may be repeated."
         ),
     ] = None,
-    timeout: Annotated[float, options.number("--timeout", "SECONDS", "Time for an answer \\[s].")] = 60.0,
+    timeout: Annotated[float, options.number("SECONDS", "Time for an answer \\[s].")] = 60.0,
     program: Annotated[
-        str | None,
-        typer.Option(
-            "--program", metavar="FILE", help="A Python that has the package of the engine, or its program."
-        ),
+        str | None, options.value("FILE", "A Python that has the package of the engine, or its program.")
     ] = None,
     output: Annotated[
-        Path | None,
-        typer.Option("-o", "--output", help="A page (.html), or a board that impact compare reads (.h5)."),
+        Path | None, options.output("A page (.html), or a board that impact compare reads (.h5).")
     ] = None,
     overwrite: options.Overwrite = False,
     show_engines: Annotated[bool, typer.Option("--list", help="List the engines.")] = False,

@@ -17,10 +17,7 @@ from .completion import complete_code
 
 def export(
     source: options.Source = None,
-    to: Annotated[
-        str | None,
-        typer.Option("--to", metavar="CODE", autocompletion=complete_code, help="The code, see --list."),
-    ] = None,
+    to: Annotated[str | None, options.value("CODE", "The code, see --list.", complete_code)] = None,
     model: Annotated[
         str | None,
         options.model(
@@ -31,21 +28,15 @@ def export(
     at: options.At = None,
     dt: Annotated[
         str | None,
-        typer.Option(
-            "--dt",
-            metavar="SECONDS",
-            help='The time step \\[s], or with a unit, such as "2 us". \\[default: contact time/50]',
+        options.value(
+            "SECONDS", 'The time step \\[s], or with a unit, such as "2 us". \\[default: contact time/50]'
         ),
     ] = None,
     parameter: options.Parameter = None,
     friction: options.FrictionKey = None,
     code_version: Annotated[
         str | None,
-        typer.Option(
-            "--code-version",
-            metavar="VERSION",
-            help="Release of the code. \\[default: the installed one, else the newest known]",
-        ),
+        options.value("VERSION", "Release of the code. \\[default: the installed one, else the newest known]"),
     ] = None,
     script: Annotated[
         bool, typer.Option("--script", help="Write a complete input with two balls that measures its e.")
@@ -54,12 +45,9 @@ def export(
         bool, typer.Option("--verify", help="Run the script and compare its e with the predicted one.")
     ] = False,
     program: Annotated[
-        str | None,
-        typer.Option(
-            "--program", metavar="FILE", help="What runs scripts, such as lmp or a Python with the code's package."
-        ),
+        str | None, options.value("FILE", "What runs scripts, such as lmp or a Python with the code's package.")
     ] = None,
-    output: Annotated[Path | None, typer.Option("-o", "--output", help="The file. \\[default: stdout]")] = None,
+    output: Annotated[Path | None, options.output("The file. \\[default: stdout]")] = None,
     overwrite: options.Overwrite = False,
     show_codes: Annotated[bool, typer.Option("--list", help="List the codes and their laws.")] = False,
     sets: options.Set = None,

@@ -5,8 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 import impact
 
 from . import exits, options
@@ -15,7 +13,7 @@ from .execution import Execution, print_summary_and_exit
 
 def expand(
     result: options.Result,
-    output: Annotated[Path, typer.Option("-o", "--output", help="The file to write.")],
+    output: Annotated[Path, options.output("The file to write.")],
     sel: options.Select = None,
     model: options.Models = None,
     overwrite: options.Overwrite = False,
@@ -39,16 +37,14 @@ def extend(
     result: options.Result,
     sets: Annotated[
         list[str],
-        typer.Option(
-            "--set",
-            metavar="PATH=VALUE",
-            help="More values of an axis, such as sweep.m2=[1.0, 2.0], or more models; may be repeated. "
+        options.value(
+            "PATH=VALUE",
+            "More values of an axis, such as sweep.m2=[1.0, 2.0], or more models; may be repeated. "
             "Existing values are kept.",
+            names=["--set"],
         ),
     ],
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="The larger result. \\[default: the result itself]")
-    ] = None,
+    output: Annotated[Path | None, options.output("The larger result. \\[default: the result itself]")] = None,
     plugins: options.Plugins = None,
     overwrite: options.Overwrite = False,
     allow_failed: options.AllowFailed = False,

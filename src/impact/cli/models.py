@@ -36,22 +36,16 @@ def models(
         ),
     ] = None,
     family: Annotated[
-        str | None,
-        typer.Option(
-            "--family", metavar="NAME", autocompletion=complete_family, help="List only the laws of this family."
-        ),
+        str | None, options.value("NAME", "List only the laws of this family.", complete_family)
     ] = None,
     search: Annotated[
         str | None,
-        typer.Option(
-            "--search",
-            metavar="WORDS",
-            help='List the laws with these words in key, title, equation or reference: "lammps hertz".',
+        options.value(
+            "WORDS", 'List the laws with these words in key, title, equation or reference: "lammps hertz".'
         ),
     ] = None,
     check: Annotated[
-        Path | None,
-        typer.Option("--check", metavar="FILE", help="Check the models of a Python file against the contract."),
+        Path | None, options.value("FILE", "Check the models of a Python file against the contract.")
     ] = None,
     frictions: Annotated[bool, typer.Option("--frictions", help="List friction laws, not models.")] = False,
     plugins: options.Plugins = None,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -12,20 +12,31 @@ from . import completion, parsing
 from .parsing import NamedValue
 
 
-def whole_number(*names: str, help: str) -> Any:
+def value(
+    metavar: str, help: str, complete: Callable[..., list[str]] | None = None, *, names: Sequence[str] = ()
+) -> Any:
+    """Declare an option with a value; its name is that of its parameter, unless it has others."""
+    return typer.Option(*names, metavar=metavar, autocompletion=complete, help=help)
+
+
+def output(help: str, metavar: str | None = None) -> Any:
+    """Declare the option for the file to write."""
+    return typer.Option("-o", "--output", metavar=metavar, help=help)
+
+
+def whole_number(help: str, *names: str) -> Any:
     """Declare an option whose value is a whole number of at least 1."""
     return typer.Option(*names, metavar="N", parser=parsing.parse_whole_number, help=help)
 
 
-def number(name: str, metavar: str, help: str) -> Any:
+def number(metavar: str, help: str) -> Any:
     """Declare an option whose value is a number, which may be in percent."""
-    return typer.Option(name, metavar=metavar, parser=parsing.parse_number, help=help)
+    return typer.Option(metavar=metavar, parser=parsing.parse_number, help=help)
 
 
-def pairs(name: str, complete: Callable[..., list[str]], help: str) -> Any:
+def pairs(complete: Callable[..., list[str]], help: str) -> Any:
     """Declare an option that is repeated for several names."""
     return typer.Option(
-        name,
         metavar="NAME=VALUE",
         autocompletion=complete,
         parser=parsing.parse_setting,
@@ -37,29 +48,25 @@ def pairs(name: str, complete: Callable[..., list[str]], help: str) -> Any:
 def tolerance(metavar: str, help: str) -> Any:
     """Declare an option for a tolerance of all, or of one by its name."""
     return typer.Option(
-        "--tol", metavar=metavar, parser=parsing.parse_tolerance, callback=parsing.reject_duplicates, help=help
+        metavar=metavar, parser=parsing.parse_tolerance, callback=parsing.reject_duplicates, help=help
     )
 
 
 def target(help: str) -> Any:
     """Declare the option for the wanted output."""
     return typer.Option(
-        "--target",
-        metavar="NAME=VALUE",
-        parser=parsing.parse_target,
-        autocompletion=completion.complete_target,
-        help=help,
+        metavar="NAME=VALUE", parser=parsing.parse_target, autocompletion=completion.complete_target, help=help
     )
 
 
 def model(help: str) -> Any:
     """Declare an option for the key of a model."""
-    return typer.Option("--model", metavar="KEY", autocompletion=completion.complete_model, help=help)
+    return value("KEY", help, completion.complete_model)
 
 
 def friction(help: str) -> Any:
     """Declare an option for the key of a friction law."""
-    return typer.Option("--friction", metavar="KEY", autocompletion=completion.complete_friction, help=help)
+    return value("KEY", help, completion.complete_friction)
 
 
 Result = Annotated[Path, typer.Argument(help="A result of `impact sweep`.")]
@@ -68,68 +75,54 @@ Source = Annotated[
 ]
 At = Annotated[
     list[NamedValue] | None,
-    pairs("--at", completion.complete_input, "Value of an input, such as e=0.05; may be repeated."),
+    pairs(completion.complete_input, "Value of an input, such as e=0.05; may be repeated."),
 ]
 ModelKey = Annotated[str, model("The model.")]
 Parameter = Annotated[
     str | None,
-    typer.Option(
-        "--for",
-        metavar="PARAMETER",
-        help="Find the value of this parameter of the law, of K or of materials.NAME.E, from which on every phase "
+    value(
+        "PARAMETER",
+        "Find the value of this parameter of the law, of K or of materials.NAME.E, from which on every phase "
         "is within the tolerance at the given --dt.",
+        names=["--for"],
     ),
 ]
 FrictionKey = Annotated[
     str | None, friction("The friction law. \\[default: the first of the source, if it has any]")
 ]
-Output = Annotated[Path, typer.Option("-o", "--output", help="The result file.")]
-Page = Annotated[Path | None, typer.Option("-o", "--output", help="The page: .html. \\[default: RESULT.html]")]
+Output = Annotated[Path, output("The result file.")]
+Page = Annotated[Path | None, output("The page: .html. \\[default: RESULT.html]")]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace the output if it exists.")]
-Rows = Annotated[
-    int | None,
-    whole_number("--rows", help="Write at most N rows of a table, evenly spread. \\[default: all]"),
-]
-Digits = Annotated[
-    int | None, whole_number("--digits", help="Significant digits of a table. \\[default: all, in .tex 6]")
-]
-Decimal = Annotated[
-    str,
-    typer.Option("--decimal", metavar="NAME", help="point, comma (semicolons separate columns) or locale."),
-]
-Table = Annotated[
-    Path | None,
-    typer.Option("-o", "--output", metavar="FILE", help="Write the table: .csv, .tex or .parquet."),
-]
+Rows = Annotated[int | None, whole_number("Write at most N rows of a table, evenly spread. \\[default: all]")]
+Digits = Annotated[int | None, whole_number("Significant digits of a table. \\[default: all, in .tex 6]")]
+Decimal = Annotated[str, value("NAME", "point, comma (semicolons separate columns) or locale.")]
+Table = Annotated[Path | None, output("Write the table: .csv, .tex or .parquet.", "FILE")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON on stdout.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")]
 AllowFailed = Annotated[bool, typer.Option("--allow-failed", help="Exit 0 even if points failed.")]
 Resume = Annotated[bool, typer.Option("--resume", help="Continue an interrupted sweep.")]
 Set = Annotated[
     list[str] | None,
-    typer.Option(
-        "--set",
-        metavar="PATH=VALUE",
-        autocompletion=completion.complete_setting,
-        help="Change the config, such as sweep.m2=2.0; may be repeated.",
+    value(
+        "PATH=VALUE",
+        "Change the config, such as sweep.m2=2.0; may be repeated.",
+        completion.complete_setting,
+        names=["--set"],
     ),
 ]
 Plugins = Annotated[
     list[Path] | None,
-    typer.Option("--plugin", metavar="FILE", help="Python file with user-defined models; may be repeated."),
+    value("FILE", "Python file with user-defined models; may be repeated.", names=["--plugin"]),
 ]
 Select = Annotated[
     list[NamedValue] | None,
-    pairs("--sel", completion.complete_selection, "Value of an axis, such as m2=1.0; may be repeated."),
+    pairs(completion.complete_selection, "Value of an axis, such as m2=1.0; may be repeated."),
 ]
 Models = Annotated[list[str] | None, model("Only this model; may be repeated.")]
 Frictions = Annotated[list[str] | None, friction("Only this friction law; may be repeated.")]
-Jobs = Annotated[int, whole_number("--jobs", "-j", help="Number of processes.")]
-Threads = Annotated[int, whole_number("--threads", help="Number of threads, instead of processes.")]
-MaxPoints = Annotated[
-    int,
-    whole_number("--max-points", help="Largest number of points in layout full, of trajectories otherwise."),
-]
+Jobs = Annotated[int, whole_number("Number of processes.", "--jobs", "-j")]
+Threads = Annotated[int, whole_number("Number of threads, instead of processes.")]
+MaxPoints = Annotated[int, whole_number("Largest number of points in layout full, of trajectories otherwise.")]
 Tolerance = Annotated[
     list[NamedValue] | None,
     tolerance(

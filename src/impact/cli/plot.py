@@ -25,96 +25,69 @@ def plot(
     result: Annotated[Path, typer.Argument(help="A result of `impact sweep`, or a history of `impact run`.")],
     output: Annotated[
         Path | None,
-        typer.Option(
-            "-o",
-            "--output",
-            help="The picture: .png, .svg, .pdf, .eps, .pgf, or .gif (animation); several kinds: one file each. "
-            "\\[default: RESULT.png]",
+        options.output(
+            "The picture: .png, .svg, .pdf, .eps, .pgf, or .gif (animation); several kinds: one file each. "
+            "\\[default: RESULT.png]"
         ),
     ] = None,
     kind: Annotated[
         list[str] | None,
-        typer.Option(
-            "--kind",
-            "-k",
-            metavar="KIND",
-            autocompletion=complete_kind,
-            help=f"{', '.join(KINDS)}; may be repeated. \\[default: final-velocities, or the kind of the result]",
+        options.value(
+            "KIND",
+            f"{', '.join(KINDS)}; may be repeated. \\[default: final-velocities, or the kind of the result]",
+            complete_kind,
+            names=["--kind", "-k"],
         ),
     ] = None,
     x: Annotated[
-        str | None,
-        typer.Option(
-            "--x",
-            metavar="AXIS",
-            autocompletion=complete_axis,
-            help="Horizontal axis. \\[default: e, else the first axis]",
-        ),
+        str | None, options.value("AXIS", "Horizontal axis. \\[default: e, else the first axis]", complete_axis)
     ] = None,
     y: Annotated[
         str | None,
-        typer.Option(
-            "--y",
-            metavar="AXIS",
-            autocompletion=complete_axis,
-            help="Vertical axis of a map, or of validity. \\[default: the next axis]",
-        ),
+        options.value("AXIS", "Vertical axis of a map, or of validity. \\[default: the next axis]", complete_axis),
     ] = None,
     variable: Annotated[
         str | None,
-        typer.Option(
-            "--variable",
-            metavar="NAME",
-            autocompletion=complete_output,
-            help="Variable of a map or of bands. \\[default: e_error of a map, e_out of bands]",
+        options.value(
+            "NAME", "Variable of a map or of bands. \\[default: e_error of a map, e_out of bands]", complete_output
         ),
     ] = None,
     sel: options.Select = None,
     model: options.Models = None,
     friction: options.Frictions = None,
-    log: Annotated[str, typer.Option("--log", metavar="AXES", help="Logarithmic axes: x, y or xy.")] = "",
+    log: Annotated[str, options.value("AXES", "Logarithmic axes: x, y or xy.")] = "",
     points: Annotated[
         Path | None,
-        typer.Option(
-            "--points",
-            metavar="FILE",
-            help="CSV file of measured points to plot, with columns such as v1 \\[m/s], e_out and sigma.",
+        options.value(
+            "FILE", "CSV file of measured points to plot, with columns such as v1 \\[m/s], e_out and sigma."
         ),
     ] = None,
     width: Annotated[
         str | None,
-        typer.Option(
-            "--width",
-            metavar="LENGTH",
-            help=f"A length such as 84mm, or a journal column: {', '.join(WIDTHS)}. \\[default: double]",
+        options.value(
+            "LENGTH", f"A length such as 84mm, or a journal column: {', '.join(WIDTHS)}. \\[default: double]"
         ),
     ] = None,
     height: Annotated[
-        str | None,
-        typer.Option("--height", metavar="LENGTH", help="A length such as 60mm. \\[default: depends on the kind]"),
+        str | None, options.value("LENGTH", "A length such as 60mm. \\[default: depends on the kind]")
     ] = None,
     style: Annotated[
-        str | None,
-        typer.Option(
-            "--style", metavar="FILE", help="Matplotlib style sheet: a file, or a name such as grayscale."
-        ),
+        str | None, options.value("FILE", "Matplotlib style sheet: a file, or a name such as grayscale.")
     ] = None,
     no_title: Annotated[bool, typer.Option("--no-title", help="Omit the title and the conditions.")] = False,
     legend: Annotated[
         str | None,
-        typer.Option(
-            "--legend",
-            metavar="NAMES",
-            help="Name laws in full, short or by keys; none: no legend. \\[default: full, short or keys, the "
+        options.value(
+            "NAMES",
+            "Name laws in full, short or by keys; none: no legend. \\[default: full, short or keys, the "
             "first that takes at most a fifth of the height]",
         ),
     ] = None,
     label: Annotated[
         list[str] | None,
-        typer.Option(
-            "--label",
-            metavar="KEY=TEXT",
-            help="Text for an axis, the name beside a curve (both by name), a law (its key), reference or title; "
+        options.value(
+            "KEY=TEXT",
+            "Text for an axis, the name beside a curve (both by name), a law (its key), reference or title; "
             "may be repeated.",
         ),
     ] = None,
@@ -123,14 +96,10 @@ def plot(
         typer.Option("--equations", help="Show the equation numbers of the paper with the names of the laws."),
     ] = False,
     data: Annotated[
-        Path | None,
-        typer.Option("--data", metavar="FILE", help="Write the plotted numbers: .csv, .tex or .parquet."),
+        Path | None, options.value("FILE", "Write the plotted numbers: .csv, .tex or .parquet.")
     ] = None,
     data_form: Annotated[
-        str,
-        typer.Option(
-            "--data-form", metavar="FORM", help="wide: a column for each curve; long: a row for each point."
-        ),
+        str, options.value("FORM", "wide: a column for each curve; long: a row for each point.")
     ] = "wide",
     rows: options.Rows = None,
     digits: options.Digits = None,

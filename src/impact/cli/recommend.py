@@ -15,9 +15,7 @@ def recommend(
     result: options.Result,
     tol: Annotated[
         float,
-        options.number(
-            "--tol", "VALUE", "Largest accepted |e_out − e|, or distance from the target, such as 0.02 or 2%."
-        ),
+        options.number("VALUE", "Largest accepted |e_out − e|, or distance from the target, such as 0.02 or 2%."),
     ] = 0.01,
     target: Annotated[
         NamedValue | None,

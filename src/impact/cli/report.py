@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Annotated
 
-import typer
-
 import impact
 
 from . import exits, options
@@ -19,11 +17,7 @@ def report(
     model: options.Models = None,
     section: Annotated[
         list[str] | None,
-        typer.Option(
-            "--section",
-            metavar="NAME",
-            help="Only this section, such as figures, answer, friction or models; may be repeated.",
-        ),
+        options.value("NAME", "Only this section, such as figures, answer, friction or models; may be repeated."),
     ] = None,
 ) -> None:
     """Write a report: one HTML page with the swept inputs, the ranking, figures, failed points and the config.

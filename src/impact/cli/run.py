@@ -26,14 +26,11 @@ def run(
     sets: options.Set = None,
     plugins: options.Plugins = None,
     history: Annotated[
-        Path | None,
-        typer.Option("--history", metavar="FILE", help="Write the time history: .h5, .hdf5, .nc or .csv."),
+        Path | None, options.value("FILE", "Write the time history: .h5, .hdf5, .nc or .csv.")
     ] = None,
     times: Annotated[
         int | None,
-        options.whole_number(
-            "--times", help="Number of uniform times of the history. \\[default: steps of the integrator]"
-        ),
+        options.whole_number("Number of uniform times of the history. \\[default: steps of the integrator]"),
     ] = None,
     overwrite: options.Overwrite = False,
     as_json: options.Json = False,

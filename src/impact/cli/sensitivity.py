@@ -19,16 +19,11 @@ def sensitivity(
     config: Annotated[Path, typer.Argument(help="A TOML file with \\[design] and distributions.")],
     of: Annotated[
         list[str] | None,
-        typer.Option(
-            "--of",
-            metavar="OUTPUT",
-            autocompletion=complete_output,
-            help="The output, such as peak_force; may be repeated. \\[default: e_out]",
+        options.value(
+            "OUTPUT", "The output, such as peak_force; may be repeated. \\[default: e_out]", complete_output
         ),
     ] = None,
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="The result file. \\[default: none]")
-    ] = None,
+    output: Annotated[Path | None, options.output("The result file. \\[default: none]")] = None,
     overwrite: options.Overwrite = False,
     sets: options.Set = None,
     plugins: options.Plugins = None,

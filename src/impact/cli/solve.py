@@ -18,11 +18,11 @@ def solve(
     model: options.ModelKey,
     name: Annotated[
         str,
-        typer.Option(
-            "--for",
-            metavar="PARAMETER",
-            autocompletion=complete_unknown,
-            help="What to solve for: a parameter of the model or of the friction law, e (to enter), K, or mu.",
+        options.value(
+            "PARAMETER",
+            "What to solve for: a parameter of the model or of the friction law, e (to enter), K, or mu.",
+            complete_unknown,
+            names=["--for"],
         ),
     ],
     target: Annotated[NamedValue, options.target("The wanted output, such as e_out=0.6 or beta=0.4.")],

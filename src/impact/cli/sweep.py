@@ -27,19 +27,13 @@ def sweep(
     threads: options.Threads = 1,
     scheduler: Annotated[
         str | None,
-        typer.Option(
-            "--scheduler",
-            metavar="ADDRESS",
-            help="Integrate on dask workers: tcp://host:8786, or local (127.0.0.1, ports without authentication).",
+        options.value(
+            "ADDRESS",
+            "Integrate on dask workers: tcp://host:8786, or local (127.0.0.1, ports without authentication).",
         ),
     ] = None,
-    scheduler_file: Annotated[
-        Path | None, typer.Option("--scheduler-file", metavar="FILE", help="The same, by the scheduler's file.")
-    ] = None,
-    shard: Annotated[
-        str | None,
-        typer.Option("--shard", metavar="K/N", help="Only part K of N; impact merge joins the parts."),
-    ] = None,
+    scheduler_file: Annotated[Path | None, options.value("FILE", "The same, by the scheduler's file.")] = None,
+    shard: Annotated[str | None, options.value("K/N", "Only part K of N; impact merge joins the parts.")] = None,
     max_points: options.MaxPoints = 10**9,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Only print the number of points and trajectories, bytes and time.")

@@ -20,24 +20,18 @@ def timestep(
     steps_per_contact: Annotated[
         list[float] | None,
         options.number(
-            "--steps-per-contact",
             "N",
             "Contact time of the continuous law over the time step; may be repeated. \\[default: 10, 20, 50, 100]",
         ),
     ] = None,
     dt: Annotated[
         list[str] | None,
-        typer.Option(
-            "--dt",
-            metavar="SECONDS",
-            help='A time step \\[s], or with a unit, such as "2 us"; may be repeated.',
-        ),
+        options.value("SECONDS", 'A time step \\[s], or with a unit, such as "2 us"; may be repeated.'),
     ] = None,
-    phases: Annotated[int, options.whole_number("--phases", help="Phases at which the contact begins.")] = 400,
+    phases: Annotated[int, options.whole_number("Phases at which the contact begins.")] = 400,
     tol: Annotated[
         float | None,
         options.number(
-            "--tol",
             "VALUE",
             "Find the number of steps per contact with which every phase is within this relative tolerance, "
             "such as 0.01 or 1%.",
@@ -46,13 +40,12 @@ def timestep(
     parameter: options.Parameter = None,
     scheme: Annotated[
         str | None,
-        typer.Option(
-            "--scheme",
-            metavar="NAME",
-            help="How a step is computed: kick-drift, drake-tamsi (also LAGGED and SIMILAR), drake-sap "
+        options.value(
+            "NAME",
+            "How a step is computed: kick-drift, drake-tamsi (also LAGGED and SIMILAR), drake-sap "
             "(where --for takes relaxation_time too) or pybullet. "
             "\\[default: drake-tamsi for laws of Drake, else kick-drift]",
-            autocompletion=complete_scheme,
+            complete_scheme,
         ),
     ] = None,
     friction: options.FrictionKey = None,
