@@ -27,7 +27,7 @@ LIBRARIES = {
     "typer": {"cli"}, "rich": {"display", "progress_display"}, "matplotlib": {"plots"},
     "pandas": {"display", "plots"}, "ipywidgets": {"plots"}, "jinja2": {"exporters", "reporting"},
     "markupsafe": {"reporting"},
-    "xarray": {"results", "comparison", "inverse", "uncertainty", "pytest_plugin"},
+    "xarray": {"results", "comparison", "inverse", "uncertainty", "plots", "reporting", "pytest_plugin"},
     "h5py": {"results"}, "h5netcdf": {"results"}, "tomllib": {"config"}, "pydantic": {"config", "results"},
     "pydantic_core": {"config"},
     "pint": {"config"}, "filelock": {"engine"}, "numba": {"contact"},

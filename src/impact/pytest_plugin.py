@@ -121,44 +121,33 @@ class ImpactRegression:
         import impact
 
         try:
-            verdict, failure = self._check(source, baseline, tol, subset, overrides, plugins, allow_failed)
+            path = self._path(
+                baseline if baseline is not None else f"baselines/{baseline_name(self.request.node)}"
+            )
+            reason = self.request.config.getoption("--impact-bless")
+            new = self._result_file(source, overrides, plugins)
+            if reason is not None:
+                return self._bless(new, path, reason, tol=tol, subset=subset, allow_failed=allow_failed)
+            if not path.exists():
+                path = self._baseline_with_old_name(path, is_default=baseline is None)
+            verdict = impact.compare(new, path, tol=tol, subset=subset)
         except impact.ImpactError as error:
-            verdict, failure = None, str(error)
-        if failure:
-            pytest.fail(failure, pytrace=False)
+            pytest.fail(str(error), pytrace=False)
+        if not verdict.equal:
+            hint = self._hint("why the numbers change")
+            pytest.fail(f"{verdict}\nnew result: {new}\nbaseline: {path}\n{hint}", pytrace=False)
         return verdict
 
-    def _check(
-        self,
-        source: str | Path | Mapping[str, object] | xr.Dataset,
-        baseline: str | Path | None,
-        tol: float | str | Tolerances | None,
-        subset: bool,
-        overrides: Sequence[str],
-        plugins: Sequence[ForceModel | str | Path],
-        allow_failed: bool,
-    ) -> tuple[Verdict | None, str]:
-        """The verdict, and why the test fails, or an empty text."""
-        import impact
-
-        path = self._path(baseline if baseline is not None else f"baselines/{baseline_name(self.request.node)}")
-        reason = self.request.config.getoption("--impact-bless")
-        new = self._result_file(source, overrides, plugins)
-        if reason is not None:
-            return self._bless(new, path, reason, tol=tol, subset=subset, allow_failed=allow_failed), ""
-        if not path.exists():
-            old = self._path(f"baselines/{_old_name(self.request.node)}")
-            if baseline is not None or not old.exists() or self._is_shared(old):
-                shared = f"; {old} may be that of another test" if baseline is None and old.exists() else ""
-                return None, f"{path}: no baseline{shared}\n{self._hint('first baseline')}"
-            command = shlex.join(["mv", str(old), str(path)])
-            self.request.node.user_properties.append((OLD_NAME, command))
-            path = old
-        verdict = impact.compare(new, path, tol=tol, subset=subset)
-        if verdict.equal:
-            return verdict, ""
-        hint = self._hint("why the numbers change")
-        return verdict, f"{verdict}\nnew result: {new}\nbaseline: {path}\n{hint}"
+    def _baseline_with_old_name(self, path: Path, *, is_default: bool) -> Path:
+        """Find the baseline of a test whose own does not exist under its old name, or fail the test."""
+        __tracebackhide__ = True
+        old = self._path(f"baselines/{_old_name(self.request.node)}")
+        if not is_default or not old.exists() or self._is_shared(old):
+            shared = f"; {old} may be that of another test" if is_default and old.exists() else ""
+            pytest.fail(f"{path}: no baseline{shared}\n{self._hint('first baseline')}", pytrace=False)
+        command = shlex.join(["mv", str(old), str(path)])
+        self.request.node.user_properties.append((OLD_NAME, command))
+        return old
 
     def _bless(
         self, new: Path, baseline: Path, reason: str, *, tol: Any, subset: bool, allow_failed: bool

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from ..array_types import Array
 from ..config.measurements import SIGMA
@@ -20,9 +21,6 @@ from .kinds import Choice, Kind
 from .labels import model_label
 from .slices import conditions_of
 from .style import is_geometric
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 # laws that are drawn unless the user names them
 MAX_LAWS = 5

@@ -6,10 +6,11 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
+import xarray as xr
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -25,9 +26,6 @@ from .kinds import Choice
 from .labels import LawPart, label_axis, pretty_conditions, symbol, words_of
 from .slices import unit_of
 from .style import FAINT, SOFT, is_geometric, law_key, model_styles, tint
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 # the colour of distances from zero, and its shares in those that are shaded, the widest first, and in lines
 BAND_COLOUR, BAND_SHARES, BAND_LINE_SHARE = "#0072B2", (0.08, 0.2), 0.65

@@ -7,6 +7,9 @@ from dataclasses import Field, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
+import pandas as pd
+import xarray as xr
+
 from ..config.columns import columns_of_table, complete_rows, near_miss, read_csv
 from ..config.measurements import MEASURED_OUTPUTS, SIGMA, SPECIMEN, derive_impacts, percent_problems
 from ..config.quantities import Quantity
@@ -18,8 +21,6 @@ from ..formatting import argument, heading, safe_text
 from ..results.schema import plain_unit
 
 if TYPE_CHECKING:
-    import pandas as pd
-    import xarray as xr
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure

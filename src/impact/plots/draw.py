@@ -6,9 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
+import xarray as xr
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -34,10 +35,6 @@ from .labels import (
 )
 from .layout import LEGEND_PART, Picture
 from .style import default_size, styled
-
-if TYPE_CHECKING:
-    import pandas as pd
-    import xarray as xr
 
 DEFAULT_LOOK = Look()
 

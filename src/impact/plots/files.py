@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
+
+import xarray as xr
 
 from ..atomic import check_outputs, write_file
 from ..contact.model import ForceModel
@@ -18,9 +20,6 @@ from .draw import draw, get_plot_data, label_keys
 from .kinds import Choice, Look, check_kind, default_kind, find_kind
 from .labels import check_labels
 from .style import check_picture, save_figure
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 Plugins = Sequence[ForceModel | str | Path]
 

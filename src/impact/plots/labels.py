@@ -6,9 +6,10 @@ import math
 import re
 from collections.abc import Collection, Iterator, Mapping
 from functools import cache, partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+import xarray as xr
 from matplotlib.axis import Axis
 from matplotlib.mathtext import MathTextParser
 from matplotlib.ticker import Formatter, FuncFormatter, LogLocator, MaxNLocator, NullFormatter
@@ -21,9 +22,6 @@ from ..errors import UsageError
 from ..formatting import NO_BREAK, argument, safe_text, scaled_unit, typographic, with_year
 from .slices import parameter_text, scalars_of, units_of
 from .style import WITH, law_key
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 GREEK = "alpha|beta|gamma|delta|epsilon|zeta|eta|theta|kappa|lambda|mu|nu|xi|rho|sigma|tau|phi|chi|psi|omega"
 # symbols of the paper for names that are words; v_post and abs_e_error are each a label of several variables

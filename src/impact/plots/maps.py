@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
+import xarray as xr
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.collections import QuadMesh
@@ -38,9 +39,6 @@ from .labels import (
 from .layout import Picture
 from .slices import choose_plane, conditions_of, not_a_sweep, read, take_plane, unit_of
 from .style import is_geometric, law_key, model_styles, tint
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 FloatArray = NDArray[np.float64]
 # a value at each y and x

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 
 from ..config.input_names import InputName
 from ..contact.models import catalogue
@@ -19,9 +19,6 @@ from .curves import Curve, CurveData, Mark, Panel, curve_of
 from .kinds import Choice, Kind
 from .labels import REFERENCE, friction_text, law_text, words_of
 from .slices import choose_line, described_inputs, parameter_text, unit_of
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 # a permanent indentation is marked above this fraction of the largest one
 MIN_MARKED_INDENTATION = 0.02

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 from numpy.typing import ArrayLike
 
 from ..array_types import Array
@@ -22,9 +22,6 @@ from .labels import LawPart, split_by_law
 from .motions import choose_point, curves_over
 from .restitution import complete, read_line
 from .slices import Line, numeric_axes
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 NEEDS_FRICTION = "this result has no friction; sweep a config with frictions = [...]"
 # pairs that are drawn where no friction law is chosen: more curves cannot be told apart

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 
 from ..contact.variables import OUTPUTS
 from ..errors import UsageError
@@ -15,9 +15,6 @@ from .curves import Curve, CurveData, Panel, curve_of, law_curve, x_axis_fields
 from .kinds import Choice, Kind
 from .labels import REFERENCE, LawPart, model_label, split_by_law
 from .slices import Line, choose_line, conditions_of, is_ordered, numeric_axes, read, take_line
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 FIGURE_6 = "Final velocities comparison"
 # distances from zero that are shaded, the widest first

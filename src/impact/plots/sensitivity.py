@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
+import xarray as xr
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -23,9 +23,6 @@ from .kinds import Choice, Kind
 from .labels import axis_text, model_label, number_axis, pretty_conditions, symbol
 from .slices import conditions_of
 from .style import tint
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 # bars of an input, and their colours
 BARS = {"first": "First-order index", "total": "Total index"}

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+import xarray as xr
 
 from ..config.grid import SAMPLE
 from ..config.input_names import InputName, is_input
@@ -17,10 +18,6 @@ from ..formatting import NO_BREAK, argument, prefixed, safe_text
 from ..results.schema import exponents_of, plain_unit
 from ..results.selection import select, select_laws
 from .kinds import Choice
-
-if TYPE_CHECKING:
-    import xarray as xr
-
 
 # values in a picture, which are held as Python objects
 MAX_DRAWN = 2**24

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 
 from ..config.grid import SAMPLE
 from ..contact.variables import OUTPUTS
@@ -18,9 +18,6 @@ from .curves import Curve, CurveData, Panel, curve_of, law_curve, x_axis_fields
 from .kinds import Choice, Kind
 from .labels import split_by_law
 from .slices import choose_line, conditions_of, numeric_axes, read, take_line
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 # ends of the band, and points of a distribution function that are drawn
 BAND, MAX_DRAWN_PROBABILITIES = (0.05, 0.95), 401

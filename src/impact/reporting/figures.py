@@ -9,9 +9,9 @@ import shlex
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from ..config.grid import SAMPLE
@@ -31,9 +31,6 @@ from ..results.replay_command import command_start
 from ..results.schema import columns_along
 from ..results.selection import law_positions
 from ..results.slabs import distinct_points, is_computed, slabs
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 # points that are searched for the first one with an answer, at which the figures are drawn
 MAX_SEARCHED = 2**18

@@ -10,9 +10,10 @@ import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 from markupsafe import Markup
 from numpy.typing import NDArray
 
@@ -35,9 +36,6 @@ from ..results.selection import law_positions
 from ..results.trajectory_table import TrajectoryTable, table_of_result
 from ..results.xarray_backend import open_result, result_of
 from .report import check_page_path, page_title, template
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 SHOWN = ("e_out", "e_error", "v1_post", "v2_post", "v1_error", "v2_error", "peak_force", "contact_time")
 # columns of a trajectory, in the contact's own units, by the names of the outputs that follow from them

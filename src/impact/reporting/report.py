@@ -10,10 +10,11 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from urllib.parse import quote
 
 import numpy as np
+import xarray as xr
 from jinja2 import Environment, FunctionLoader, StrictUndefined, Template
 from markupsafe import Markup
 from numpy.typing import NDArray
@@ -53,9 +54,6 @@ from ..results.slabs import MAX_SUMMARY_POINTS, is_large
 from ..results.summary import Summary, extremes_of, summarize
 from ..results.xarray_backend import result_of
 from .figures import Figure, at_text, coordinate_text, figures_of, numbered_unit
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 # the most that is shown: letters of a text and of a line of the config, values of an axis, failed points
 MAX_TEXT_LETTERS, MAX_LINE_LETTERS, MAX_VALUES, MAX_FAILED = 2000, 100_000, 8, 20
