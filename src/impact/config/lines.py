@@ -11,36 +11,23 @@ from pydantic import ValidationError
 from ..contact.model import ForceModel
 from ..errors import did_you_mean
 from ..formatting import safe_text
-from . import quantities
+from . import quantities, tables
 from .quantities import VALUE_FORMS, Column, ConfigProblem, KeyPath, as_text
-from .tables import (
-    MATERIAL_QUANTITIES,
-    MODELS_EXPECTED,
-    Data,
-    Design,
-    Document,
-    MaterialTable,
-    Output,
-    Solver,
-    Sweep,
-    law_quantities,
-    laws_of,
-)
 
 MAX_PROBLEM_LINES = 100
 EXPECTED_BY_KEY = {
     "sweep": "a table [sweep] of what to sweep: e or alpha, v1, m1, m2, material, ...",
-    "models": MODELS_EXPECTED,
-    **{name: f"{quantity.expected}: {quantity.meaning}" for name, quantity in MATERIAL_QUANTITIES.items()},
+    "models": tables.MODELS_EXPECTED,
+    **{name: f"{quantity.expected}: {quantity.meaning}" for name, quantity in tables.MATERIAL_QUANTITIES.items()},
     **{name: str(info.description) for name, info in Column.model_fields.items()},
-    "n": f"the number of {Design.model_fields['n'].description}, such as 1024",
+    "n": f"the number of {tables.Design.model_fields['n'].description}, such as 1024",
 }
 KEYS_BY_TABLE: Mapping[str, Iterable[str]] = {
-    "sweep": Sweep.model_fields,
-    "data": Data.model_fields,
-    "design": Design.model_fields,
-    "solver": vars(Solver()),
-    "output": vars(Output()),
+    "sweep": tables.Sweep.model_fields,
+    "data": tables.Data.model_fields,
+    "design": tables.Design.model_fields,
+    "solver": vars(tables.Solver()),
+    "output": vars(tables.Output()),
 }
 # other words that users may write for a key
 KEY_SYNONYMS = {
@@ -203,7 +190,7 @@ def validation_problems(error: ValidationError, models: Mapping[str, ForceModel]
 def _unknown_key_hint(location: KeyPath, models: Mapping[str, ForceModel]) -> str:
     """Suggest a known key for an unknown one; `location` is its path, with tags."""
     name = str(location[-1])
-    if len(location) == 1 and name in Sweep.model_fields:
+    if len(location) == 1 and name in tables.Sweep.model_fields:
         return "it belongs under [sweep]"
     keys: Iterable[str]
     match location[:-1]:
@@ -216,13 +203,13 @@ def _unknown_key_hint(location: KeyPath, models: Mapping[str, ForceModel]) -> st
         case (*_, quantities.COLUMN):
             keys = Column.model_fields
         case ():
-            keys = Document.model_fields
+            keys = tables.Document.model_fields
         case ("materials", _):
-            keys = MaterialTable.model_fields
+            keys = tables.MaterialTable.model_fields
         case ("model" | "friction" as table,):
-            keys = laws_of(table, models)
+            keys = tables.laws_of(table, models)
         case ("model" | "friction" as table, key):
-            keys = law_quantities(laws_of(table, models)[str(key)])
+            keys = tables.law_quantities(tables.laws_of(table, models)[str(key)])
         case (table, *_):
             keys = KEYS_BY_TABLE[str(table)]
     return did_you_mean(name, list(keys), KEY_SYNONYMS)

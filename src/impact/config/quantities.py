@@ -174,12 +174,17 @@ def known_name(description: str, choices_of: Callable[[ValidationInfo], Sequence
     return BeforeValidator(check)
 
 
-def simplify_schema(schema: dict[str, Any]) -> None:
-    """Remove null defaults, which TOML does not have, and all but the summary of the docstring."""
-    schema["description"] = schema.get("description", "").split("\n")[0]
-    for key_schema in schema.get("properties", {}).values():
-        if key_schema.get("default", 0) is None:
-            del key_schema["default"]
+def simplified(**more: object) -> Callable[[dict[str, Any]], None]:
+    """Build the change of a schema: no null defaults, which TOML does not have, a short description, and more."""
+
+    def simplify(schema: dict[str, Any]) -> None:
+        schema["description"] = schema.get("description", "").split("\n")[0]
+        for key_schema in schema.get("properties", {}).values():
+            if key_schema.get("default", 0) is None:
+                del key_schema["default"]
+        schema.update(more)
+
+    return simplify
 
 
 class Table(BaseModel):
@@ -192,7 +197,7 @@ class Table(BaseModel):
         protected_namespaces=(),
         # commands that read no config need no validators
         defer_build=True,
-        json_schema_extra=simplify_schema,
+        json_schema_extra=simplified(),
     )
 
 
@@ -232,15 +237,10 @@ class Column(Table):
     decimal: DecimalKey = Field(None, description="sign, where it is not recognised")
 
 
-def _one_form_schema(schema: dict[str, Any]) -> None:
-    simplify_schema(schema)
-    schema.update(minProperties=1, maxProperties=1)
-
-
 class _OneForm(Table):
     """A table that describes several numbers in one of several forms: exactly one of its fields is given."""
 
-    model_config = ConfigDict(json_schema_extra=_one_form_schema)
+    model_config = ConfigDict(json_schema_extra=simplified(minProperties=1, maxProperties=1))
     FORMS: ClassVar[Mapping[str, str]]
     EXPECTED: ClassVar[str]
 

@@ -55,7 +55,7 @@ from .quantities import (
     located_errors,
     mismatch_error,
     name_or_names,
-    simplify_schema,
+    simplified,
     value_error,
 )
 
@@ -233,7 +233,7 @@ OBLIQUE_DEFAULTS = {"omega1": 0.0, "omega2": 0.0, "inertia_factor1": 0.4, "inert
 LAW_STIFFNESS = Quantity("N/m^n", "stiffness of this law, in place of the sweep's", 0, above=True)
 
 
-@dataclass(frozen=True, config=ConfigDict(extra="forbid", json_schema_extra=simplify_schema))
+@dataclass(frozen=True, config=ConfigDict(extra="forbid", json_schema_extra=simplified()))
 class Solver:
     """How impacts are integrated."""
 
@@ -264,7 +264,7 @@ def _list_or_none(value: object) -> object:
     raise mismatch_error(value, "a list of names")
 
 
-@dataclass(frozen=True, config=ConfigDict(extra="forbid", json_schema_extra=simplify_schema))
+@dataclass(frozen=True, config=ConfigDict(extra="forbid", json_schema_extra=simplified()))
 class Output:
     """What of a result is stored, and how."""
 
@@ -328,16 +328,13 @@ SIGMA_EXPECTED = f"{_SIGMA_INTERVAL} in the unit of the output, or a list of one
 _Sigma: Any = Annotated[float, Field(ge=MIN_SIGMA, le=MAX_MEASURED)] | str
 
 
-def _data_schema(schema: dict[str, Any]) -> None:
-    """Require the measurements in a file or in the config."""
-    simplify_schema(schema)
-    schema["anyOf"] = [{"required": ["file"]}, {"required": ["columns"]}]
-
-
 class Data(Table):
     """Measurements, to which `impact calibrate` fits the parameters that have bounds."""
 
-    model_config = ConfigDict(json_schema_extra=_data_schema)
+    # the measurements are in a file or in the config
+    model_config = ConfigDict(
+        json_schema_extra=simplified(anyOf=[{"required": ["file"]}, {"required": ["columns"]}])
+    )
 
     file: Annotated[Any, ReadAs(str), expected("the name of a CSV file")] = Field(
         None, description="CSV file, whose columns are inputs and outputs with units, and standard deviations"
