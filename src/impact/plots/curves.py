@@ -21,9 +21,9 @@ from numpy.typing import ArrayLike
 from ..config.measurements import SIGMA
 from ..errors import UsageError
 from ..formatting import NO_BREAK, heading
-from .data import MEASURED, Points
+from .data import MEASURED, LegendEntries, Points
 from .kinds import Choice
-from .labels import LawPart, label_axis, pretty_conditions, symbol, words_of
+from .labels import LawPart, label_axis, pretty_conditions, symbol, words_of, write_beside
 from .slices import unit_of
 from .style import FAINT, SOFT, is_geometric, law_key, model_styles, tint
 
@@ -176,9 +176,7 @@ class CurveData:
         aspect = PANEL_ASPECT if count == 1 else STACKED_PANEL_ASPECT
         return list(all_axes.ravel()), sum(heights) * width * aspect + 0.3
 
-    def draw(
-        self, all_axes: Sequence[Axes], labels: Mapping[str, str], points: Points | None
-    ) -> list[tuple[Artist, str]]:
+    def draw(self, all_axes: Sequence[Axes], labels: Mapping[str, str], points: Points | None) -> LegendEntries:
         styles = model_styles([curve.law for panel in self.panels for curve in panel.curves if curve.law])
         entries: dict[str, Artist] = {}
         band: dict[str, Artist] = {}
@@ -310,17 +308,8 @@ def _label_guides(axes: Axes, guides: Sequence[Curve]) -> None:
     lowest = -math.inf
     for guide in sorted(guides, key=lambda curve: curve.y[-1]):
         lowest = max((guide.y[-1] - low) / (high - low), lowest + LABEL_DISTANCE)
-        axes.annotate(
-            pretty_conditions(guide.case.replace(" ", NO_BREAK)),
-            (1.0, lowest),
-            (4, 0),
-            xycoords="axes fraction",
-            textcoords="offset points",
-            va="center",
-            fontsize="small",
-            color=tint(SOFT),
-            annotation_clip=False,
-        )
+        text = pretty_conditions(guide.case.replace(" ", NO_BREAK))
+        write_beside(axes, text, lowest, 4, xycoords="axes fraction", fontsize="small")
 
 
 def _draw_bands(axes: Axes, panel: Panel) -> None:
@@ -340,35 +329,15 @@ def _label_bands(axes: Axes, panel: Panel) -> None:
     # narrower bands have their label below the line, except near the lower end, where only the space above is left
     for band in panel.bands if panel.y_log else ():
         is_below = band != panel.bands[0] and band > (low * high) ** 0.5
-        axes.annotate(
-            f"{band:g}",
-            (1, band),
-            (3, -1 if is_below else 1),
-            xycoords=("axes fraction", "data"),
-            textcoords="offset points",
-            ha="left",
-            va="top" if is_below else "bottom",
-            fontsize="x-small",
-            color=BAND_COLOUR,
-            annotation_clip=False,
-        )
+        alignment = "top" if is_below else "bottom"
+        write_beside(axes, f"{band:g}", band, 3, -1 if is_below else 1, va=alignment, color=BAND_COLOUR)
 
 
 def _label_floor(axes: Axes, panel: Panel) -> None:
     """Write beside the axis that values at the floor are that or less."""
     floor = panel.y_floor
     if floor is not None and any(y < floor for curve in panel.curves for y in curve.y):
-        axes.annotate(
-            f"≤ $10^{{{math.log10(floor):.0f}}}$",
-            (1, floor),
-            (3, 0),
-            xycoords=("axes fraction", "data"),
-            textcoords="offset points",
-            va="center",
-            fontsize="x-small",
-            color=tint(SOFT),
-            annotation_clip=False,
-        )
+        write_beside(axes, f"≤ $10^{{{math.log10(floor):.0f}}}$", floor, 3)
 
 
 def _label_axes(axes: Axes, panel: Panel, labels: Mapping[str, str], *, last: bool) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import Field, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, TypeAlias
 
 import pandas as pd
 import xarray as xr
@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+# handles and names of a legend
+LegendEntries: TypeAlias = "list[tuple[Artist, str]]"
 # forms of a table
 TABLE_FORMS = ("wide", "long")
 MEASURED = "Measured"
@@ -65,9 +67,7 @@ class PlotData(Protocol):
     def place_panels(self, figure: Figure, width: float) -> tuple[list[Axes], float]:
         """Add the axes of all panels to a figure; also returns the height of all panels [in]."""
 
-    def draw(
-        self, all_axes: Sequence[Axes], labels: Mapping[str, str], points: Points | None
-    ) -> list[tuple[Artist, str]]:
+    def draw(self, all_axes: Sequence[Axes], labels: Mapping[str, str], points: Points | None) -> LegendEntries:
         """Draw the panels, with labels that replace those of names; returns handles and names of the legend."""
 
 

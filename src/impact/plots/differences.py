@@ -16,10 +16,10 @@ from ..comparison.verdict import Verdict
 from ..errors import UsageError
 from ..formatting import number, safe_text
 from ..results.schema import SCHEMA
-from .labels import axis_text, escape_mathtext, number_axis, words_of
+from .labels import axis_text, escape_mathtext, number_axis, words_of, write_beside
 from .layout import Picture
 from .slices import unit_of
-from .style import COLOURS, MARKERS, SOFT, default_size, is_geometric, styled, tint
+from .style import COLOURS, MARKERS, default_size, is_geometric, styled, tint
 
 # height of a row of panels [in]
 PANEL_HEIGHT = 2.3
@@ -99,7 +99,11 @@ def draw_differences(plot_data: DifferenceData) -> Figure:
         figure = Picture(width, escape_mathtext(plot_data.title))
         grid = figure.add_gridspec(len(rows), 2)
         names = list(dict.fromkeys(name for panel in plot_data.panels for name in panel.ratios))
-        ends = _y_limits(plot_data.panels)
+        # of the vertical axes, with the tolerance and the band for differences without a number
+        ratios = [
+            r for panel in plot_data.panels for row in panel.ratios.values() for r in row if 0.0 < r < np.inf
+        ]
+        ends = max(MIN_DRAWN_RATIO, min([0.1, *ratios]) / 2.0), 2.0 * NO_NUMBER_BAND * max([1.0, *ratios])
         entries: dict[str, Artist] = {}
         for row, panels in enumerate(rows):
             for column, panel in enumerate(panels):
@@ -136,12 +140,6 @@ def _arrange_panels(panels: Sequence[DifferencePanel]) -> list[tuple[DifferenceP
         else:
             rows.append((panel,))
     return rows
-
-
-def _y_limits(panels: Sequence[DifferencePanel]) -> tuple[float, float]:
-    """The limits of the vertical axis, with the tolerance and the band for differences without a number."""
-    ratios = [r for panel in panels for row in panel.ratios.values() for r in row if 0.0 < r < np.inf]
-    return max(MIN_DRAWN_RATIO, min([0.1, *ratios]) / 2.0), 2.0 * NO_NUMBER_BAND * max([1.0, *ratios])
 
 
 def _draw_panel(
@@ -195,17 +193,7 @@ def _draw_panel(
 
 def _draw_limit(axes: Axes, height: float, name: str, **style: Any) -> None:
     axes.axhline(height, color=tint(1.0), **style)
-    axes.annotate(
-        name,
-        (1.0, height),
-        (-2, -3),
-        xycoords=("axes fraction", "data"),
-        textcoords="offset points",
-        ha="right",
-        va="top",
-        fontsize="x-small",
-        color=tint(SOFT),
-    )
+    write_beside(axes, name, height, -2, -3, ha="right", va="top")
 
 
 def _label_ticks(axes: Axes, panel: DifferencePanel, x: np.ndarray) -> None:

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import xarray as xr
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -22,7 +21,7 @@ from ..errors import UsageError
 from ..results.single_impact import Impact, histories
 from ..results.xarray_backend import result_of
 from .curves import CurveData
-from .data import PlotData, Points, read_points
+from .data import LegendEntries, PlotData, Points, read_points
 from .kinds import DEFAULT_LEGENDS, STUDIES, Choice, Look, default_kind, find_kind
 from .labels import (
     check_labels,
@@ -230,7 +229,7 @@ def _new_picture(
 
 def _draw_panels(
     plot_data: PlotData, all_axes: Sequence[Axes], labels: Mapping[str, str], measured: Points | None, look: Look
-) -> list[tuple[Artist, str]]:
+) -> LegendEntries:
     """Draw the panels, with the decimal separator of the look; returns handles and names of the legend."""
     entries = plot_data.draw(all_axes, labels, measured)
     if look.decimal == "point":

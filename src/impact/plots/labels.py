@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
+from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.mathtext import MathTextParser
 from matplotlib.ticker import Formatter, FuncFormatter, LogLocator, MaxNLocator, NullFormatter
@@ -21,7 +22,7 @@ from ..contact.variables import HISTORY, OUTPUTS
 from ..errors import UsageError
 from ..formatting import NO_BREAK, argument, safe_text, scaled_unit, typographic, with_year
 from .slices import parameter_text, scalars_of, units_of
-from .style import WITH, law_key
+from .style import SOFT, WITH, law_key, tint
 
 GREEK = "alpha|beta|gamma|delta|epsilon|zeta|eta|theta|kappa|lambda|mu|nu|xi|rho|sigma|tau|phi|chi|psi|omega"
 # symbols of the paper for names that are words; v_post and abs_e_error are each a label of several variables
@@ -236,6 +237,12 @@ def friction_text(key: str, inputs: Mapping[str, object], units: Mapping[str, st
         if value not in (None, default):
             chosen[name] = value
     return ", ".join(filter(None, (law.title, parameter_text(f"friction.{key}", chosen, units))))
+
+
+def write_beside(axes: Axes, text: str, height: float, right: float, up: float = 0.0, **style: Any) -> None:
+    """Write a text at the right end of the axes, at a height in data, moved by points to the right and up."""
+    place = {"xycoords": ("axes fraction", "data"), "va": "center", "fontsize": "x-small", "color": tint(SOFT)}
+    axes.annotate(text, (1.0, height), (right, up), textcoords="offset points", **(place | style))
 
 
 def label_axis(

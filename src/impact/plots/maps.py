@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from ..errors import UsageError, did_you_mean
 from ..formatting import argument, heading, percentage, safe_text
 from ..results.ranking import error_floor
-from .data import Points
+from .data import LegendEntries, Points
 from .kinds import Choice, Kind
 from .labels import (
     REFERENCE,
@@ -167,8 +167,10 @@ class MapData:
 
     def place_panels(self, figure: Figure, width: float) -> tuple[list[Axes], float]:
         """Place panels in rows; only the left and lower axes have tick labels."""
-        count, columns = self.panel_count, panels_per_row(self, width)
-        rows = -(-count // columns)
+        count = self.panel_count
+        rows = -(-count // max(1, int(width / (MIN_CLOSEST_PANEL_WIDTH if self.closest else MIN_PANEL_WIDTH))))
+        # the rows have nearly equal numbers of panels
+        columns = -(-count // rows)
         grid = figure.subplots(rows, columns, squeeze=False)
         for index, axes in enumerate(grid.ravel()):
             axes.tick_params(labelleft=index % columns == 0, labelbottom=index + columns >= count)
@@ -177,9 +179,7 @@ class MapData:
         height = min(max(0.9 * (width - MARGIN_WIDTH) / columns, MIN_ROW_HEIGHT), MAX_ROW_HEIGHT)
         return list(grid.ravel()[:count]), rows * (height + 0.25) + 0.3
 
-    def draw(
-        self, all_axes: Sequence[Axes], labels: Mapping[str, str], points: Points | None
-    ) -> list[tuple[Artist, str]]:
+    def draw(self, all_axes: Sequence[Axes], labels: Mapping[str, str], points: Points | None) -> LegendEntries:
         x, y = edges_of(self.x_values, self.x_log), edges_of(self.y_values, self.y_log)
         draw_panels = _draw_closest if self.closest else _draw_fields
         mesh, entries = draw_panels(self, all_axes, x, y, labels)
@@ -316,15 +316,9 @@ def edges_of(values: Sequence[float], log: bool) -> FloatArray:
     return np.asarray(np.exp(edges) if log else edges)
 
 
-def panels_per_row(plot_data: MapData, width: float) -> int:
-    """Count the panels in each row of a figure of a width [in]; the rows have nearly equal numbers."""
-    fit = max(1, int(width / (MIN_CLOSEST_PANEL_WIDTH if plot_data.closest else MIN_PANEL_WIDTH)))
-    return -(-plot_data.panel_count // -(-plot_data.panel_count // fit))
-
-
 def _draw_fields(
     plot_data: MapData, axes: Sequence[Axes], x: FloatArray, y: FloatArray, labels: Mapping[str, str]
-) -> tuple[QuadMesh, list[tuple[Artist, str]]]:
+) -> tuple[QuadMesh, LegendEntries]:
     """Draw the panels of a map; returns what the colour bar shows, and handles and names of the legend."""
     values = np.ma.masked_invalid([panel.values for panel in plot_data.panels])
     low, top = float(values.min()), float(values.max())
@@ -336,7 +330,7 @@ def _draw_fields(
 
 def _draw_closest(
     plot_data: MapData, axes: Sequence[Axes], x: FloatArray, y: FloatArray, labels: Mapping[str, str]
-) -> tuple[QuadMesh, list[tuple[Artist, str]]]:
+) -> tuple[QuadMesh, LegendEntries]:
     """Draw the two panels of the closest model; returns the same."""
     names = {
         panel.model: labels.get(panel.model or "", pretty_conditions(panel.label)) for panel in plot_data.panels
@@ -345,7 +339,7 @@ def _draw_closest(
         [panel.model for panel in plot_data.panels if panel.model in plot_data.shares and panel.model]
     )
     closest = np.array(plot_data.closest, object)
-    entries: list[tuple[Artist, str]] = []
+    entries: LegendEntries = []
     for key, share in plot_data.shares.items():
         style, name = (_tied(), f"{SEVERAL}, equally close") if key else (_failed(), NO_VALUE)
         if key in styles:
@@ -367,7 +361,7 @@ def _draw_values(
     values: Any,
     norm: Normalize,
     colours: str,
-) -> tuple[QuadMesh, list[tuple[Artist, str]]]:
+) -> tuple[QuadMesh, LegendEntries]:
     """Draw values, of shape (axes, y, x), as colours with contour lines; returns the same."""
     name = symbol("abs_e_error" if plot_data.closest else "e_error") + (" = " if plot_data.closest else " = ±")
     entries: dict[float, tuple[Artist, str]] = {}

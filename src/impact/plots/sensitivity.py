@@ -18,7 +18,7 @@ from ..formatting import argument, heading
 from ..results.kinds import kind_of
 from ..results.selection import select, select_laws
 from ..results.sensitivity import distribution_texts
-from .data import Points
+from .data import LegendEntries, Points
 from .kinds import Choice, Kind
 from .labels import axis_text, model_label, number_axis, pretty_conditions, symbol
 from .slices import conditions_of
@@ -96,9 +96,7 @@ class BarData:
         all_axes = figure.subplots(self.panel_count, sharex=True, squeeze=False)
         return list(all_axes.ravel()), self.panel_count * (PANEL_INCHES + INPUT_INCHES * len(self.inputs)) + 0.3
 
-    def draw(
-        self, all_axes: Sequence[Axes], labels: Mapping[str, str], points: Points | None
-    ) -> list[tuple[Artist, str]]:
+    def draw(self, all_axes: Sequence[Axes], labels: Mapping[str, str], points: Points | None) -> LegendEntries:
         entries: dict[str, Artist] = {}
         positions = np.arange(len(self.inputs))[::-1]
         for axes, panel in zip(all_axes, self.panels, strict=True):
