@@ -9,6 +9,7 @@ import shlex
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 import xarray as xr
@@ -39,6 +40,8 @@ MAX_SEARCHED = 2**18
 MAX_COMPARED, MAX_VALUES, MAX_MORE = 48, 6, 12
 # of the largest number: what is hardly visible
 MAX_DIFFERENCE = 1e-3
+# an index of some axes
+Position: TypeAlias = Mapping[Hashable, int]
 
 
 @dataclass(frozen=True)
@@ -53,23 +56,62 @@ class Figure:
     command: str
 
 
+class Planned(NamedTuple):
+    """A figure to draw: its kind, what it shows, and an index for each axis that it does not draw."""
+
+    kind: Kind
+    choice: Choice
+    position: Position
+
+
 @dataclass(frozen=True)
-class _Drawing:
-    """What a figure is drawn from."""
+class Drawing:
+    """A result, or some of its models, whose figures are drawn."""
 
     dataset: xr.Dataset
     keys: Sequence[str]
     plugins: Sequence[ForceModel | str | Path]
-    name: str
+    name: str  # of its file
     model_count: int  # of the result in the file
 
+    def figures(self) -> tuple[list[Figure], list[str]]:
+        """Draw all figures; also returns a sentence for each that is left out."""
+        figures, left_out = list[Figure](), list[str]()
+        plans = list(iterate_choices(self.dataset, self.keys))
+        # numbered as they stand on the page: those of friction have a section of their own
+        for of_friction in (False, True):
+            others: list[tuple[int, Planned, Position, PlotData | None]] = []
+            for planned in plans:
+                kind, choice, position = planned
+                if kind.of_friction != of_friction:
+                    continue
+                number = len(figures) + 1
+                try:
+                    plot_data = get_plot_data(self.dataset, kind.name, choice, self.plugins)
+                    comparison, drawn_too = _compare_values(self, planned)
+                    conditions = _condition_sentences(self.dataset, position, self.keys)
+                    sentences = [kind.caption, *conditions, *comparison]
+                    sentences += [f"Not drawn: {'; '.join(plot_data.not_drawn)}."] if plot_data.not_drawn else []
+                    figures.append(self.figure(number, planned, " ".join(sentences), plot_data, is_first=True))
+                except ImpactError as error:
+                    left_out.append(f"The figure {kind.name} is left out: {'; '.join(error.problems)}")
+                    continue
+                others += [(number, self.moved(planned, index), index, known) for index, known in drawn_too]
+            for first, planned, index, known in others:
+                more = known or self.plot_data(planned)
+                if more is not None:
+                    caption = f"As Figure {first}, at {_changes_text(self.dataset, index)}."
+                    figures.append(self.figure(len(figures) + 1, planned, caption, more))
+        return figures, left_out
+
     def figure(
-        self, number: int, kind: Kind, choice: Choice, caption: str, plot_data: PlotData, *, is_first: bool = False
+        self, number: int, planned: Planned, caption: str, plot_data: PlotData, *, is_first: bool = False
     ) -> Figure:
         """Draw a figure; title and conditions are in the caption, and the legend beside the first of a kind.
 
         It is narrow, so that its text is legible on a phone.
         """
+        kind = planned.kind
         # the legend of the closest model depends on the values
         legend = None if is_first or "y" in kind.along else "none"
         picture = draw(plot_data, Look(width="single", title=False, legend=legend))
@@ -77,12 +119,13 @@ class _Drawing:
         for background in (picture.patch, *(axes.patch for axes in picture.axes)):
             background.set_visible(False)
         source = f"data:image/svg+xml;base64,{base64.b64encode(encoded(picture, 'svg')).decode()}"
-        command = self.command(number, kind, choice, legend)
+        command = self.command(number, planned, legend)
         label = kind.caption if is_first else caption
         return Figure(label, f"Figure {number}. {caption}", source, kind.of_friction, is_first, command)
 
-    def command(self, number: int, kind: Kind, choice: Choice, legend: str | None) -> str:
+    def command(self, number: int, planned: Planned, legend: str | None) -> str:
         """Write the command that draws a figure; empty if a model is a Python value."""
+        kind, choice, _ = planned
         options = {"x": choice.x, "y": choice.y, "variable": choice.variable}
         words = [f"--{name}={value}" for name, value in options.items() if value is not None]
         words += [
@@ -97,14 +140,14 @@ class _Drawing:
         start = command_start(self.name or "RESULT.h5", self.dataset, "plot")
         return shlex.join([*start, f"--kind={kind.name}", *words]) if start else ""
 
-    def plot_data(self, kind: Kind, choice: Choice) -> PlotData | None:
+    def plot_data(self, planned: Planned) -> PlotData | None:
         """Read the data of a figure; None where it has no values."""
         try:
-            return get_plot_data(self.dataset, kind.name, choice, self.plugins)
+            return get_plot_data(self.dataset, planned.kind.name, planned.choice, self.plugins)
         except ImpactError:
             return None
 
-    def has_answer(self, position: Mapping[Hashable, int]) -> bool:
+    def has_answer(self, position: Position) -> bool:
         """Whether a model has an answer for an impact at some values of axes."""
         if "status" not in self.dataset:
             return True
@@ -112,116 +155,64 @@ class _Drawing:
         values = status.isel({dim: place for dim, place in position.items() if dim in status.dims}).values
         return bool(((values < FIRST_FAILURE) & (values != NO_IMPACT)).any())
 
-    def choice_at(self, kind: Kind, choice: Choice, position: Mapping[Hashable, int]) -> Choice:
-        """Choose the same figure at other values of axes: labels of axes, or the inputs of a motion."""
+    def moved(self, planned: Planned, index: Position) -> Planned:
+        """Plan the same figure at other values of some axes: labels of axes, or the inputs of a motion."""
+        kind, choice, position = planned
+        position = {**position, **index}
         if kind.source == "history":
-            return replace(choice, sel=_inputs_at(self.dataset, position))
-        sel = {str(dim): self.dataset[dim].values[index].item() for dim, index in position.items()}
-        return replace(choice, sel={**(choice.sel or {}), **sel})
+            return Planned(kind, replace(choice, sel=_inputs_at(self.dataset, position)), position)
+        sel = {str(dim): self.dataset[dim].values[place].item() for dim, place in position.items()}
+        return Planned(kind, replace(choice, sel={**(choice.sel or {}), **sel}), position)
 
 
-def figures_of(
-    dataset: xr.Dataset,
-    keys: Sequence[str],
-    plugins: Sequence[ForceModel | str | Path],
-    name: str,
-    model_count: int,
-) -> tuple[list[Figure], list[str]]:
-    """Draw the figures of a result, or of some models of its `model_count`, whose file has a name.
+def _compare_values(
+    drawing: Drawing, planned: Planned
+) -> tuple[list[str], list[tuple[Position, PlotData | None]]]:
+    """Compare the numbers of a figure at the values of all other axes, at most MAX_COMPARED combinations.
 
-    Also returns a sentence for each that is left out.
+    Returns sentences, and what is drawn too: the indices of the axes that differ, and the data if they are known.
+    Motions are integrated for it: they are compared at the first and the last value of each axis alone.
     """
-    drawing, figures, left_out = _Drawing(dataset, keys, plugins, name, model_count), list[Figure](), list[str]()
-    choices = list(iterate_choices(dataset, keys))
-    # numbered as they stand on the page: those of friction have a section of their own
-    for of_friction in (False, True):
-        others: list[tuple[int, Kind, Choice, Mapping[Hashable, int], PlotData | None]] = []
-        for kind, choice, position in choices:
-            if kind.of_friction != of_friction:
-                continue
-            place_on_page = len(figures) + 1
-            try:
-                plot_data = get_plot_data(dataset, kind.name, choice, plugins)
-                other_values = _OtherValues.of(drawing, kind, choice, position)
-                sentences = [kind.caption, *_condition_sentences(dataset, position, keys), *other_values.sentences]
-                sentences += [f"Not drawn: {'; '.join(plot_data.not_drawn)}."] if plot_data.not_drawn else []
-                caption = " ".join(sentences)
-                figures.append(drawing.figure(place_on_page, kind, choice, caption, plot_data, is_first=True))
-            except ImpactError as error:
-                left_out.append(f"The figure {kind.name} is left out: {'; '.join(error.problems)}")
-                continue
-            others += [
-                (place_on_page, kind, drawing.choice_at(kind, choice, {**position, **index}), index, known)
-                for index, known in other_values.drawn
-            ]
-        for first, kind, choice, index, known in others:
-            more = known or drawing.plot_data(kind, choice)
-            if more is not None:
-                caption = f"As Figure {first}, at {_changes_text(dataset, index)}."
-                figures.append(drawing.figure(len(figures) + 1, kind, choice, caption, more))
-    return figures, left_out
+    sizes, position = drawing.dataset.sizes, planned.position
+    dims = [dim for dim in position if sizes[dim] > 1]
+    if planned.kind.source == "history":
+        one_each = [{dim: place} for dim in dims for place in (0, sizes[dim] - 1)]
+        compared = [{dim: position[dim] for dim in dims}, *({**position, **index} for index in one_each)]
+    else:
+        count = {dim: sizes[dim] for dim in dims}
+        while math.prod(count.values()) > MAX_COMPARED:
+            count[max(count, key=lambda dim: count[dim])] -= 1
+        places = itertools.product(*(_spread(sizes[dim], count[dim], position[dim]) for dim in dims))
+        compared = [dict(zip(dims, place, strict=True)) for place in places]
+    known = {
+        tuple(index[dim] for dim in dims): drawing.plot_data(drawing.moved(planned, index)) for index in compared
+    }
+    tables = {index: _numbers(data) for index, data in known.items()}
+    differ = []
+    for axis, dim in enumerate(dims):
+        base = position[dim]
+        pairs = ((table, tables[*index[:axis], base, *index[axis + 1 :]]) for index, table in tables.items())
+        if not all(_are_equal(*pair) for pair in pairs):
+            differ.append(dim)
+    drawn = _drawn_too(drawing, planned, differ)
+    sentences = _comparison_sentences(sizes, dims, differ, drawn, len(tables))
+    return sentences, [(index, known.get(tuple({**position, **index}[dim] for dim in dims))) for index in drawn]
 
 
-@dataclass(frozen=True)
-class _OtherValues:
-    """What a figure is at other values of the axes that it does not draw: sentences, and those to draw too."""
-
-    sentences: list[str]
-    drawn: list[tuple[Mapping[Hashable, int], PlotData | None]]  # indices of the axes that differ, and known data
-
-    @classmethod
-    def of(cls, drawing: _Drawing, kind: Kind, choice: Choice, position: Mapping[Hashable, int]) -> _OtherValues:
-        """Compare the numbers of a figure at the values of all other axes, at most MAX_COMPARED combinations.
-
-        Motions are integrated for it: they are compared at the first and the last value of each axis alone.
-        """
-        sizes = drawing.dataset.sizes
-        dims = [dim for dim in position if sizes[dim] > 1]
-        if kind.source == "history":
-            one_each = [{dim: place} for dim in dims for place in (0, sizes[dim] - 1)]
-            compared = [{dim: position[dim] for dim in dims}, *({**position, **index} for index in one_each)]
-        else:
-            count = {dim: sizes[dim] for dim in dims}
-            while math.prod(count.values()) > MAX_COMPARED:
-                count[max(count, key=lambda dim: count[dim])] -= 1
-            places = itertools.product(*(_spread(sizes[dim], count[dim], position[dim]) for dim in dims))
-            compared = [dict(zip(dims, place, strict=True)) for place in places]
-        known = {
-            tuple(index[dim] for dim in dims): drawing.plot_data(
-                kind, drawing.choice_at(kind, choice, {**position, **index})
-            )
-            for index in compared
-        }
-        tables = {index: _numbers(data) for index, data in known.items()}
-        differ = []
-        for axis, dim in enumerate(dims):
-            base = position[dim]
-            pairs = ((table, tables[*index[:axis], base, *index[axis + 1 :]]) for index, table in tables.items())
-            if not all(_are_equal(*pair) for pair in pairs):
-                differ.append(dim)
-        sentences, drawn = _described(drawing, kind, dims, differ, len(tables), position)
-        drawn_places = [tuple({**position, **index}[dim] for dim in dims) for index in drawn]
-        return cls(
-            sentences, [(index, known.get(place)) for index, place in zip(drawn, drawn_places, strict=True)]
-        )
-
-
-def _described(
-    drawing: _Drawing,
-    kind: Kind,
+def _comparison_sentences(
+    sizes: Mapping[Hashable, int],
     dims: Sequence[Hashable],
     differ: Sequence[Hashable],
+    drawn: Sequence[Position],
     compared_count: int,
-    position: Mapping[Hashable, int],
-) -> tuple[list[str], list[Mapping[Hashable, int]]]:
-    """Describe which axes do not matter and what is not drawn; choose the values that are drawn too."""
-    equal, sentences, sizes = [dim for dim in dims if dim not in differ], [], drawing.dataset.sizes
+) -> list[str]:
+    """Describe which axes do not matter, and how many values and combinations are not drawn."""
+    equal, sentences = [dim for dim in dims if dim not in differ], []
     if equal:
         combinations = math.prod(sizes[dim] for dim in dims)
         among = f" of {compared_count:,} of {combinations:,} combinations" if compared_count < combinations else ""
         verb = "do" if len(equal) > 1 else "does"
         sentences.append(f"{_and(equal)} {verb} not matter (differences{among} below {MAX_DIFFERENCE:.1%}).")
-    drawn = _drawn_too(drawing, kind, differ, position)
     combinations = math.prod(sizes[dim] for dim in differ) - 1 - len(drawn)
     parts = []
     for dim in differ:
@@ -230,16 +221,15 @@ def _described(
         parts += [f"{left:,} value{'s' * (left > 1)} of {dim}"] if left else []
     parts += [f"{combinations:,} combination{'s' * (combinations > 1)} of {_and(differ)}"] if combinations else []
     sentences += [f"Not drawn: {_and(parts)}."] if parts else []
-    return sentences, drawn
+    return sentences
 
 
-def _drawn_too(
-    drawing: _Drawing, kind: Kind, differ: Sequence[Hashable], position: Mapping[Hashable, int]
-) -> list[Mapping[Hashable, int]]:
+def _drawn_too(drawing: Drawing, planned: Planned, differ: Sequence[Hashable]) -> list[Position]:
     """Choose the indices at which a figure is drawn too: all combinations if few, else along one axis at a time.
 
     A motion is drawn at the ends of each axis, where it is compared. Samples are not drawn one by one.
     """
+    kind, _, position = planned
     sizes, dims = drawing.dataset.sizes, [dim for dim in differ if dim != SAMPLE]
     count = 2 if kind.source == "history" else MAX_VALUES
     if kind.source != "history" and math.prod(sizes[dim] for dim in dims) - 1 <= MAX_MORE:
@@ -289,9 +279,7 @@ def _are_equal(
     return bool(np.all((np.abs(a - b) <= most) | (a == b) | (np.isnan(a) & np.isnan(b))))
 
 
-def _condition_sentences(
-    dataset: xr.Dataset, position: Mapping[Hashable, int], keys: Sequence[str]
-) -> Iterator[str]:
+def _condition_sentences(dataset: xr.Dataset, position: Position, keys: Sequence[str]) -> Iterator[str]:
     """Write the inputs that vary in the sweep and not in the figure: for all models, and for each model."""
     point, inputs = dataset.isel(position), varying_inputs(dataset)
     for key in ("", *keys):
@@ -300,7 +288,7 @@ def _condition_sentences(
             yield f"{'With' if key else 'At'} {values}."
 
 
-def _changes_text(dataset: xr.Dataset, index: Mapping[Hashable, int]) -> str:
+def _changes_text(dataset: xr.Dataset, index: Position) -> str:
     """Write the inputs along some axes at their indices."""
     inputs = varying_inputs(dataset)
     along = {dim: [name for name in inputs if dataset[name].dims == (dim,)] for dim in index}
@@ -313,20 +301,15 @@ def at_text(point: xr.Dataset, names: Sequence[str]) -> str:
     return ", ".join(value.replace(" ", "\u00a0") for value in values)
 
 
-def iterate_choices(
-    dataset: xr.Dataset, keys: Sequence[str]
-) -> Iterator[tuple[Kind, Choice, dict[Hashable, int]]]:
-    """Choose the figures of a result: their kinds, what each shows, and an index for each axis it does not draw.
-
-    A motion comes last, at the middle of the axis of other figures.
-    """
+def iterate_choices(dataset: xr.Dataset, keys: Sequence[str]) -> Iterator[Planned]:
+    """Choose the figures of a result; a motion comes last, at the middle of the axis of other figures."""
     axes = numeric_axes(dataset)
     for kind in sorted(kinds_of(dataset), key=lambda kind: kind.source == "history"):
         choice = kind.default(dataset, keys) if kind.in_report else None
         if choice is None:
             continue
         if kind.source in STUDIES:
-            yield kind, choice, {}
+            yield Planned(kind, choice, {})
             continue
         is_motion = kind.source == "history"
         inputs = [choice.x] if is_motion else kind.inputs_along(choice.x, choice.y)
@@ -334,15 +317,15 @@ def iterate_choices(
         position = _first_answered_index(dataset, keys, [*dims, *({SAMPLE} & {*kind.along})])
         if not is_motion:
             sel = {str(dim): dataset[dim].values[index].item() for dim, index in position.items()}
-            yield kind, replace(choice, sel=sel), position
+            yield Planned(kind, replace(choice, sel=sel), position)
             continue
         if choice.x:
             values = axes[choice.x].values
             position[dims[0]] = int(np.argsort(values, kind="stable")[values.size // 2])
-        yield kind, replace(choice, x=None, sel=_inputs_at(dataset, position)), position
+        yield Planned(kind, replace(choice, x=None, sel=_inputs_at(dataset, position)), position)
 
 
-def _inputs_at(dataset: xr.Dataset, position: Mapping[Hashable, int]) -> dict[str, float | str]:
+def _inputs_at(dataset: xr.Dataset, position: Position) -> dict[str, float | str]:
     """Find the inputs that select a point: the label of an axis, or all columns of an axis of cases or samples."""
     names = {dim: [str(dim)] if is_input(dim) else columns_along(dataset, dim) for dim in position}
     inputs = {name: dataset[name].values[position[dim]].item() for dim in names for name in names[dim]}

@@ -35,13 +35,7 @@ from ..formatting import argument, number, prefixed, safe_text, scaled_unit, wit
 from ..plots.slices import varying_inputs
 from ..results.attributes import read_attribute
 from ..results.board import BOARD_HEADINGS, Board, board_rows, check_rows, engine_headline, failure_lines
-from ..results.calibration import (
-    FIT_HEADINGS,
-    calibration_title,
-    describe_data,
-    fit_notes,
-    fit_rows,
-)
+from ..results.calibration import FIT_HEADINGS, calibration_title, describe_data, fit_notes, fit_rows
 from ..results.kinds import kind_of
 from ..results.plausibility import input_notes, inputs_of, result_notes, with_depths
 from ..results.provenance import stored_config
@@ -53,7 +47,7 @@ from ..results.sensitivity import INDEX_HEADINGS, describe_design, describe_stud
 from ..results.slabs import MAX_SUMMARY_POINTS, is_large
 from ..results.summary import Summary, extremes_of, summarize
 from ..results.xarray_backend import result_of
-from .figures import Figure, at_text, coordinate_text, figures_of, numbered_unit
+from .figures import Drawing, Figure, at_text, coordinate_text, numbered_unit
 
 # the most that is shown: letters of a text and of a line of the config, values of an axis, failed points
 MAX_TEXT_LETTERS, MAX_LINE_LETTERS, MAX_VALUES, MAX_FAILED = 2000, 100_000, 8, 20
@@ -151,7 +145,7 @@ def _report_of(
     drawn, left_out = list[Figure](), list[str]()
     if {"figures", "friction", "commands"} & {*sections}:
         name = Path(str(dataset.encoding.get("source", ""))).name
-        drawn, left_out = figures_of(dataset, keys, plugins, name, model_count)
+        drawn, left_out = Drawing(dataset, keys, plugins, name, model_count).figures()
     descriptions = [_model_section(dataset.isel(model=index)) for index in range(dataset.sizes["model"])]
     inputs, changes = inputs_of(dataset), read_attribute(dataset.attrs, "config_set")
     lines = str(dataset.attrs.get("config", "")).replace("\r\n", "\n").expandtabs(4).split("\n")
