@@ -44,7 +44,7 @@ CLI_IMPORTS = {
     # the executors, which have no public function
     "execution": {"engine", "results.sweep"},
     # a value in TOML
-    "parsing": {"config.files"},
+    "options": {"config.files"},
     "plot": {"plots.kinds"},
     # a history as CSV
     "run": {"plots.data"},

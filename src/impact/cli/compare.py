@@ -133,7 +133,6 @@ def _check_plot(plot: Path | None, *sources: Path) -> None:
 
 def _report_verdict(verdict: Verdict, format: Format, plot: Path | None) -> None:
     """Print a verdict, draw it, and exit with its code."""
-
     with exits.ignore_broken_pipe():
         if format is Format.table:
             show(verdict)

@@ -25,11 +25,12 @@ def complete_friction(incomplete: str) -> list[str]:
     return _beginning_with(incomplete, impact.frictions())
 
 
-def complete_key_of(module: str, table: str) -> Callable[[str], list[str]]:
+def complete_key_of(module: str, table: str, ending: str = "") -> Callable[[str], list[str]]:
     """Make the completion of the keys of a table, whose module is imported when a key is completed."""
 
     def complete(incomplete: str) -> list[str]:
-        return _beginning_with(incomplete, getattr(import_module(f"impact.{module}"), table))
+        keys = getattr(import_module(f"impact.{module}"), table)
+        return [f"{key}{ending}" for key in _beginning_with(incomplete, keys)]
 
     return complete
 
@@ -40,6 +41,7 @@ complete_code = complete_key_of("exporters.registry", "CODES")
 complete_scheme = complete_key_of("contact.fixed_step", "SCHEMES")
 complete_kind = complete_key_of("plots.kinds", "KINDS")
 complete_output = complete_key_of("contact.variables", "OUTPUTS")
+complete_target = complete_key_of("contact.variables", "OUTPUTS", "=")
 
 
 def complete_input(context: typer.Context, incomplete: str) -> list[str]:
@@ -52,11 +54,6 @@ def complete_input(context: typer.Context, incomplete: str) -> list[str]:
 def complete_unknown(context: typer.Context, incomplete: str) -> list[str]:
     """What `impact solve` solves for: the parameters of the model and of the friction law, K, e and mu."""
     return _beginning_with(incomplete, [*_parameters(context), "K", "e", "mu"])
-
-
-def complete_target(incomplete: str) -> list[str]:
-    """`NAME=` of the variables of a result."""
-    return [f"{name}=" for name in complete_output(incomplete)]
 
 
 def complete_axis(context: typer.Context, incomplete: str) -> list[str]:

@@ -18,7 +18,6 @@ def init(
     overwrite: options.Overwrite = False,
 ) -> None:
     """Write a commented starter config, ready to sweep."""
-
     impact.init(path, overwrite=overwrite)
     exits.print_line(f"{path}: written; next: impact sweep {path}")
 
@@ -28,7 +27,6 @@ def schema(
     overwrite: options.Overwrite = False,
 ) -> None:
     """Print the JSON Schema of a config, for completion and validation in editors."""
-
     json_schema = impact.schema(output, overwrite=overwrite)
     if output is None:
         print(json.dumps(json_schema, indent=2, ensure_ascii=False))

@@ -12,7 +12,6 @@ import impact
 from ..display import show
 from . import exits, options
 from .completion import complete_engine
-from .parsing import NamedValue
 
 
 def conform(
@@ -29,7 +28,7 @@ def conform(
     suite: Annotated[str, options.value("NAME", "The set of collisions.")] = "conformance-1",
     only: Annotated[list[str] | None, options.value("ID", "Judge only this collision; may be repeated.")] = None,
     tol: Annotated[
-        list[NamedValue] | None,
+        list[options.NamedValue] | None,
         options.tolerance(
             "[CHECK=]VALUE", "Tolerance of all checks or of one, such as momentum=1e-6 or 5%; may be repeated."
         ),

@@ -128,7 +128,9 @@ def _exit_code(command: Callable[[], object], *, debug: bool) -> int:
         return EXIT_OK
     except Exception as error:
         if _is_out_of_memory(error):
-            print_line(_out_of_memory(error), error=True)
+            # with the size that NumPy tried to allocate
+            size = f": {safe_text(str(error))}" if isinstance(error, MemoryError) and str(error) else ""
+            print_line(f"out of memory{size}", error=True)
             return EXIT_STORAGE
         if isinstance(error, OSError) and error.errno in WRITE_ERRNOS:
             print_line(f"cannot write: {error.strerror}", error=True)
@@ -158,12 +160,6 @@ def _is_out_of_memory(error: BaseException) -> bool:
     except (OSError, MemoryError):
         return True
     return False
-
-
-def _out_of_memory(error: Exception) -> str:
-    """One line about a lack of memory, with the size that NumPy tried to allocate."""
-    what = safe_text(str(error)) if isinstance(error, MemoryError) else ""
-    return "out of memory" + (f": {what}" if what else "")
 
 
 def _warning_printer() -> Callable[..., None]:

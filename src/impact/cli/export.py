@@ -59,7 +59,6 @@ def export(
 
     With --verify, exit 1 if the code delivers another e, exit 2 if it is not installed.
     """
-
     if show_codes:
         _print_codes(as_json)
         return exits.EXIT_OK

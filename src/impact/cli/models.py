@@ -102,7 +102,6 @@ def materials(
     as_json: options.Json = False,
 ) -> None:
     """List common materials, which need no table in a config: E, nu, rho, yield strength, source."""
-
     catalogue = impact.materials()
     if name is not None and name not in catalogue:
         raise UsageError(f'no material "{name}"; {did_you_mean(name, list(catalogue))}')

@@ -115,7 +115,6 @@ def plot(
     Of several kinds, those that --sel leaves no axis are drawn over the whole axis, and those that do not apply
     are reported with the reason.
     """
-
     files = impact.plot_to_files(
         result,
         output,

@@ -8,7 +8,6 @@ import impact
 
 from ..display import TableForm, check_table_output, show, write_table
 from . import exits, options
-from .parsing import NamedValue
 
 
 def recommend(
@@ -18,7 +17,7 @@ def recommend(
         options.number("VALUE", "Largest accepted |e_out − e|, or distance from the target, such as 0.02 or 2%."),
     ] = 0.01,
     target: Annotated[
-        NamedValue | None,
+        options.NamedValue | None,
         options.target("The wanted output, such as beta=0.4. \\[default: e_out, compared with e]"),
     ] = None,
     sel: options.Select = None,
@@ -35,7 +34,6 @@ def recommend(
 
     With --target, rank them, or their pairs with friction laws, by the distance of an output from it.
     """
-
     form = TableForm(rows, digits, decimal)
     check_table_output(output, form, overwrite=overwrite)
     ranking = impact.recommend(

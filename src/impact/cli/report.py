@@ -24,7 +24,6 @@ def report(
 
     The page is a single file. It needs no network and runs no scripts.
     """
-
     output = output or result.with_suffix(".html")
     page = impact.report(
         result, output=output, overwrite=overwrite, plugins=plugin or (), models=model, sections=section

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated
 
-import typer
-
 import impact
 
 from ..display import show
 from . import options
 from .completion import complete_input, complete_unknown
-from .parsing import NamedValue, parse_range
 
 
 def solve(
@@ -25,18 +22,17 @@ def solve(
             names=["--for"],
         ),
     ],
-    target: Annotated[NamedValue, options.target("The wanted output, such as e_out=0.6 or beta=0.4.")],
+    target: Annotated[options.NamedValue, options.target("The wanted output, such as e_out=0.6 or beta=0.4.")],
     source: options.Source = None,
     friction: options.FrictionKey = None,
     at: options.At = None,
     over: Annotated[
-        NamedValue | None,
-        typer.Option(
-            "--over",
-            metavar="NAME=FIRST:LAST:COUNT",
-            autocompletion=complete_input,
-            parser=parse_range,
-            help="Find the value that serves best over a range of an input, such as v1=0.1:3:30.",
+        options.NamedValue | None,
+        options.value(
+            "NAME=FIRST:LAST:COUNT",
+            "Find the value that serves best over a range of an input, such as v1=0.1:3:30.",
+            complete_input,
+            options.parse_range,
         ),
     ] = None,
     sets: options.Set = None,

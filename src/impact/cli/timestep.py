@@ -66,7 +66,6 @@ def timestep(
 
     If a phase fails, its step has none of them, and the exit code is 3.
     """
-
     form = TableForm(rows, digits, decimal)
     check_table_output(output, form, overwrite=overwrite)
     result = impact.timestep(
