@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from contextlib import suppress
-from dataclasses import fields
 from importlib import import_module
 from typing import Any
 
@@ -75,17 +74,11 @@ def complete_selection(context: typer.Context, incomplete: str) -> list[str]:
 
 def complete_setting(incomplete: str) -> list[str]:
     """`TABLE.KEY=` of the keys of a config."""
-    from ..config.quantities import Table
-    from ..config.tables import Data, Design, Document, Output, Solver, Sweep
+    from ..config.lines import KEYS_BY_TABLE
 
     keys = ["title", "models", "frictions"]
-    described: dict[str, type[Table]] = {"sweep": Sweep, "design": Design, "data": Data}
-    for name, table in described.items():
-        keys += [f"{name}.{key}" for key in table.model_fields]
-    for name, settings in {"solver": Solver, "output": Output}.items():
-        keys += [f"{name}.{field.name}" for field in fields(settings)]
-    tables = [f"{name}." for name in ("materials", "model", "friction") if name in Document.model_fields]
-    return _beginning_with(incomplete, [*(f"{key}=" for key in keys), *tables])
+    keys += [f"{table}.{key}" for table, names in KEYS_BY_TABLE.items() for key in names]
+    return _beginning_with(incomplete, [*(f"{key}=" for key in keys), "materials.", "model.", "friction."])
 
 
 def _beginning_with(incomplete: str, words: Iterable[str]) -> list[str]:

@@ -24,8 +24,8 @@ EXPECTED_BY_KEY = {
 }
 KEYS_BY_TABLE: Mapping[str, Iterable[str]] = {
     "sweep": tables.Sweep.model_fields,
-    "data": tables.Data.model_fields,
     "design": tables.Design.model_fields,
+    "data": tables.Data.model_fields,
     "solver": vars(tables.Solver()),
     "output": vars(tables.Output()),
 }

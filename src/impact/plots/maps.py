@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -119,6 +120,11 @@ class MapData:
         variable = () if self.closest else (self.variable,)
         return {self.x, self.y, *variable, *(panel.key for panel in self.panels)}
 
+    @cached_property
+    def edges(self) -> tuple[FloatArray, FloatArray]:
+        """The edges of the cells along x and along y."""
+        return edges_of(self.x_values, self.x_log), edges_of(self.y_values, self.y_log)
+
     @property
     def laws(self) -> dict[str, str]:
         return {panel.key: panel.label for panel in self.panels if panel.model}
@@ -180,9 +186,8 @@ class MapData:
         return list(grid.ravel()[:count]), rows * (height + 0.25) + 0.3
 
     def draw(self, all_axes: Sequence[Axes], labels: Mapping[str, str], points: Points | None) -> LegendEntries:
-        x, y = edges_of(self.x_values, self.x_log), edges_of(self.y_values, self.y_log)
-        draw_panels = _draw_closest if self.closest else _draw_fields
-        mesh, entries = draw_panels(self, all_axes, x, y, labels)
+        x, y = self.edges
+        mesh, entries = self._draw_closest(all_axes, labels) if self.closest else self._draw_fields(all_axes)
         names = [labels.get(panel.key, pretty_conditions(panel.label)) for panel in self.panels]
         titles = ["Closest model", "Its absolute error"] if self.closest else names
         keys = [panel.key for panel in self.panels]
@@ -217,6 +222,86 @@ class MapData:
             largest = max(map(abs, mesh.get_clim()))
             label_axis(bar.ax.yaxis, self.labels[2], self.variable, self.units[2], largest, labels, log=False)
         return entries
+
+    def _draw_fields(self, axes: Sequence[Axes]) -> tuple[QuadMesh, LegendEntries]:
+        """Draw the panels of a map; returns what the colour bar shows, and handles and names of the legend."""
+        values = np.ma.masked_invalid([panel.values for panel in self.panels])
+        low, top = float(values.min()), float(values.max())
+        if self.signed:
+            low, top = -max(abs(low), abs(top)), max(abs(low), abs(top))
+        norm = Normalize(low, top) if low < top else Normalize(low - 0.5, low + 0.5)
+        return self._draw_values(axes, values, norm, "RdBu_r" if self.signed else "viridis")
+
+    def _draw_closest(self, axes: Sequence[Axes], labels: Mapping[str, str]) -> tuple[QuadMesh, LegendEntries]:
+        """Draw the two panels of the closest model; returns the same."""
+        names = {
+            panel.model: labels.get(panel.model or "", pretty_conditions(panel.label)) for panel in self.panels
+        }
+        styles = model_styles([panel.model for panel in self.panels if panel.model in self.shares and panel.model])
+        closest = np.array(self.closest, object)
+        entries: LegendEntries = []
+        for key, share in self.shares.items():
+            style, name = (_tied(), f"{SEVERAL}, equally close") if key else (_failed(), NO_VALUE)
+            if key in styles:
+                look, name = styles[key], names[key]
+                style = {
+                    "facecolor": look["color"],
+                    "hatch": look["hatch"],
+                    "edgecolor": tint(0.0),
+                    "linewidth": 0,
+                }
+            axes[0].add_patch(self._merged_cells(closest == key, style))
+            entries.append((Patch(**style), f"{percentage(share)}  {name}"))
+        shown = np.ma.maximum(np.ma.masked_invalid(self.distance), MIN_DRAWN_DISTANCE)
+        norm = LogNorm(shown.min(), max(shown.max(), 10.0 * shown.min()))
+        mesh, rest = self._draw_values(axes[1:], shown[None], norm, "viridis")
+        return mesh, entries + [(artist, name) for artist, name in rest if name != NO_VALUE]
+
+    def _draw_values(
+        self, axes: Sequence[Axes], values: Any, norm: Normalize, colours: str
+    ) -> tuple[QuadMesh, LegendEntries]:
+        """Draw values, of shape (axes, y, x), as colours with contour lines; returns the same."""
+        name = symbol("abs_e_error" if self.closest else "e_error") + (" = " if self.closest else " = ±")
+        entries: dict[float, tuple[Artist, str]] = {}
+        for panel_axes, field in zip(axes, values, strict=True):
+            mesh = panel_axes.pcolormesh(
+                *self.edges, field, norm=norm, cmap=colours, rasterized=values.size > MAX_VECTOR_CELLS
+            )
+            if field.mask.any():
+                panel_axes.add_patch(self._merged_cells(np.ma.getmaskarray(field), _failed()))
+                entries[0.0] = Patch(**_failed()), NO_VALUE
+            levels = [sign * level for level in CONTOURS for sign in (-1, 1)] if self.variable == "e_error" else []
+            inside = sorted(level for level in levels if field.min() < level < field.max())
+            if inside:
+                # contours that reach the edges of the cells, with an outline visible on dark and on light colours
+                wider = np.ma.masked_invalid(np.pad(field.filled(np.nan), 1, mode="edge"))
+                x, y = self.edges
+                across, up = [x[0], *self.x_values, x[-1]], [y[0], *self.y_values, y[-1]]
+                drawn = panel_axes.contour(
+                    across,
+                    up,
+                    wider,
+                    inside,
+                    colors=[tint(1.0)],
+                    linewidths=0.8,
+                    linestyles=[CONTOURS[abs(level)] for level in inside],
+                )
+                drawn.set_path_effects([withStroke(linewidth=1.8, foreground=tint(0.0))])
+            for level in map(abs, inside):
+                line = Line2D([], [], color=tint(1.0), linewidth=0.8, linestyle=CONTOURS[level])
+                entries[level] = line, f"{name}{level:g}"
+        return mesh, [entries[level] for level in sorted(entries)]
+
+    def _merged_cells(self, mask: NDArray[np.bool_], style: dict[str, Any]) -> PathPatch:
+        """Join the cells in a mask, of shape (y, x), into a patch; neighbours in a row are one rectangle."""
+        (x, y), rectangles = self.edges, []
+        for low, high, row in zip(y[:-1], y[1:], mask, strict=True):
+            ends = x[np.flatnonzero(np.diff(np.concatenate(([False], row, [False]))))]
+            for left, right in ends.reshape(-1, 2):
+                corners = [(left, low), (right, low), (right, high), (left, high), (left, low)]
+                rectangles.append(Path(corners, closed=True))
+        path = Path.make_compound_path(*rectangles)
+        return PathPatch(path, antialiased=False, rasterized=mask.size > MAX_VECTOR_CELLS, **style)
 
 
 def field_map(dataset: xr.Dataset, choice: Choice) -> MapData:
@@ -316,86 +401,6 @@ def edges_of(values: Sequence[float], log: bool) -> FloatArray:
     return np.asarray(np.exp(edges) if log else edges)
 
 
-def _draw_fields(
-    plot_data: MapData, axes: Sequence[Axes], x: FloatArray, y: FloatArray, labels: Mapping[str, str]
-) -> tuple[QuadMesh, LegendEntries]:
-    """Draw the panels of a map; returns what the colour bar shows, and handles and names of the legend."""
-    values = np.ma.masked_invalid([panel.values for panel in plot_data.panels])
-    low, top = float(values.min()), float(values.max())
-    if plot_data.signed:
-        low, top = -max(abs(low), abs(top)), max(abs(low), abs(top))
-    norm = Normalize(low, top) if low < top else Normalize(low - 0.5, low + 0.5)
-    return _draw_values(plot_data, axes, x, y, values, norm, "RdBu_r" if plot_data.signed else "viridis")
-
-
-def _draw_closest(
-    plot_data: MapData, axes: Sequence[Axes], x: FloatArray, y: FloatArray, labels: Mapping[str, str]
-) -> tuple[QuadMesh, LegendEntries]:
-    """Draw the two panels of the closest model; returns the same."""
-    names = {
-        panel.model: labels.get(panel.model or "", pretty_conditions(panel.label)) for panel in plot_data.panels
-    }
-    styles = model_styles(
-        [panel.model for panel in plot_data.panels if panel.model in plot_data.shares and panel.model]
-    )
-    closest = np.array(plot_data.closest, object)
-    entries: LegendEntries = []
-    for key, share in plot_data.shares.items():
-        style, name = (_tied(), f"{SEVERAL}, equally close") if key else (_failed(), NO_VALUE)
-        if key in styles:
-            look, name = styles[key], names[key]
-            style = {"facecolor": look["color"], "hatch": look["hatch"], "edgecolor": tint(0.0), "linewidth": 0}
-        axes[0].add_patch(_merged_cells(x, y, closest == key, style))
-        entries.append((Patch(**style), f"{percentage(share)}  {name}"))
-    shown = np.ma.maximum(np.ma.masked_invalid(plot_data.distance), MIN_DRAWN_DISTANCE)
-    norm = LogNorm(shown.min(), max(shown.max(), 10.0 * shown.min()))
-    mesh, rest = _draw_values(plot_data, axes[1:], x, y, shown[None], norm, "viridis")
-    return mesh, entries + [(artist, name) for artist, name in rest if name != NO_VALUE]
-
-
-def _draw_values(
-    plot_data: MapData,
-    axes: Sequence[Axes],
-    x: FloatArray,
-    y: FloatArray,
-    values: Any,
-    norm: Normalize,
-    colours: str,
-) -> tuple[QuadMesh, LegendEntries]:
-    """Draw values, of shape (axes, y, x), as colours with contour lines; returns the same."""
-    name = symbol("abs_e_error" if plot_data.closest else "e_error") + (" = " if plot_data.closest else " = ±")
-    entries: dict[float, tuple[Artist, str]] = {}
-    for panel_axes, field in zip(axes, values, strict=True):
-        mesh = panel_axes.pcolormesh(
-            x, y, field, norm=norm, cmap=colours, rasterized=values.size > MAX_VECTOR_CELLS
-        )
-        if field.mask.any():
-            panel_axes.add_patch(_merged_cells(x, y, np.ma.getmaskarray(field), _failed()))
-            entries[0.0] = Patch(**_failed()), NO_VALUE
-        levels = (
-            [sign * level for level in CONTOURS for sign in (-1, 1)] if plot_data.variable == "e_error" else []
-        )
-        inside = sorted(level for level in levels if field.min() < level < field.max())
-        if inside:
-            # contours that reach the edges of the cells, with an outline visible on dark and on light colours
-            wider = np.ma.masked_invalid(np.pad(field.filled(np.nan), 1, mode="edge"))
-            across, up = [x[0], *plot_data.x_values, x[-1]], [y[0], *plot_data.y_values, y[-1]]
-            drawn = panel_axes.contour(
-                across,
-                up,
-                wider,
-                inside,
-                colors=[tint(1.0)],
-                linewidths=0.8,
-                linestyles=[CONTOURS[abs(level)] for level in inside],
-            )
-            drawn.set_path_effects([withStroke(linewidth=1.8, foreground=tint(0.0))])
-        for level in map(abs, inside):
-            line = Line2D([], [], color=tint(1.0), linewidth=0.8, linestyle=CONTOURS[level])
-            entries[level] = line, f"{name}{level:g}"
-    return mesh, [entries[level] for level in sorted(entries)]
-
-
 def _failed() -> dict[str, Any]:
     """The style of cells without a value."""
     return {"facecolor": tint(0.08), "edgecolor": tint(0.3), "hatch": "/////", "linewidth": 0}
@@ -404,18 +409,6 @@ def _failed() -> dict[str, Any]:
 def _tied() -> dict[str, Any]:
     """The style of cells where several models are closest."""
     return {"facecolor": tint(0.26), "linewidth": 0}
-
-
-def _merged_cells(x: FloatArray, y: FloatArray, mask: NDArray[np.bool_], style: dict[str, Any]) -> PathPatch:
-    """Join the cells in a mask, of shape (y, x), into a patch; neighbours in a row are one rectangle."""
-    rectangles = []
-    for row, line in enumerate(mask):
-        ends = x[np.flatnonzero(np.diff(np.concatenate(([False], line, [False]))))]
-        for left, right in ends.reshape(-1, 2):
-            corners = [(left, y[row]), (right, y[row]), (right, y[row + 1]), (left, y[row + 1]), (left, y[row])]
-            rectangles.append(Path(corners, closed=True))
-    path = Path.make_compound_path(*rectangles)
-    return PathPatch(path, antialiased=False, rasterized=mask.size > MAX_VECTOR_CELLS, **style)
 
 
 MAP = Kind(
