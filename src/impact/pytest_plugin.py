@@ -177,19 +177,18 @@ class ImpactRegression:
 
         import impact
 
-        is_config = isinstance(source, str | Path) and Path(source).suffix.lower() == ".toml"
-        if isinstance(source, xr.Dataset) or (isinstance(source, str | Path) and not is_config):
-            if overrides or plugins:
-                raise TypeError("got overrides or plugins and a result, expected them with a config")
-            if not isinstance(source, xr.Dataset):
-                return self._path(source)
+        path = self._path(source) if isinstance(source, str | Path) else None
+        is_result = path.suffix.lower() != ".toml" if path is not None else isinstance(source, xr.Dataset)
+        if is_result and (overrides or plugins):
+            raise TypeError("got overrides or plugins and a result, expected them with a config")
+        if is_result and path is not None:
+            return path
         new = self.tmp_path_factory.mktemp("impact_regression") / "new.h5"
         if isinstance(source, xr.Dataset):
             impact.save(source, new)
         else:
-            config = self._path(source) if isinstance(source, str | Path) else source
             files = [self._path(plugin) if isinstance(plugin, str | Path) else plugin for plugin in plugins]
-            impact.sweep(config, output=new, overrides=overrides, plugins=files)
+            impact.sweep(path or source, output=new, overrides=overrides, plugins=files)
         return new
 
     def _path(self, path: str | Path) -> Path:
