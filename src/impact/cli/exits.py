@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import functools
 import mmap
 import os
 import re
@@ -92,7 +93,9 @@ def run_command_line(command: Callable[[], object], *, debug: bool) -> int:
         with contextlib.suppress(AttributeError):
             # a locale that cannot encode a formula shows escapes instead of a traceback
             stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
-    warnings.showwarning = _warning_printer()
+    # each line once: the filters of `warnings` forget what was shown when a library changes them
+    print_once = functools.cache(print_line)
+    warnings.showwarning = lambda message, *_, **__: print_once(f"note: {safe_text(str(message), 1000)}")
     code = _exit_code(command, debug=debug)
     try:
         # a failing flush at the exit of the interpreter would change the exit code
@@ -160,22 +163,6 @@ def _is_out_of_memory(error: BaseException) -> bool:
     except (OSError, MemoryError):
         return True
     return False
-
-
-def _warning_printer() -> Callable[..., None]:
-    """A function that prints a warning, of this package or a library, as a line on stderr, and each line once.
-
-    The filters of `warnings` forget what was shown when a library changes them.
-    """
-    printed: set[str] = set()
-
-    def print_warning(message: Warning | str, *_: object, **__: object) -> None:
-        line = f"note: {safe_text(str(message), 1000)}"
-        if line not in printed:
-            printed.add(line)
-            print_line(line)
-
-    return print_warning
 
 
 def _usage_message(error: TyperException) -> str:

@@ -402,11 +402,6 @@ def _length_problems(path: Path, rows: Mapping[int, Sequence[str]], n_columns: i
     ]
 
 
-def _with_unit(values: list[object], unit: str) -> list[object]:
-    """Write the unit of a column beside its numbers; a text may have its own."""
-    return [value if isinstance(value, str) else f"{value!r} {unit}" for value in values] if unit else values
-
-
 def columns_of_table(table: Any, source: str) -> Columns:
     """Take the columns of a mapping, a DataFrame, or a dataset of xarray, whose units are attributes."""
     units: dict[str, str] = {}
@@ -554,7 +549,9 @@ def expand_cases(draft: Draft) -> Draft:
             message = f'set together with "{header_of[column]}", expected one of the two'
             problems.append((("sweep", "cases", header), message))
             continue
-        header_of[column], cases[column] = header, _with_unit(values, unit)
+        header_of[column] = header
+        # a text may have its own unit
+        cases[column] = [v if isinstance(v, str) else f"{v!r} {unit}" for v in values] if unit else values
     paths: dict[KeyPath, KeyPath] = {}
     # the columns that belong to [sweep] take the position of the table
     in_sweep = {column: values for column, values in cases.items() if not InputName.parse(column).owner}

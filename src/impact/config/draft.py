@@ -254,11 +254,10 @@ class Draft:
                 return (0, key_line[path[:end]]), f"{self.name}:{key_line[path[:end]]}"
         # a parameter of a law without a table is required by the key `models` or `frictions`, and a property of a
         # material of the library by the key that names it
-        named = {key: self.table("sweep").get(key) for key in ("material", "material1", "material2")}
         required_by = {"model": "models", "friction": "frictions"}.get(str(path[0])) if path else None
         if required_by:
             return self._locate((required_by,), key_line)
-        keys = [key for key, name in named.items() if path[:2] == ("materials", name)]
+        keys = [key for key in MATERIAL_KEYS if path[:2] == ("materials", self.table("sweep").get(key))]
         return self._locate(("sweep", keys[0]), key_line) if keys else ((0, 0), self.name)
 
 

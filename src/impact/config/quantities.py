@@ -519,12 +519,12 @@ class Quantity:
             return float(self.words.index(str(value)))
         if type(value) is float and self.least < value < self.most:
             return value + 0.0
-        if isinstance(value, str):
-            number = self._with_unit(value, n)
-        elif isinstance(value, bool) or not isinstance(value, int | float):
+        if isinstance(value, bool) or not isinstance(value, int | float | str):
             raise mismatch_error(value, self.expected)
-        else:
-            number = _float_or_inf(lambda: float(value))
+        try:
+            number = self._with_unit(value, n) if isinstance(value, str) else float(value)
+        except OverflowError:
+            number = math.inf
         if not self.allows(number):
             raise value_error(self.refusal(value, number))
         # -0.0 becomes 0.0: they are one value with one label
@@ -552,7 +552,7 @@ class Quantity:
         if number == 0.0 or not math.isfinite(number):
             return number
         # exact until it is converted to a float, so that "35 mm" equals 0.035 exactly
-        return _float_or_inf(lambda: float(Fraction(parts[1]) * factor))
+        return float(Fraction(parts[1]) * factor)
 
     @property
     def _example(self) -> str:
@@ -670,9 +670,7 @@ def numbers_type(quantity: Quantity) -> TypeAdapter[Any]:
     distributions["empirical"] = Annotated[either, Field(description=DISTRIBUTION_FORMS["empirical"])], None
     distribution_type = create_model(f"Distribution of {of_quantity}", __base__=Distribution, **distributions)
     bounds = Field(description=f"{FIT_FORM}, between which impact calibrate fits it, or true")
-    pair: Any = Annotated[
-        cast(Any, tuple)[end, end], Field(strict=False), BeforeValidator(_list_of_length(2, FIT_FORM)), Tag(LIST)
-    ]
+    pair: Any = Annotated[_tuple_of((end, end), FIT_FORM), Tag(LIST)]
     natural: Any = Annotated[Literal[True], Tag(SCALAR)]
     fit: Any = Annotated[natural | pair, Discriminator(lambda value: SCALAR if value is True else LIST), bounds]
     fit_type = create_model(f"Fit of {of_quantity}", __base__=FitRange, fit=(fit, ...))
@@ -691,35 +689,21 @@ def numbers_type(quantity: Quantity) -> TypeAdapter[Any]:
 def _fields(forms: Mapping[str, str], **numbers: tuple[Any, ...]) -> dict[str, Any]:
     """Define optional fields, each a list of numbers of these types in its form."""
     return {
-        name: (
-            Annotated[
-                cast(Any, tuple)[types],
-                Field(description=forms[name], strict=False),
-                BeforeValidator(_list_of_length(len(types), forms[name])),
-            ],
-            None,
-        )
+        name: (Annotated[_tuple_of(types, forms[name]), Field(description=forms[name])], None)
         for name, types in numbers.items()
     }
 
 
-def _list_of_length(length: int, form: str) -> Callable[[object], object]:
-    """Check that the list of a range, a fit or a distribution has as many numbers as its form."""
+def _tuple_of(types: tuple[Any, ...], form: str) -> Any:
+    """Build the type of a list of numbers in a form, such as that of a range, which becomes a tuple."""
 
-    def check(value: object) -> object:
-        if isinstance(value, list | tuple) and len(value) == length:
+    def check_length(value: object) -> object:
+        if isinstance(value, list | tuple) and len(value) == len(types):
             return value
         got = f"a list of {len(value)}" if isinstance(value, list | tuple) else as_text(value)
         raise value_error(f"got {got}, expected {form}")
 
-    return check
-
-
-def _float_or_inf(convert: Callable[[], float]) -> float:
-    try:
-        return convert()
-    except OverflowError:
-        return math.inf
+    return Annotated[cast(Any, tuple)[types], Field(strict=False), BeforeValidator(check_length)]
 
 
 @cache

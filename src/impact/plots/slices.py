@@ -211,19 +211,16 @@ def x_axis(dataset: xr.Dataset, x: str | None) -> str:
             raise UsageError(f'cannot draw over "{x}"; {did_you_mean(x, lines)}')
         return x
     # prefer floats: an integer axis only numbers the points; axes come before parameters of single laws
-    for name in ("e", *(dim for dim in dataset.sizes if dim in lines and _is_float(dataset, str(dim))), *lines):
-        if name in lines and _is_float(dataset, str(name)):
-            return str(name)
+    floats = [name for name in lines if dataset[name].dtype.kind == "f"]
+    for name in ("e", *map(str, dataset.sizes), *floats):
+        if name in floats:
+            return name
     if lines:
         return lines[0]
     raise UsageError(
         "this result has no numeric axis left to draw over; sweep one, such as e, or draw a point with "
         f"{argument('kind', 'loop')}"
     )
-
-
-def _is_float(dataset: xr.Dataset, name: str) -> bool:
-    return dataset[name].dtype.kind == "f"
 
 
 def unit_of(coordinate: xr.DataArray | xr.Variable) -> str:

@@ -276,7 +276,7 @@ def _are_equal(
         return False
     largest = np.fmax.reduce(np.where(np.isfinite(a), np.abs(a), 0.0), axis=0, initial=0.0)
     most = np.fmax(MAX_DIFFERENCE * largest, MIN_ERROR_FLOOR)
-    return bool(np.all((np.abs(a - b) <= most) | (a == b) | (np.isnan(a) & np.isnan(b))))
+    return np.allclose(a, b, rtol=0.0, atol=most, equal_nan=True)
 
 
 def _condition_sentences(dataset: xr.Dataset, position: Position, keys: Sequence[str]) -> Iterator[str]:
