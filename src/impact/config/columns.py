@@ -100,10 +100,7 @@ class Columns:
 
     def find(self, text: str) -> tuple[str, str]:
         """Find a column by its name, with or without a unit; also returns the unit, which its header may lack."""
-        unit = ""
-        name = text if text in self.cells else ""
-        if not name:
-            name, unit = split_header(text)
+        name, unit = (text, "") if text in self.cells else split_header(text)
         if name not in self.cells:
             hint = f"; {did_you_mean(text, list(self.cells))}" if self.is_known else ""
             raise ConfigError(self.problem(f"got {as_text(text)}, expected one of its columns{hint}"))
@@ -214,10 +211,7 @@ def read_csv(
         return name in looked_for or header in looked_for or is_known(name)
 
     mark = form.separator or _find_separator(path, numbered, is_looked_for)
-    try:
-        rows = _split(numbered, mark)
-    except csv.Error as error:
-        raise ConfigError(f"{path}:{error}") from None
+    rows = _split(path, numbered, mark)
     (first, headers), *_ = rows.items()
     del rows[first]
     names = [split_header(text) for text in headers]
@@ -244,8 +238,8 @@ def read_csv(
     return _with_decimal_points(columns, form.decimal, [name for name in units if is_looked_for(name)])
 
 
-def _split(numbered: Sequence[tuple[int, str]], separator: str) -> dict[int, list[str]]:
-    """Split lines into cells, by the number of the line; a csv.Error begins with it."""
+def _split(path: Path, numbered: Sequence[tuple[int, str]], separator: str) -> dict[int, list[str]]:
+    """Split lines into cells, by the number of the line."""
     # csv knows spaces before a quoted cell, and none after it
     lines = (re.sub(rf'(?<!")" +(?={separator}|$)', '"', line) for _, line in numbered)
     reader = csv.reader(lines, delimiter=separator, strict=True, skipinitialspace=separator != "\t")
@@ -255,21 +249,21 @@ def _split(numbered: Sequence[tuple[int, str]], separator: str) -> dict[int, lis
             rows[numbered[reader.line_num - 1][0]] = [cell.strip() for cell in row]
         return rows
     except csv.Error as error:
-        raise csv.Error(f"{numbered[reader.line_num - 1][0]}: not CSV: {error}") from None
+        raise ConfigError(f"{path}:{numbered[reader.line_num - 1][0]}: not CSV: {error}") from None
 
 
 def _find_separator(path: Path, numbered: Sequence[tuple[int, str]], is_looked_for: Callable[[str], bool]) -> str:
     """Recognise the separator by the header: it separates all rows alike, and names that are looked for."""
     readings: dict[str, list[list[str]]] = {}
-    errors: dict[str, str] = {}
+    errors: dict[str, ConfigError] = {}
     for mark in SEPARATORS:
         try:
-            readings[mark] = list(_split(numbered, mark).values())
-        except csv.Error as error:
-            errors[mark] = f"{path}:{error}"
+            readings[mark] = list(_split(path, numbered, mark).values())
+        except ConfigError as error:
+            errors[mark] = error
     readings = {mark: rows for mark, rows in readings.items() if len(rows[0]) > 1}
     if errors and not readings:
-        raise ConfigError(errors[max(errors, key=numbered[0][1].count)])
+        raise errors[max(errors, key=numbered[0][1].count)]
     regular = {mark: rows for mark, rows in readings.items() if len({*map(len, rows)}) == 1} or readings
     readings = {mark: rows for mark, rows in regular.items() if any(map(is_looked_for, rows[0]))} or regular
     if len(readings) > 1 and any(is_looked_for(header) for rows in readings.values() for header in rows[0]):
@@ -284,21 +278,13 @@ def _find_separator(path: Path, numbered: Sequence[tuple[int, str]], is_looked_f
 
 def _with_decimal_points(columns: Columns, decimal: str, looked_for: Sequence[str]) -> Columns:
     """Write decimal commas as points; the sign is that of all numbers, else of those that are looked for."""
-    signs: dict[str, list[tuple[int, str]]] = {}
     for names in [looked_for] if decimal else [list(columns.cells), looked_for]:
-        signs = {}
-        for sign, pattern in NUMBER_WITH.items():
-            cells = [
-                (columns.lines[i], cell)
-                for name in names
-                for i, cell in enumerate(map(str, columns.cells[name]))
-                if pattern.fullmatch(cell)
-            ]
-            if cells:
-                signs[sign] = cells
+        cells = [cell for name in names for cell in zip(columns.lines, map(str, columns.cells[name]), strict=True)]
+        numbers = {sign: [cell for cell in cells if form.fullmatch(cell[1])] for sign, form in NUMBER_WITH.items()}
+        signs = {sign: of_sign for sign, of_sign in numbers.items() if of_sign}
         if len(signs) == 1:
             break
-    places = {sign: f"{columns.source}:{cells[0][0]}" for sign, cells in signs.items()}
+    places = {sign: f"{columns.source}:{of_sign[0][0]}" for sign, of_sign in signs.items()}
     if not decimal and len(signs) > 1:
         got = f"got a decimal comma, and a point in line {signs['.'][0][0]}, expected one of them"
         raise ConfigError(f'{places[","]}: {got}; decimal = "," or decimal = "." settles it')

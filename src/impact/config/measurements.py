@@ -343,16 +343,15 @@ def _column_of(header: str, outputs: Sequence[str], models: Mapping[str, ForceMo
         return _Column("output", header, MEASURED_OUTPUTS[header])
     if header == SPECIMEN:
         return _Column("specimen", header, Quantity("1", "name of a specimen"))
-    if header.removeprefix(f"{SIGMA}_") in LABORATORY:
-        measured = header.removeprefix(f"{SIGMA}_")
-        return _Column(
-            "sigma", measured, replace(LABORATORY[measured][0], meaning="standard deviation", above=True)
-        )
-    if header == SIGMA or header.removeprefix(f"{SIGMA}_") in MEASURED_OUTPUTS:
+    measured = header.removeprefix(f"{SIGMA}_")
+    if measured in LABORATORY:
+        deviation = replace(LABORATORY[measured][0], meaning="standard deviation", above=True)
+        return _Column("sigma", measured, deviation)
+    if header == SIGMA or measured in MEASURED_OUTPUTS:
         if header == SIGMA and len(outputs) > 1:
             expected = " or ".join(f"{SIGMA}_{output}" for output in outputs)
             raise value_error(f"got {len(outputs)} outputs, expected {expected}")
-        output = header.removeprefix(f"{SIGMA}_") if header != SIGMA else next(iter(outputs), "e_out")
+        output = measured if header != SIGMA else next(iter(outputs), "e_out")
         if outputs and output not in outputs:
             raise value_error(f"got no column {output}, expected one next to its standard deviation")
         return _Column("sigma", output, _deviation(output))
