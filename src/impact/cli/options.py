@@ -131,9 +131,12 @@ def value(
     complete: Callable[..., list[str]] | None = None,
     parser: Callable[[Any], Any] | None = None,
     names: Sequence[str] = (),
+    callback: Callable[..., Any] | None = None,
 ) -> Any:
     """Declare an option with a value; its name is that of its parameter, unless it has others."""
-    return typer.Option(*names, metavar=metavar, autocompletion=complete, parser=parser, help=help)
+    return typer.Option(
+        *names, metavar=metavar, autocompletion=complete, parser=parser, callback=callback, help=help
+    )
 
 
 def output(help: str, metavar: str | None = None) -> Any:
@@ -153,18 +156,12 @@ def number(metavar: str, help: str) -> Any:
 
 def pairs(complete: Callable[..., list[str]], help: str) -> Any:
     """Declare an option that is repeated for several names."""
-    return typer.Option(
-        metavar="NAME=VALUE",
-        autocompletion=complete,
-        parser=parse_setting,
-        callback=reject_duplicates,
-        help=help,
-    )
+    return value("NAME=VALUE", help, complete, parse_setting, callback=reject_duplicates)
 
 
 def tolerance(metavar: str, help: str) -> Any:
     """Declare an option for a tolerance of all, or of one by its name."""
-    return typer.Option(metavar=metavar, parser=parse_tolerance, callback=reject_duplicates, help=help)
+    return value(metavar, help, parser=parse_tolerance, callback=reject_duplicates)
 
 
 def target(help: str) -> Any:

@@ -295,8 +295,8 @@ def _summary_sentence(dataset: xr.Dataset) -> str:
     models, axes = dataset.sizes["model"], [str(dim) for dim in dataset.sizes if dim not in ("model", "friction")]
     points, over = count_points(dataset), f" over {', '.join(axes)}" if axes else ""
     return (
-        f"{models:,} model{_plural_s(models)} of the impact of two balls{over}, compared with the "
-        f"impulse-momentum solution: {points:,} point{_plural_s(points)}."
+        f"{models:,} model{'s' * (models != 1)} of the impact of two balls{over}, compared with the "
+        f"impulse-momentum solution: {points:,} point{'s' * (points != 1)}."
     )
 
 
@@ -468,7 +468,3 @@ def _model_section(model_data: xr.Dataset) -> dict[str, Any]:
         "domain": declaration.domain_text if declaration else "",
         "evidence": evidence,
     }
-
-
-def _plural_s(number: int) -> str:
-    return "" if number == 1 else "s"
