@@ -499,14 +499,13 @@ def test_the_natural_range_is_about_the_size_in_units_of_the_contact() -> None:
 
 def test_the_natural_range_of_a_damping_of_lammps_contains_that_of_small_balls() -> None:
     """The damping per contact radius of a bead is a million times that of a ball of 1 kg."""
-    from impact.engine.plugins import read_plugins
     from impact.inverse.calibrate import natural_bounds
 
     beads = {"m1": "0.16 g", "m2": math.inf, "R1": "2.5 mm", "R2": math.inf, "material": "glass"}
     data = {"fit": True, "columns": {"v1": [0.5, 1.0], "e_out": [0.7, 0.6]}}
     for law in ("lammps-viscoelastic-hooke", "lammps-viscoelastic-hertz"):
         config = read_config({"models": law, "sweep": beads, "data": data}, purpose="calibrate")
-        ((lower, upper),) = natural_bounds(config, read_plugins([])).values()
+        ((lower, upper),) = natural_bounds(config).values()
         source = {"models": law, "sweep": {**beads, "v1": 1.0}}
         (root,) = impact.solve(law, "eta", {"e_out": 0.6}, source=source).roots
         assert 10.0 * lower < root.value < 0.1 * upper

@@ -31,7 +31,7 @@ LIBRARIES = {
     "h5py": {"results"}, "h5netcdf": {"results"}, "tomllib": {"config"}, "pydantic": {"config", "results"},
     "pydantic_core": {"config"},
     "pint": {"config"}, "filelock": {"engine"}, "numba": {"contact"},
-    "scipy": {"config", "inverse", "uncertainty"},
+    "scipy": {"config", "inverse", "results", "uncertainty"},
     "dask": {"engine"}, "distributed": {"engine"}, "pytest": {"pytest_plugin"},
 }  # fmt: skip
 # what a module of cli may import apart from public names, foundations and other modules of cli

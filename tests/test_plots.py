@@ -802,8 +802,8 @@ def test_measured_points_are_drawn_over_the_curves(speeds: xr.Dataset, tmp_path:
         ("v_1, e_out\n1, 2\n", 'data.csv:1: v_1: no such input or variable; did you mean "v1"'),
         ("v1, v1\n1, 2\n", 'data.csv:1: got "v1" twice'),
         ("v1 [kg], e_out\n1, 2\n", "data.csv:1: v1: got [kg], expected a unit of m/s"),
-        ("v1, e_out\n1, 2\n2, high\n", 'data.csv:3: e_out: got "high", expected a'),
-        ("m1, e_out\n1, 2\n", "data.csv: the picture shows v1 and e_out, and the points have m1, e_out"),
+        ("v1, e_out\n1, 0.2\n2, high\n", 'data.csv:3: e_out: got "high", expected a'),
+        ("m1, e_out\n1, 0.2\n", "data.csv: the picture shows v1 and e_out, and the points have m1, e_out"),
         ("v1, e_out\n", "data.csv: got one line, expected a line of names"),
     ],
 )
