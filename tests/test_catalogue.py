@@ -23,6 +23,7 @@ from impact.contact.closed_forms.dashpot import (
 from impact.contact.closed_forms.hysteresis import WORK_SERIES_BELOW_CHI, approach_damped_restitution
 from impact.contact.closed_forms.viscoelastic import pade_damping, pade_restitution
 from impact.contact.dimensionless import delivered
+from impact.contact.frictions import frictions
 from impact.contact.models import catalogue, find
 from impact.contact.output_formulas import collide
 from impact.contact.status import Status
@@ -519,3 +520,11 @@ def test_the_versions_in_a_title_include_the_one_that_was_run():
             oldest, newest, tested = ([*map(int, text.split("."))] for text in (*versions.groups(), run[1]))
             assert oldest <= tested <= newest, code.name
     assert find("mujoco-solref").title.endswith("(since 2.1)")
+
+
+@pytest.mark.parametrize("laws", [catalogue(), frictions()], ids=["models", "frictions"])
+def test_a_year_in_a_key_is_that_of_the_law(laws):
+    years = {key: re.search(r"-((?:17|18|19|20)\d\d)(?![^-])", key) for key in laws}
+    dated = {key: int(found[1]) for key, found in years.items() if found}
+    assert len(dated) >= 3
+    assert {key: laws[key].year for key in dated} == dated

@@ -506,6 +506,8 @@ def test_info(cli: Run, stored: Path) -> None:
     assert not {"equation", "reference", "doi", "year"} & {*names}
     assert names.count("title") == 1
     printed = json.loads(cli("info", stored, "--json").stdout)
+    (title,) = (line for line in page.splitlines() if line.startswith("title"))
+    assert title.split()[1:] == printed["attributes"]["title"].split()
     assert printed["dimensions"] == {"model": 3, "e": 101}
     assert printed["attributes"]["config"].startswith("#:schema")
 

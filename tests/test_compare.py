@@ -446,9 +446,14 @@ def test_the_scales_of_spins_and_of_friction_have_the_approach_with_the_slip() -
 
 def test_impacts_without_slip_have_no_tangential_restitution_and_are_equal() -> None:
     inputs = {"v1": 2.0, "u1": 0.0, "m1": 1.0, "m2": 3.0, "R1": 0.03, "R2": 0.04, "K": 1e6, "mu": 0.3}
-    swept = impact.sweep({"models": "hertz", "frictions": "coulomb-1785", "sweep": inputs})
-    assert np.isnan(swept["beta"].item())
-    assert swept["friction_status"].item() == 1
+    frictions = ["coulomb-1785", "cundall-strack-1979"]
+    output = {"variables": list(OUTPUTS)}
+    table = {"cundall-strack-1979": {"k_t": 3e3}}
+    swept = impact.sweep(
+        {"models": "hertz", "frictions": frictions, "sweep": inputs, "friction": table, "output": output}
+    )
+    assert np.isnan(swept["beta"].values).all()
+    assert (swept["friction_status"].values == 1).all()
     assert impact.compare(swept, swept, tol=0.0).equal
 
 

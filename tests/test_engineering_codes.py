@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import impact
-from impact.contact.closed_forms.dashpot import force_restitution, limited_restitution
+from impact.contact.closed_forms.dashpot import approach_restitution, force_restitution, limited_restitution
 from impact.contact.closed_forms.hysteresis import delivered_restitution
 from impact.contact.dimensionless import delivered
 from impact.contact.impulse import velocities_after
@@ -603,3 +603,12 @@ def test_deduplicated_points_have_the_bits_of_separate_ones_where_a_code_sets_th
     )
     for name in ("stiffness", "peak_indentation", "contact_time", "e_out", "peak_force"):
         assert deduplicated[name].values.tobytes() == separate[name].values.tobytes()
+
+
+@pytest.mark.parametrize("m2", [1.0, 4.0, np.inf])
+def test_newton_damps_the_approach_by_kd_over_twice_the_root_of_mass_and_stiffness(m2):
+    m, K, ratio = 1.0 if np.isinf(m2) else m2 / (1.0 + m2), 1e6, 0.3
+    kd = 2.0 * ratio * np.sqrt(m * K)
+    balls = {"v1": 1.0, "m1": 1.0, "m2": m2, "K": K, "n": 1.0}
+    config = {"models": "newton-semi-implicit", "sweep": balls, "model": {"newton-semi-implicit": {"kd": kd}}}
+    assert impact.sweep(config)["e_out"].item() == pytest.approx(approach_restitution(np.array(ratio)), rel=1e-9)

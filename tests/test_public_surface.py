@@ -107,9 +107,13 @@ def describe_parameter(parameter: inspect.Parameter) -> str:
 
 
 def options() -> Iterator[str]:
-    """Give a line for each command: its arguments and options."""
+    """Give a line for each command: its arguments and options, and the defaults of those that have one."""
     for name in sorted(program.COMMANDS):
-        words = ["/".join([*option.opts, *option.secondary_opts]) for option in program.load_command(name).params]
+        words = []
+        for option in program.load_command(name).params:
+            word, default = "/".join([*option.opts, *option.secondary_opts]), option.default
+            has_default = not callable(default) and default not in (None, False, "", (), [])
+            words.append(f"{word}={default}" if has_default else word)
         yield f"{name}: {' '.join(words)}"
 
 

@@ -221,6 +221,12 @@ def test_the_command_ends_well_without_a_root(cli: Run) -> None:
     assert "no value of e gives e_out = 0.6; e_out is from 0 to 0.593624" in done.stdout
 
 
+def test_the_text_has_a_line_for_each_root() -> None:
+    result = impact.solve("mujoco-solref", "dampratio", {"contact_time": 0.01})
+    (root,) = result.roots
+    assert str(result) == f"dampratio = {root.value:.10g}: contact_time = 0.01, e_out = {root.e_out:.6g}"
+
+
 @pytest.mark.slow
 def test_a_range_of_toml_is_a_range_of_the_option(cli: Run) -> None:
     words = ("solve", "--model", "hunt-crossley-1975", "--for", "e", "--target", "e_out=0.6", "--over")
