@@ -688,6 +688,10 @@ FACTORED: dict[str, tuple[ChangeFile, str]] = {
     "a summary in a list": (lambda f: _set_attribute(f, "", "summary", np.bytes_(b"[]")), NOT_JSON),
     "a summary of fewer points than none": (partial(_set_summary, status={"ok": 9, "limit": -1}), NOT_JSON),
     "a summary of other points": (partial(_set_summary, status={"ok": 9}), WRONG_SUMMARY),
+    "a summary of more points than evaluated ones": (
+        partial(_set_summary, status={"ok": 9}, not_evaluated=1),
+        WRONG_SUMMARY,
+    ),
     "a summary of an unknown status": (partial(_set_summary, status={"good": 8}), WRONG_SUMMARY),
     "a summary of another model": (partial(_set_summary, worst={"e_error": {"hertz": 1.0}}), WRONG_SUMMARY),
     "a summary of a point that is not there": (

@@ -131,6 +131,8 @@ WRONG: dict[str, tuple[Engine, set[str]]] = {
 def test_a_correct_engine_of_thirty_lines_passes_every_check() -> None:
     board = impact.conform(adapter=rigid)
     assert board.passed, str(board)
+    # no empty line for failures that there are not
+    assert str(board) == str(board).rstrip()
     assert len((EXAMPLES / "rigid.py").read_text(encoding="utf-8").splitlines()) <= 30
     checks = board.as_dict()["checks"]
     assert {check["status"] for check in checks} == {"pass"}

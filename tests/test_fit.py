@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy import stats
 
-from impact.inverse.fit import Bounds, DataPoints, Fit, FitProblem, fit_all
+from impact.inverse.fit import Bounds, DataPoints, Estimate, Fit, FitProblem, best_of, fit_all
 
 Array = NDArray[np.float64]
 # damping ratio of a linear spring and dashpot with e = 0.5, and de/dzeta there
@@ -340,3 +340,10 @@ def test_coverage_and_bias_of_synthetic_sets(count: int) -> None:
     assert abs(covered - 0.95) <= 4.0 * np.sqrt(0.95 * 0.05 / count)
     assert abs(np.var(estimates) / bound**2 - 1.0) <= 4.0 * np.sqrt(2.0 / count)
     assert abs(np.mean(estimates) - ZETA) <= 4.0 * bound / np.sqrt(count)
+
+
+def test_of_equal_fits_one_that_converged_is_the_best() -> None:
+    stopped, converged = (Estimate(np.zeros(1), 2.0, 0.0, reached) for reached in (False, True))
+    far = Estimate(np.zeros(1), 2.1, 0.0, True)
+    assert best_of([far, stopped, converged]) is converged
+    assert best_of([far, stopped]) is stopped
