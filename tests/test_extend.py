@@ -13,7 +13,7 @@ import xarray as xr
 
 import impact
 from impact.contact.status import FrictionStatus
-from impact.errors import ConfigError, ResultError, UsageError
+from impact.errors import ConfigError, ImpactError, ResultError, UsageError
 
 from .conftest import Run, assert_same_bits
 
@@ -50,6 +50,8 @@ E = 1e9
 nu = 0.3
 rho = 1000
 """
+BALLS = {"e": 0.5, "v1": 1.0, "m1": 1.0, "m2": 2.0, "K": 1e6, "n": 1.5}
+MINE = {"key": "mine-2026", "title": "Mine", "year": 2026, "equation": "", "reference": ""}
 FULL, FACTORED = 'output.layout="full"', 'output.layout="factored"'
 BOTH_LAYOUTS = pytest.mark.parametrize("layout", [FULL, FACTORED], ids=["full", "factored"])
 # a copy of the stored result of a config with overrides, as r.h5 in the folder of the test
@@ -213,6 +215,21 @@ def test_an_extension_changes_nothing_but_values_of_axes(
     stored_sweep: StoredSweep, override: str, expected: str
 ) -> None:
     assert_refused(stored_sweep(), [override], expected)
+
+
+@pytest.mark.parametrize("change", ["rho=2000", "nu=0.2", "yield_strength=1e8"])
+def test_an_extension_does_not_change_a_material(stored_sweep: StoredSweep, change: str) -> None:
+    overrides = [f"materials.soft.{change}", "sweep.m2=[2.0, 3.0]"]
+    expected = f"r.h5: overrides changes materials.soft.{change.partition('=')[0]}, expected more values"
+    assert_refused(stored_sweep(DASHPOT), overrides, expected)
+
+
+def test_an_extension_does_not_change_a_law_of_the_user(tmp_path: Path) -> None:
+    laws = [impact.hysteresis(**MINE, chi=chi) for chi in (lambda e: 1 - e, lambda e: 2 - 2 * e)]
+    impact.sweep_to_file({"models": "mine-2026", "sweep": BALLS}, tmp_path / "r.h5", plugins=laws[:1])
+    with pytest.raises(ImpactError, match="was made with another version of the model mine-2026"):
+        impact.extend(tmp_path / "r.h5", ["sweep.e=[0.5, 0.6]"], plugins=laws[1:])
+    assert impact.extend(tmp_path / "r.h5", ["sweep.e=[0.5, 0.6]"], plugins=laws[:1])["e"].size == 2
 
 
 @pytest.mark.parametrize("override", ['output.dtype="float32"', 'output.variables=["e_out"]'])

@@ -233,9 +233,6 @@ def _check_changes(old: Plan, new: Plan, name: str) -> None:
     old_physics, new_physics = dict(old.physics), dict(new.physics)
     free = ("models", "frictions", "axes", "scalars", "materials", "plugins")
     changed = [key for key in old_physics if key not in free and old_physics[key] != new_physics[key]]
-    changed += [
-        f"model {key}" for key in old.plugins.hashes if old.plugins.hashes[key] != new.plugins.hashes.get(key)
-    ]
     used, swept = new.material_record, new.inputs.names()
     changed += [
         f"materials.{key}.{field}"
