@@ -119,7 +119,9 @@ class Page:
     def wait_for(self, expression: str, limit_s: float = CHANGE_S, every_s: float = 0.02) -> Any:
         end = time.monotonic() + limit_s
         while not (value := self.evaluate(expression)):
-            assert time.monotonic() < end, f"{expression} is {value} after {limit_s} s"
+            if time.monotonic() > end:
+                messages = self.evaluate("JSON.stringify(window.messages)")
+                pytest.fail(f"{expression} is {value} after {limit_s} s, with the messages {messages}")
             time.sleep(every_s)
         return value
 
