@@ -411,7 +411,7 @@ class SlipPhase:
     def _rate_of_force(self, y: Array, k: Array, params: Params) -> Array:
         """Compute the rate of the normal force by a difference quotient."""
         # near s = 0 a force with a part that does not vanish there loses its rate to rounding in shorter steps
-        reach = _reach(y[0])
+        reach = np.clip(np.abs(y[0]), MIN_REACH, 1.0)
         if self.form.cap == "total":
             small = motion.RELEASE_STEP * reach
             if self.breakpoints:
@@ -510,7 +510,7 @@ class SlipPhase:
 
     def rates_of_margins(self, y: Array, k: Array, params: Params) -> Array:
         """Compute the rates of the margins by central difference quotients, see `Switch`."""
-        small = RATE_OF_SLIP_STEP * _reach(y[0])
+        small = RATE_OF_SLIP_STEP * np.clip(np.abs(y[0]), MIN_REACH, 1.0)
         y, step = y[:N_COMPONENTS], small * k[:N_COMPONENTS]
         # behind and ahead at once: there are few trajectories here, and each call has its cost
         beside = np.concatenate([y - step, y + step], axis=1)
@@ -600,7 +600,7 @@ class SlipPhase:
 
     def _held_force(self, y: Array, params: Params, direction: Array) -> Array:
         """Compute the friction force that gives the slip its rate, over G0."""
-        small = RATE_OF_SLIP_STEP * _reach(y[0], motion.MIN_RELEASE_S)
+        small = RATE_OF_SLIP_STEP * np.clip(np.abs(y[0]), motion.MIN_RELEASE_S, 1.0)
         k = self.rates(y, params)
         step = small * k[:N_COMPONENTS]
         ahead, behind = (self._held_slip(y + sign * step, params, direction)[0] for sign in (1.0, -1.0))
@@ -760,12 +760,6 @@ class SlipPhase:
 
 def _taken(params: Params, rows: NDArray[np.intp]) -> Params:
     return tuple(column[rows] for column in params)
-
-
-def _reach(s: Array, least: float = MIN_REACH) -> Array:
-    """Bound abs(s), to which the steps of difference quotients are relative."""
-    # faster than np.clip
-    return np.minimum(np.maximum(np.abs(s), least), 1.0)
 
 
 def _away_from_zero(s: Array) -> Array:

@@ -45,7 +45,7 @@ def locate_switches(problem: Problem, switch: Switch, state: State, trial: Trial
     # of the one before, where its secant vanishes within the next step
     vanishing = trial.h_next / (state.h + trial.h_next)
     may_vanish = np.fmin(trial.h_next * rates + margins, margins) < 0.0
-    may_vanish |= _may_have_low_minimum(margins, rates, before, rates_before, state.h)
+    may_vanish |= (rates_before < 0.0) & (rates > 0.0)
     may_vanish |= np.isnan(rates) & ((margins < vanishing * before) | (margins > FAR_ABOVE * before))
     positions = (may_vanish.any(axis=0) & accepted).nonzero()[0]
     reached = which = positions[:0]
@@ -95,11 +95,6 @@ def _locate(
     slopes = np.where(goes_on, slopes, np.fmin(slopes, 0.0))
     turns = (slopes_before < 0.0) & (slopes > 0.0)
     falls = (is_event_ahead(margins, slopes, h_ahead) | turns).any(axis=0)
-    # the rest for those few whose margin does vanish
-    positions = positions[falls]
-    margins, before, slopes, slopes_before = (rows[:, falls] for rows in (margins, before, slopes, slopes_before))
-    unknown, turns = unknown[:, falls], turns[:, falls]
-    h, h_ahead, goes_on = h[falls], h_ahead[falls], goes_on[falls]
     # the secant of a step that was shortened before has half the height at its start, so that steps across a
     # zero do not approach it from beyond for ever (the Illinois rule)
     height = np.where(state.h_free[positions] > 0.0, 0.5, 1.0) * before
@@ -108,9 +103,9 @@ def _locate(
     picked = which, np.arange(which.size)
     rtol = np.where(unknown[picked] | turns[picked], SWITCH_RTOL, NEAR_SWITCH)
     near = rtol * (h + state.h_last[positions]) + SWITCH_ATOL
-    reached = (np.abs(offset) <= near) & goes_on
-    crossed = (offset < -near) & ~reached
-    is_ahead = (offset > near) & (offset < h_ahead)
+    reached = falls & (np.abs(offset) <= near) & goes_on
+    crossed = falls & (offset < -near) & ~reached
+    is_ahead = falls & (offset > near) & (offset < h_ahead)
     _shorten(state, trial, positions, offset, crossed, crossed | is_ahead)
     return positions[reached], which[reached], offset[reached]
 
@@ -133,13 +128,6 @@ def _first_zero(
     offset = np.where(g < 0.0, crossing, ahead)
     which = offset.argmin(axis=0)
     return which, offset[which, np.arange(which.size)]
-
-
-def _may_have_low_minimum(g: Array, dg: Array, g_before: Array, dg_before: Array, h: Array) -> Mask:
-    """Find steps whose cubic may have one: it does not fall below any of its Bezier points."""
-    third = h / 3.0
-    least = np.minimum(g_before + third * dg_before, g - third * dg)
-    return (dg_before < 0.0) & (dg > 0.0) & (least < LOW_MARGIN * np.maximum(g, g_before))
 
 
 def _low_minimum(g: Array, dg: Array, g_before: Array, dg_before: Array, h: Array) -> Array:
