@@ -182,7 +182,7 @@ def calls_of_columns(result: xr.Dataset) -> dict[str, Call]:
         return impact.sweep({"models": "tsuji-1992", "sweep": {"cases": cases, **others}})["v1_post"].values
 
     def with_points(columns: Any) -> Any:
-        measured = {"e": columns["e"], "e_out": columns["v1"]}
+        measured = {"e": columns["e"], "e_out": columns["e"]}
         points = pd.DataFrame(measured) if isinstance(columns, pd.DataFrame) else measured
         axes = impact.plot(result, kind="restitution", sel={"v1": 1.0}, points=points).axes[0]
         return [list(line.get_ydata()) for line in axes.lines if len(line.get_ydata()) == len(COLUMNS["e"])]

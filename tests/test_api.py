@@ -49,7 +49,7 @@ def test_types_of_results_and_errors_are_public() -> None:
     for name in impact.__all__:
         function = getattr(impact, name)
         if inspect.isfunction(function):
-            for kind in str(inspect.signature(function).return_annotation).split(" | "):
+            for kind in re.findall(r"\w+", str(inspect.signature(function).return_annotation)):
                 member = inspect.unwrap(function).__globals__.get(kind)
                 is_own = inspect.isclass(member) and member.__module__.startswith("impact.")
                 assert not is_own or kind in impact.__all__, f"{name} returns {kind}"

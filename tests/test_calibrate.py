@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from pathlib import Path
 from typing import Any
@@ -222,19 +223,33 @@ def test_excess_without_specimens_says_that_points_repeat(cli: Run, tmp_path: Pa
     assert "20 of 20 points repeat the inputs of another" in done.stdout
 
 
+BALLS_ON_STEEL = """
+models = "kuwabara-kono-1987"
+data = { file = "balls.csv", sigma = 0.01, fit = true }
+sweep = { R1 = "2.5 mm", m2 = inf, material = "steel" }
+"""
+
+
 def test_specimens_that_all_deviate_to_one_side_are_named(cli: Run, tmp_path: Path) -> None:
     """A law with too little change within each specimen fits it at restitutions that none of them has."""
     rows = ["1,a,0.9", "1,a,0.91", "2,a,0.85", "1,b,0.95", "2,b,0.9", "1,c,0.88", "2,c,0.83"]
     text = "\n".join(["v1 [m/s],specimen,e_out", *rows, ""])
     (tmp_path / "balls.csv").write_text(text, encoding="utf-8")
-    config = """
-models = "kuwabara-kono-1987"
-data = { file = "balls.csv", sigma = 0.01, fit = true }
-sweep = { R1 = "2.5 mm", m2 = inf, material = "steel" }
-"""
-    (tmp_path / "fit.toml").write_text(config, encoding="utf-8")
+    (tmp_path / "fit.toml").write_text(BALLS_ON_STEEL, encoding="utf-8")
     done = cli("calibrate", tmp_path / "fit.toml")
     assert "the specimens deviate from kuwabara-kono-1987 to one side, by 0." in done.stdout
+
+
+def test_specimens_that_agree_with_a_law_do_not_deviate_to_one_side(cli: Run, tmp_path: Path) -> None:
+    """The rounding of exact values is the same for all specimens, and far below sigma."""
+    inputs = {"R1": "2.5 mm", "m2": math.inf, "material": "steel", "kuwabara-kono-1987.A": 1e-6}
+    law = impact.prepare(model="kuwabara-kono-1987", at=inputs)
+    exact = {v1: law(v1=v1)["e_out"] for v1 in (0.5, 1.0, 2.0, 3.0)}
+    rows = [f"{v1},{specimen},{e + 1e-9!r}" for specimen in "abcd" for v1, e in exact.items()]
+    (tmp_path / "balls.csv").write_text("\n".join(["v1 [m/s],specimen,e_out", *rows, ""]), encoding="utf-8")
+    (tmp_path / "fit.toml").write_text(BALLS_ON_STEEL, encoding="utf-8")
+    done = cli("calibrate", tmp_path / "fit.toml")
+    assert (done.returncode, "to one side" in done.stdout) == (0, False)
 
 
 @pytest.mark.slow

@@ -747,6 +747,15 @@ def test_a_legend_in_foreign_axes_fits_them_and_takes_no_room() -> None:
     ]
 
 
+def test_a_picture_without_entries_keeps_the_legend_of_foreign_axes() -> None:
+    result = impact.sweep(models="flores-2011", e=[0.5, 0.9], v1=[1.0, 2.0])
+    axes = Figure((6.6, 4.0)).subplots()
+    axes.plot([], [], label="mine")
+    legend = axes.legend()
+    impact.plot(result, kind="map", variable="e_out", ax=axes)
+    assert axes.get_legend() is legend
+
+
 def test_a_picture_without_legend_and_foreign_axes_without_title(coarse: xr.Dataset) -> None:
     axes = Figure((4.0, 4.0)).subplots(1, 2)
     impact.plot(coarse, kind="restitution", ax=axes[0], legend="none")

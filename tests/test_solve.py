@@ -221,6 +221,18 @@ def test_the_command_ends_well_without_a_root(cli: Run) -> None:
     assert "no value of e gives e_out = 0.6; e_out is from 0 to 0.593624" in done.stdout
 
 
+def test_the_ends_of_a_range_of_materials_are_named() -> None:
+    range_of = {"material1": ["steel", "glass"]}
+    result = impact.solve("tsuji-1992", "e", {"e_out": 0.6}, over=range_of)
+    assert str(result) == "e = 0.6: e_out from 0.6 at material1 = steel to 0.6 at material1 = glass"
+    assert [condition["material1"] for condition in result.over or ()] == range_of["material1"]
+
+
+def test_a_range_that_does_not_count_is_refused() -> None:
+    with pytest.raises(UsageError, match="over: alpha does not count if e is solved for"):
+        impact.solve("tsuji-1992", "e", {"e_out": 0.6}, over={"alpha": [0.1, 0.2]})
+
+
 def test_the_text_has_a_line_for_each_root() -> None:
     result = impact.solve("mujoco-solref", "dampratio", {"contact_time": 0.01})
     (root,) = result.roots

@@ -39,7 +39,8 @@ Laws and what they need: models, frictions, materials, cite, check_model, hyster
 Classes of laws: ForceModel, FrictionLaw, Parameter, Evidence
 
 Classes of results: Impact, PreparedProblem, Ranking, SolveResult, TimestepResult, Export, Estimate, Verdict,
-SweepOutcome, ShardProgress, PlotFiles, Info, Fits, Studies, Board, Engines, Models, ModelDescription, Frictions,
+SweepOutcome, Progress, ShardProgress, PlotFiles, Info, Fits, Studies, Board, Engines, Models, ModelDescription,
+Frictions,
 FrictionDescription, ContractResult, Citations, Environment
 
 Errors and warnings: ImpactError, ConfigError, ModelError, ResultError, StoreError, UsageError, InUseError,
@@ -48,6 +49,7 @@ UnfinishedError, MissingFileError, ImpactWarning
 
 from __future__ import annotations
 
+import ast
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -55,13 +57,14 @@ from typing import Any
 
 from ._version import __version__ as __version__
 
-# type checkers read the same names; each is imported on first use, so that `impact --help` needs no numpy
-_STUB = Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8")
+# the stub lists the public names for type checkers; each is imported on first use, so that `impact --help` needs
+# no numpy
+_STUB = ast.parse(Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8"))
 _MODULES = {
-    name: f".{module}"
-    for module, _, names in (statement.partition(" import ") for statement in _STUB.split("from .")[1:])
-    for name in names.replace("(", " ").replace(")", " ").replace(",", " ").split()
-    if name != "as"
+    alias.name: f".{statement.module}"
+    for statement in _STUB.body
+    if isinstance(statement, ast.ImportFrom)
+    for alias in statement.names
 }
 __all__ = sorted(_MODULES.keys() - {"__version__"})
 

@@ -22,6 +22,7 @@ from .engine.friction_catalogue import (
     frictions as frictions,
 )
 from .engine.model_catalogue import ModelDescription as ModelDescription, Models as Models, models as models
+from .engine.run import Progress as Progress
 from .errors import (
     ConfigError as ConfigError,
     ImpactError as ImpactError,

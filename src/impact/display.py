@@ -244,17 +244,17 @@ def _flat_cell(cell: object, decimal: str) -> object:
     """Write values by name, and ranges, as text."""
 
     def write(value: object) -> str:
-        return (
-            number(value).replace(".", ",") if isinstance(value, float) and decimal == "comma" else number(value)
-        )
+        text = number(value)
+        return text.replace(".", DECIMALS[decimal]) if isinstance(value, float) else text
 
+    separator = ", " if decimal == "point" else "; "
     match cell:
         case dict():
-            return ", ".join(f"{name} = {write(value)}" for name, value in cell.items())
+            return separator.join(f"{name} = {write(value)}" for name, value in cell.items())
         case (float() as low, float() as high):
             return f"{write(low)} to {write(high)}"
         case tuple() | list():
-            return ", ".join(str(_flat_cell(part, decimal)) for part in cell)
+            return separator.join(str(_flat_cell(part, decimal)) for part in cell)
     return cell
 
 

@@ -24,12 +24,12 @@ def complete_friction(incomplete: str) -> list[str]:
     return _beginning_with(incomplete, impact.frictions())
 
 
-def complete_key_of(module: str, table: str, ending: str = "") -> Callable[[str], list[str]]:
-    """Make the completion of the keys of a table, whose module is imported when a key is completed."""
+def complete_key_of(module: str, table: str, suffix: str = "") -> Callable[[str], list[str]]:
+    """Make the completion of the keys of a table with a suffix; its module is imported when one is completed."""
 
     def complete(incomplete: str) -> list[str]:
         keys = getattr(import_module(f"impact.{module}"), table)
-        return [f"{key}{ending}" for key in _beginning_with(incomplete, keys)]
+        return [f"{key}{suffix}" for key in _beginning_with(incomplete, keys)]
 
     return complete
 

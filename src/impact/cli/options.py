@@ -144,7 +144,7 @@ def output(help: str, metavar: str | None = None) -> Any:
     return typer.Option("-o", "--output", metavar=metavar, help=help)
 
 
-def whole_number(help: str, *names: str) -> Any:
+def whole_number(help: str, names: Sequence[str] = ()) -> Any:
     """Declare an option whose value is a whole number of at least 1."""
     return value("N", help, parser=parse_whole_number, names=names)
 
@@ -230,7 +230,7 @@ Select = Annotated[
 ]
 Models = Annotated[list[str] | None, model("Only this model; may be repeated.")]
 Frictions = Annotated[list[str] | None, friction("Only this friction law; may be repeated.")]
-Jobs = Annotated[int, whole_number("Number of processes.", "--jobs", "-j")]
+Jobs = Annotated[int, whole_number("Number of processes.", names=["--jobs", "-j"])]
 Threads = Annotated[int, whole_number("Number of threads, instead of processes.")]
 MaxPoints = Annotated[int, whole_number("Largest number of points in layout full, of trajectories otherwise.")]
 Tolerance = Annotated[

@@ -10,6 +10,7 @@ from typing import Any, Literal, get_args
 import xarray as xr
 
 from ..contact.status import Status
+from ..contact.units import names_in
 from ..contact.variables import OUTPUTS
 from ..display import Block, Displayed, Table, Wrapped
 from ..formatting import number, prefixed, safe_text
@@ -98,7 +99,9 @@ class VariableComparison:
 
     def worst_text(self, digits: int) -> str:
         """Write the largest difference with its unit."""
-        return prefixed(self.worst, OUTPUTS[self.name].unit if self.name in OUTPUTS else "1", digits)
+        unit = OUTPUTS[self.name].unit if self.name in OUTPUTS else "1"
+        # an exponent n has a value for each law
+        return prefixed(self.worst, "1" if names_in(unit) else unit, digits)
 
 
 def _format_outcome(name: str, value: float) -> str:

@@ -279,12 +279,19 @@ def _find_separator(path: Path, numbered: Sequence[tuple[int, str]], is_looked_f
 def _with_decimal_points(columns: Columns, decimal: str, looked_for: Sequence[str]) -> Columns:
     """Write decimal commas as points; the sign is that of all numbers, else of those that are looked for."""
     for names in [looked_for] if decimal else [list(columns.cells), looked_for]:
-        cells = [cell for name in names for cell in zip(columns.lines, map(str, columns.cells[name]), strict=True)]
-        numbers = {sign: [cell for cell in cells if form.fullmatch(cell[1])] for sign, form in NUMBER_WITH.items()}
-        signs = {sign: of_sign for sign, of_sign in numbers.items() if of_sign}
+        cells = [
+            (line, str(cell))
+            for name in names
+            for line, cell in zip(columns.lines, columns.cells[name], strict=True)
+        ]
+        numbers = {
+            sign: [(line, cell) for line, cell in cells if pattern.fullmatch(cell)]
+            for sign, pattern in NUMBER_WITH.items()
+        }
+        signs = {sign: found for sign, found in numbers.items() if found}
         if len(signs) == 1:
             break
-    places = {sign: f"{columns.source}:{of_sign[0][0]}" for sign, of_sign in signs.items()}
+    places = {sign: f"{columns.source}:{found[0][0]}" for sign, found in signs.items()}
     if not decimal and len(signs) > 1:
         got = f"got a decimal comma, and a point in line {signs['.'][0][0]}, expected one of them"
         raise ConfigError(f'{places[","]}: {got}; decimal = "," or decimal = "." settles it')

@@ -313,18 +313,18 @@ def _read_column(
     si_unit, name = column.quantity.unit, safe_text(header, 60)
     if columns.is_text and not unit and si_unit != "1" and any(_as_float(cell) is not None for cell in cells):
         return (), [(None, f'got no unit, expected one in brackets, such as "{name} [{si_unit}]"')]
-    problems = [] if unit else percent_problems(cells, column.quantity, name)
-    return ((), problems) if problems else columns.read(header, column.quantity, n, unit)
+    problem = None if unit else percent_problem(cells, column.quantity, name)
+    return ((), [problem]) if problem else columns.read(header, column.quantity, n, unit)
 
 
-def percent_problems(cells: Sequence[object], quantity: Quantity | None, header: str) -> list[_CellProblem]:
-    """Describe the first value of a fraction without a unit that may be in percent, if there is one."""
+def percent_problem(cells: Sequence[object], quantity: Quantity | None, header: str) -> _CellProblem | None:
+    """Describe the first value of a fraction without a unit that may be in percent; None if there is none."""
     most = _INTERVALS["fraction"]["most"]
-    if quantity is None or quantity.most != most:
-        return []
     large = [index for index, cell in enumerate(cells) if (_as_float(cell) or 0.0) > most]
+    if quantity is None or quantity.most != most or not large:
+        return None
     hint = f'percent? name the unit, as in "{header} [%]"{also(len(large) - 1)}'
-    return [(index, f"got {as_text(cells[index])}, expected a fraction: {hint}") for index in large[:1]]
+    return large[0], f"got {as_text(cells[large[0]])}, expected a fraction: {hint}"
 
 
 def _as_float(cell: object) -> float | None:

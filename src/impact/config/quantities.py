@@ -174,15 +174,19 @@ def known_name(description: str, choices_of: Callable[[ValidationInfo], Sequence
     return BeforeValidator(check)
 
 
-def simplified(**more: object) -> Callable[[dict[str, Any]], None]:
-    """Build the change of a schema: no null defaults, which TOML does not have, a short description, and more."""
+def schema_simplifier(**extra: object) -> Callable[[dict[str, Any]], None]:
+    """Return a function that simplifies a JSON schema.
+
+    Null defaults, which TOML does not have, are removed, as is all but the first line of the description; `extra`
+    keys are added.
+    """
 
     def simplify(schema: dict[str, Any]) -> None:
         schema["description"] = schema.get("description", "").split("\n")[0]
         for key_schema in schema.get("properties", {}).values():
             if key_schema.get("default", 0) is None:
                 del key_schema["default"]
-        schema.update(more)
+        schema.update(extra)
 
     return simplify
 
@@ -197,7 +201,7 @@ class Table(BaseModel):
         protected_namespaces=(),
         # commands that read no config need no validators
         defer_build=True,
-        json_schema_extra=simplified(),
+        json_schema_extra=schema_simplifier(),
     )
 
 
@@ -240,7 +244,7 @@ class Column(Table):
 class _OneForm(Table):
     """A table that describes several numbers in one of several forms: exactly one of its fields is given."""
 
-    model_config = ConfigDict(json_schema_extra=simplified(minProperties=1, maxProperties=1))
+    model_config = ConfigDict(json_schema_extra=schema_simplifier(minProperties=1, maxProperties=1))
     FORMS: ClassVar[Mapping[str, str]]
     EXPECTED: ClassVar[str]
 

@@ -55,7 +55,7 @@ from .quantities import (
     located_errors,
     mismatch_error,
     name_or_names,
-    simplified,
+    schema_simplifier,
     value_error,
 )
 
@@ -233,7 +233,7 @@ OBLIQUE_DEFAULTS = {"omega1": 0.0, "omega2": 0.0, "inertia_factor1": 0.4, "inert
 LAW_STIFFNESS = Quantity("N/m^n", "stiffness of this law, in place of the sweep's", 0, above=True)
 
 
-@dataclass(frozen=True, config=ConfigDict(extra="forbid", json_schema_extra=simplified()))
+@dataclass(frozen=True, config=ConfigDict(extra="forbid", json_schema_extra=schema_simplifier()))
 class Solver:
     """How impacts are integrated."""
 
@@ -264,7 +264,7 @@ def _list_or_none(value: object) -> object:
     raise mismatch_error(value, "a list of names")
 
 
-@dataclass(frozen=True, config=ConfigDict(extra="forbid", json_schema_extra=simplified()))
+@dataclass(frozen=True, config=ConfigDict(extra="forbid", json_schema_extra=schema_simplifier()))
 class Output:
     """What of a result is stored, and how."""
 
@@ -333,7 +333,7 @@ class Data(Table):
 
     # the measurements are in a file or in the config
     model_config = ConfigDict(
-        json_schema_extra=simplified(anyOf=[{"required": ["file"]}, {"required": ["columns"]}])
+        json_schema_extra=schema_simplifier(anyOf=[{"required": ["file"]}, {"required": ["columns"]}])
     )
 
     file: Annotated[Any, ReadAs(str), expected("the name of a CSV file")] = Field(

@@ -355,7 +355,7 @@ def _damping(pair: Pair, oblique: ObliqueImpacts) -> Array:
             return _normal_damping(pair.model, impacts) * np.sqrt(_stiffness(pair, oblique) / impacts.n)
         case "cone":
             b_t = _parameter(law, oblique, "b_t")
-            b = _first_force(pair.model, impacts) if b_t is None else impacts.in_own_units(b_t, "1/s")
+            b = _force_at_first_contact(pair.model, impacts) if b_t is None else impacts.in_own_units(b_t, "1/s")
             return b / _cone_compliance(law, oblique)
     is_on, is_hertz = _value(law, oblique, "tangential_damping"), impacts.n == HERTZ
     if not is_hertz.any():
@@ -372,8 +372,8 @@ def _cone_compliance(law: FrictionLaw, oblique: ObliqueImpacts) -> Array:
     return impedance / oblique.mass_ratio + (1.0 - impedance) / _value(law, oblique, "impratio")
 
 
-def _first_force(model: ForceModel, impacts: Impacts) -> Array:
-    """Compute the force at first contact, where the velocity is 1, in the contact's own units."""
+def _force_at_first_contact(model: ForceModel, impacts: Impacts) -> Array:
+    """Compute the force at first contact in the contact's own units, in which the velocity is 1."""
     values, shape = _law_values(model, model.quantities, impacts, float(impacts.n.flat[0]))
     force = call_by_name(model.force, {**values, "x": 0.0, "v": 1.0, "elastic": 0.0})
     return np.broadcast_to(force, int(np.prod(shape))).reshape(shape)
@@ -460,7 +460,7 @@ _FACTORS_OF_DAMPING = {
 def _adhesion_problems(pair: Pair, oblique: ObliqueImpacts) -> Iterator[tuple[Mask, str]]:
     """Find where a contact force pulls from the start and friction is not Coulomb's, of a pressing force."""
     try:
-        pulls = _first_force(pair.model, oblique.impacts) < 0.0
+        pulls = _force_at_first_contact(pair.model, oblique.impacts) < 0.0
     except ModelError:
         # the integration reports it
         return

@@ -177,10 +177,11 @@ def _simulate_distinct(
     law_values = with_coefficients(model, with_units(values, n), count)
     status = check_coefficients(model, law_values, values, count)
     exact, chi = exact_restitution(model, law_values, count), chi_of(law_values, count)
-    chosen, parts = status == STATUS_OK, []
+    chosen = status == STATUS_OK
+    parts = []
     for problems in distinct_problems(model, n, law_values, chosen, collapse, separates_strong=separates_strong):
-        never = exact[problems.rows][problems.first] == 0.0
-        distinct = compute(problems.law, problems.params, never.size, never_separates=never)
+        never_separates = exact[problems.rows][problems.first] == 0.0
+        distinct = compute(problems.law, problems.params, never_separates.size, never_separates=never_separates)
         parts.append((problems.rows, distinct.take(problems.row_of_impact)))
     result = replace(CollisionResult.joined(count, status, parts), chi=chi, exact=exact)
     stopped = status == LIMIT

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,18 +29,24 @@ def index_of(cells: NDArray[np.integer], shape: Sequence[int]) -> Index:
     return np.unravel_index(cells, shape) if shape else ()
 
 
+class StoredStiffness(NamedTuple):
+    """K [N/m^n] of a law as a file stores it: the axes on which it depends, and its values over them."""
+
+    axes: tuple[int, ...]
+    values: NDArray[np.float64]
+
+
 @dataclass(frozen=True)
 class Inputs:
     """The inputs of a sweep: scalars by config name, and the axes of its grid in config order.
 
-    `stiffness` is K [N/m^n] of the laws of a file that have a rule for it, by the config name of their K: the axes
-    on which it depends, and its values over them.
+    `stiffness` has K of the laws of a file that have a rule for it, by its config name, such as "kratos-linear.K".
     """
 
     scalars: Mapping[str, float | str]
     axes: tuple[Axis, ...]
     materials: Mapping[str, Material]
-    stiffness: Mapping[str, tuple[tuple[int, ...], NDArray[np.float64]]] = field(default_factory=dict)
+    stiffness: Mapping[str, StoredStiffness] = field(default_factory=dict)
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -65,6 +72,8 @@ class Inputs:
 
     def axes_of(self, name: str) -> tuple[int, ...]:
         """List the axes along which a name varies: none for a scalar."""
+        if name in self.stiffness:
+            return self.stiffness[name].axes
         return tuple(number for number, axis in enumerate(self.axes) if name in axis.columns)
 
     def column(self, name: str, index: Index) -> NDArray[np.generic]:
@@ -72,8 +81,8 @@ class Inputs:
         if name in self.scalars:
             return np.full((1,) * dimensions(index), self.scalars[name])
         if name in self.stiffness:
-            axes, values = self.stiffness[name]
-            at_cells = values[tuple(index[axis] for axis in axes)]
+            axes, K = self.stiffness[name]
+            at_cells = K[tuple(index[axis] for axis in axes)]
             return at_cells if axes else at_cells.reshape((1,) * dimensions(index))
         (number,) = self.axes_of(name)
         return self._arrays[name][index[number]]
@@ -82,6 +91,8 @@ class Inputs:
         """Look up all values of a name: those of its axis, or a single one, None for a name without a value."""
         if name in self._arrays:
             return self._arrays[name]
+        if name in self.stiffness:
+            return self.stiffness[name].values
         parsed = InputName.parse(name)
         material = self.materials.get(parsed.material)
         constant = getattr(material, parsed.key) if material is not None else None

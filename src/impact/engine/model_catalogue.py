@@ -92,9 +92,9 @@ class ModelDescription(Displayed):
         yield Table([row for row in rows.items() if row[1]], max_cell=MAX_TEXT)
 
 
-def law_record(law: ForceModel | FrictionLaw, *others: str) -> dict[str, Any]:
-    """The declaration of a law as plain data, with other fields; a parameter lacks what few have."""
-    names = ("key", "title", "year", "equation", "reference", "doi", "same_as", *others)
+def law_record(law: ForceModel | FrictionLaw, *more_fields: str) -> dict[str, Any]:
+    """Convert the declaration of a law to plain data; rare fields of a parameter are left out where empty."""
+    names = ("key", "title", "year", "equation", "reference", "doi", "same_as", *more_fields)
     rare = ("optional", "choices", "is_damping")
     return {
         **{name: getattr(law, name) for name in names},

@@ -159,15 +159,16 @@ def law_for_version(key: str, version: str) -> str:
 def parameters(collision: Collision) -> dict[str, float | str]:
     """Write the numbers of pair_coeff; of hertz, k_n is K/√R*."""
     spring, _, _ = OPTIONS[collision.model.key]
-    constant = collision.model.damping
-    last: dict[str, float | str] = {"eta_n0": collision[constant]} if constant else {"e": collision["e"]}
+    damping = collision.model.damping
+    # LAMMPS names every damping constant eta_n0
+    strength: dict[str, float | str] = {"eta_n0": collision[damping]} if damping else {"e": collision["e"]}
     if takes_moduli(collision):
-        of_normal = {"E": collision["E1"], **last, "nu": collision["nu1"]} | (
+        of_normal = {"E": collision["E1"], **strength, "nu": collision["nu1"]} | (
             {} if collision.has_one_material else {"E2": collision["E2"], "nu2": collision["nu2"]}
         )
     else:
         k = collision["K"] if spring == "hooke" else collision["K"] / math.sqrt(collision.effective_radius)
-        of_normal = {"k_n": k, **last}
+        of_normal = {"k_n": k, **strength}
     return {**of_normal, **friction_parameters(collision)}
 
 

@@ -19,7 +19,8 @@ CODES: dict[str, Code] = {name: import_module(f".{name}", __package__).CODE for 
 
 
 def find_code(name: str) -> Code:
+    """Find a code by its key; the error for a word of its title names the key."""
     if name not in CODES:
-        by_title = next((key for key, code in CODES.items() if name.lower() in code.title.lower().split()), name)
-        raise UsageError(f'{argument("to")}: no code "{name}"; {did_you_mean(by_title, list(CODES))}')
+        key = next((key for key, code in CODES.items() if name.lower() in code.title.lower().split()), name)
+        raise UsageError(f'{argument("to")}: no code "{name}"; {did_you_mean(key, list(CODES))}')
     return CODES[name]

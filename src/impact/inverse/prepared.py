@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -33,7 +32,7 @@ from ..engine.inputs import Inputs
 from ..engine.plan import Plan
 from ..engine.plugins import read_plugins
 from ..engine.trajectories import PlanLaw, model_of
-from ..errors import UsageError, did_you_mean
+from ..errors import UsageError, did_you_mean, warn
 from ..results.selection import as_keys
 from ..results.single_impact import open_source, single_point
 
@@ -100,7 +99,7 @@ def outputs_at(
         compute=compute,
     )
     for error in errors.values():
-        warnings.warn(error, stacklevel=2)
+        warn(error)
     return outputs
 
 

@@ -40,7 +40,7 @@ from ..engine.inputs import Inputs
 from ..engine.plan import Plan
 from ..engine.plugins import read_plugins
 from ..errors import UsageError, did_you_mean
-from ..formatting import argument, number, quantity
+from ..formatting import argument, number, quantity, safe_text
 from ..results.ranking import target_value
 from ..results.single_impact import PointSource, open_source, single_point, warn_of_ignored_e
 from .prepared import outputs_at, trial_inputs
@@ -103,7 +103,7 @@ class SolveResult(Displayed):
     status: SolveStatus
     roots: tuple[Root, ...]
     attainable: tuple[float, float]
-    over: tuple[Mapping[str, float], ...] | None
+    over: tuple[Mapping[str, float | str], ...] | None
     friction: str = ""
 
     def as_dict(self) -> dict[str, Any]:
@@ -129,7 +129,7 @@ class SolveResult(Displayed):
             else:
                 name = next(iter(self.over[0]))
                 ends = (
-                    f"{number(condition[variable])} at {name} = {number(condition[name])}"
+                    f"{number(condition[variable])} at {name} = {safe_text(number(condition[name]), 60)}"
                     for condition in (self.over[0], self.over[-1])
                 )
                 yield f"{line}: {variable} from {' to '.join(ends)}"
@@ -199,6 +199,8 @@ def solve(
     unknown = unknown_of(law, name, friction_law)
     inputs = {**placeholder(law, unknown), **(at or {})}
     config, _ = single_point(point_source, model, inputs, over, friction=friction)
+    if over and not config.axes:
+        raise UsageError(f"{argument('over')}: {next(iter(over))} does not count if {unknown.name} is solved for")
     return solve_input(config, unknown, target)
 
 
@@ -648,9 +650,8 @@ def _best_over_axis(problem: SolveProblem, target: float) -> SolveResult:
         candidates.append((float(refined.fun), float(refined.x)))
     value = min(candidates)[1]
     outputs = problem.evaluate(np.full(axis.size, value), conditions)
-    inputs = {name: column for name, column in axis.columns.items() if not isinstance(column[0], str)}
     over = tuple(
-        {name: float(column[condition]) for name, column in inputs.items()}
+        {name: column[condition] for name, column in axis.columns.items()}
         | {name: float(outputs[name][condition]) for name in dict.fromkeys((problem.variable, "e_out"))}
         for condition in conditions.tolist()
     )
@@ -665,7 +666,7 @@ def _result(
     status: SolveStatus,
     roots: Iterable[Root],
     values: Array,
-    over: tuple[Mapping[str, float], ...] | None = None,
+    over: tuple[Mapping[str, float | str], ...] | None = None,
 ) -> SolveResult:
     return SolveResult(
         model=problem.model.key,

@@ -23,7 +23,7 @@ from ..errors import UsageError
 from ..formatting import NO_BREAK, heading
 from .data import MEASURED, LegendEntries, Points
 from .kinds import Choice
-from .labels import LawPart, label_axis, pretty_conditions, symbol, words_of, write_beside
+from .labels import LawPart, annotate_right_edge, label_axis, pretty_conditions, symbol, words_of
 from .slices import unit_of
 from .style import FAINT, SOFT, is_geometric, law_key, model_styles, tint
 
@@ -309,7 +309,7 @@ def _label_guides(axes: Axes, guides: Sequence[Curve]) -> None:
     for guide in sorted(guides, key=lambda curve: curve.y[-1]):
         lowest = max((guide.y[-1] - low) / (high - low), lowest + LABEL_DISTANCE)
         text = pretty_conditions(guide.case.replace(" ", NO_BREAK))
-        write_beside(axes, text, lowest, 4, xycoords="axes fraction", fontsize="small")
+        annotate_right_edge(axes, text, lowest, 4, xycoords="axes fraction", fontsize="small")
 
 
 def _draw_bands(axes: Axes, panel: Panel) -> None:
@@ -330,14 +330,14 @@ def _label_bands(axes: Axes, panel: Panel) -> None:
     for band in panel.bands if panel.y_log else ():
         is_below = band != panel.bands[0] and band > (low * high) ** 0.5
         alignment = "top" if is_below else "bottom"
-        write_beside(axes, f"{band:g}", band, 3, -1 if is_below else 1, va=alignment, color=BAND_COLOUR)
+        annotate_right_edge(axes, f"{band:g}", band, 3, -1 if is_below else 1, va=alignment, color=BAND_COLOUR)
 
 
 def _label_floor(axes: Axes, panel: Panel) -> None:
     """Write beside the axis that values at the floor are that or less."""
     floor = panel.y_floor
     if floor is not None and any(y < floor for curve in panel.curves for y in curve.y):
-        write_beside(axes, f"≤ $10^{{{math.log10(floor):.0f}}}$", floor, 3)
+        annotate_right_edge(axes, f"≤ $10^{{{math.log10(floor):.0f}}}$", floor, 3)
 
 
 def _label_axes(axes: Axes, panel: Panel, labels: Mapping[str, str], *, last: bool) -> None:

@@ -11,7 +11,7 @@ import pandas as pd
 import xarray as xr
 
 from ..config.columns import columns_of_table, complete_rows, near_miss, read_csv
-from ..config.measurements import MEASURED_OUTPUTS, SIGMA, SPECIMEN, derive_impacts, percent_problems
+from ..config.measurements import MEASURED_OUTPUTS, SIGMA, SPECIMEN, derive_impacts, percent_problem
 from ..config.quantities import Quantity
 from ..config.tables import LABORATORY, STANDARD_GRAVITY, SWEEP_QUANTITIES
 from ..contact.variables import HISTORY, OUTPUTS
@@ -138,7 +138,9 @@ def read_points(points: str | Path | Mapping[str, Sequence[object]] | pd.DataFra
             unit = columns.units.get(measured, "")
             quantity = replace(quantity, unit=quantities[measured].unit) if measured else quantity
         if not (columns.units[name] or unit):
-            for row, message in percent_problems(columns.cells[name], MEASURED_OUTPUTS.get(name), name):
+            problem = percent_problem(columns.cells[name], MEASURED_OUTPUTS.get(name), name)
+            if problem:
+                row, message = problem
                 raise ConfigError(columns.problem(message, name, row))
         values[name] = tuple(map(float, columns.values(name, quantity, None, unit)))
         variable = name

@@ -16,7 +16,7 @@ from ..comparison.verdict import Verdict
 from ..errors import UsageError
 from ..formatting import number, safe_text
 from ..results.schema import SCHEMA
-from .labels import axis_text, escape_mathtext, number_axis, words_of, write_beside
+from .labels import annotate_right_edge, axis_text, escape_mathtext, number_axis, words_of
 from .layout import Picture
 from .slices import unit_of
 from .style import COLOURS, MARKERS, default_size, is_geometric, styled, tint
@@ -29,7 +29,7 @@ MIN_DRAWN_RATIO = 1e-4
 MAX_NAME_LENGTH = 34
 MAX_TICKS = 24
 # from this number of names on the markers are smaller
-MANY_POINTS = 40
+MANY_NAMES = 40
 # ratio of the ends of the band above the panel for differences that have no number
 NO_NUMBER_BAND = 20.0
 # distance of the first and the last symbol at a name, over that of names
@@ -99,7 +99,7 @@ def draw_differences(plot_data: DifferenceData) -> Figure:
         figure = Picture(width, escape_mathtext(plot_data.title))
         grid = figure.add_gridspec(len(rows), 2)
         names = list(dict.fromkeys(name for panel in plot_data.panels for name in panel.ratios))
-        # of the vertical axes, with the tolerance and the band for differences without a number
+        # the vertical axes include the tolerance and the band for differences without a number
         ratios = [
             r for panel in plot_data.panels for row in panel.ratios.values() for r in row if 0.0 < r < np.inf
         ]
@@ -159,7 +159,7 @@ def _draw_panel(
             "color": COLOURS[index % len(COLOURS)],
             "marker": MARKERS[index % len(MARKERS)],
             "markerfacecolor": tint(0.0),
-            "markersize": 2.5 if panel.names and len(x) > MANY_POINTS else 4.5,
+            "markersize": 2.5 if panel.names and len(x) > MANY_NAMES else 4.5,
         }
         counted = np.where(np.isfinite(ratio) & (ratio > 0.0), np.maximum(ratio, bottom), np.nan)
         # on a line of many points a few symbols, and those that have no line to one of the neighbours
@@ -193,21 +193,21 @@ def _draw_panel(
 
 def _draw_limit(axes: Axes, height: float, name: str, **style: Any) -> None:
     axes.axhline(height, color=tint(1.0), **style)
-    write_beside(axes, name, height, -2, -3, ha="right", va="top")
+    annotate_right_edge(axes, name, height, -2, -3, ha="right", va="top")
 
 
 def _label_ticks(axes: Axes, panel: DifferencePanel, x: np.ndarray) -> None:
     """Write names below the points, at most MAX_TICKS."""
     every = max(1, -(-len(x) // MAX_TICKS))
     names = panel.names[::every]
-    # more than MAX_NAMES_LENGTH have a whole row
-    is_wide = sum(map(len, names)) > MAX_WIDE_NAMES_LENGTH
+    # a panel with more than MAX_NAMES_LENGTH letters has a whole row; the longest name has to fit its place
+    is_tilted = len(names) * max(map(len, names), default=0) > MAX_WIDE_NAMES_LENGTH
     axes.set_xticks(
         x[::every],
         names,
         parse_math=False,
         fontsize="small",
-        rotation=20 if is_wide else 0,
+        rotation=20 if is_tilted else 0,
         rotation_mode="anchor",
-        ha="right" if is_wide else "center",
+        ha="right" if is_tilted else "center",
     )

@@ -12,6 +12,7 @@ import pandas as pd
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter
 
@@ -84,7 +85,8 @@ def plot(
     title : write the title and the conditions; by default unless `ax` is set
     legend : name laws by title, year and parameters ("full"), by first author and year ("short"), or by key
         ("keys"); "none" for no legend; by default the first of these with which it takes at most a fifth of the
-        height, else the shortest in a higher picture; in `ax` the first with which it is as wide as the axes
+        height, else the shortest in a higher picture; in `ax` the first with which it is no wider than the axes,
+        else the keys
     decimal : "point" or "comma", in all numbers; "locale" for that of LC_NUMERIC
     labels : texts by the name of an axis, of a variable whose name is at the end of its curve, the key of a law,
         "reference" or "title"
@@ -189,13 +191,12 @@ def _legend_for(axes: Axes, plot_data: PlotData, look: Look) -> str:
     """Choose the longest names of laws with which a legend is no wider than the user's axes, else the keys."""
     for legend in DEFAULT_LEGENDS:
         names = {**plot_data.laws, **_labels(plot_data, replace(look, legend=legend))}
-        texts = [names[law] for law in plot_data.laws]
-        drawn = axes.legend([Line2D([], []) for _ in texts], texts, fontsize="small")
-        is_wide = drawn.get_window_extent().width > axes.bbox.width
-        drawn.remove()
-        if not is_wide:
-            break
-    return legend
+        handles = [Line2D([], []) for _ in plot_data.laws]
+        # not added to the axes, which may have a legend of the user
+        drawn = Legend(axes, handles, [names[law] for law in plot_data.laws], fontsize="small")
+        if drawn.get_window_extent().width <= axes.bbox.width:
+            return legend
+    return DEFAULT_LEGENDS[-1]
 
 
 def _labels(plot_data: PlotData, look: Look) -> dict[str, str]:

@@ -154,15 +154,14 @@ def legend_labels(laws: Collection[str], legend: str) -> dict[str, str]:
     keys = {law: law.split(WITH) for law in laws}
     if len({model for model, *_ in keys.values()}) == 1:
         keys = {law: friction or [model] for law, (model, *friction) in keys.items()}
-    if legend == "keys":
-        return {law: escape_mathtext(safe_text(WITH.join(parts), 80)) for law, parts in keys.items()}
 
     def short(key: str) -> str:
         law = catalogue().get(key) or frictions().get(key)
         # a plug-in is not in the catalogue
         return key if law is None else re.sub(THREE_AUTHORS, r"\1 et al.", with_year(law.title, law.year))
 
-    return {law: escape_mathtext(safe_text(WITH.join(map(short, parts)), 80)) for law, parts in keys.items()}
+    write = str if legend == "keys" else short
+    return {law: escape_mathtext(safe_text(WITH.join(map(write, parts)), 80)) for law, parts in keys.items()}
 
 
 def parameters_of_laws(laws: Mapping[str, str], names: Mapping[str, str]) -> str:
@@ -239,10 +238,10 @@ def friction_text(key: str, inputs: Mapping[str, object], units: Mapping[str, st
     return ", ".join(filter(None, (law.title, parameter_text(f"friction.{key}", chosen, units))))
 
 
-def write_beside(axes: Axes, text: str, height: float, right: float, up: float = 0.0, **style: Any) -> None:
-    """Write a text at the right end of the axes, at a height in data, moved by points to the right and up."""
+def annotate_right_edge(axes: Axes, text: str, y: float, dx: float, dy: float = 0.0, **style: Any) -> None:
+    """Write a text at the right edge of axes, at y in data unless `xycoords` is given, and an offset in points."""
     place = {"xycoords": ("axes fraction", "data"), "va": "center", "fontsize": "x-small", "color": tint(SOFT)}
-    axes.annotate(text, (1.0, height), (right, up), textcoords="offset points", **(place | style))
+    axes.annotate(text, (1.0, y), (dx, dy), textcoords="offset points", **(place | style))
 
 
 def label_axis(

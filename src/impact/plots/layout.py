@@ -275,28 +275,31 @@ class Picture(Figure):
     def fit_labels(self, height: float, *, may_shrink: bool) -> list[str]:
         """Break the labels and names of all panels to the length of their axis; returns their texts.
 
-        Letters of all labels of a direction, and of all names, are smaller where one of them does not fit. Before
-        the first layout the lengths are not those of the picture: nothing may shrink.
+        All labels of horizontal axes, all of vertical axes and all names of panels have one size each, a smaller
+        one if any of them does not fit. Before the first layout the lengths are not those of the picture: nothing
+        may shrink.
         """
         # in a single row of panels of a height [px] a vertical label may be longer than its axis
         rows = len({round(axes.get_position().y0, 1) for axes in self.axes})
         least = LABEL_SHARE_OF_ROW * height if rows == 1 else 0.0
-        across, up, names = dict[Text, float](), dict[Text, float](), dict[Text, float]()
+        # the longest line of each text [px]
+        panel_names, x_labels, y_labels = dict[Text, float](), dict[Text, float](), dict[Text, float]()
         for axes in self.axes:
             box = axes.get_window_extent()
             titles = [text for text in axes.get_children() if isinstance(text, Text) and text not in axes.texts]
-            names |= dict.fromkeys(titles, box.width)
-            across[axes.xaxis.label] = LABEL_SHARE_OF_AXIS * box.width
-            up[axes.yaxis.label] = max(LABEL_SHARE_OF_AXIS * box.height, least)
-        for lengths in (names, across, up):
+            panel_names |= dict.fromkeys(titles, box.width)
+            x_labels[axes.xaxis.label] = LABEL_SHARE_OF_AXIS * box.width
+            y_labels[axes.yaxis.label] = max(LABEL_SHARE_OF_AXIS * box.height, least)
+        for lengths in (panel_names, x_labels, y_labels):
             fits = [self.fit(text, length) for text, length in lengths.items()]
             if may_shrink and not all(fits):
                 for text, length in lengths.items():
                     text.set_fontsize("x-small")
-                    shorter = iter(self.short_names.get(text, ()))
-                    while not self.fit(text, length) and (name := next(shorter, "")):
+                    for name in (text.get_text(), *self.short_names.get(text, ())):
                         text.set_text(name)
-        return [text.get_text() for text in (*names, *across, *up)]
+                        if self.fit(text, length):
+                            break
+        return [text.get_text() for text in (*panel_names, *x_labels, *y_labels)]
 
     def fit(self, text: Text, max_width: float) -> bool:
         """Break a text at spaces into lines up to `max_width` [px], and longer words at hyphens or anywhere.

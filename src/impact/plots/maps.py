@@ -233,7 +233,7 @@ class MapData:
         return self._draw_values(axes, values, norm, "RdBu_r" if self.signed else "viridis")
 
     def _draw_closest(self, axes: Sequence[Axes], labels: Mapping[str, str]) -> tuple[QuadMesh, LegendEntries]:
-        """Draw the two panels of the closest model; returns the same."""
+        """Draw the two panels of the closest model; returns the mesh of the colour bar and the legend entries."""
         names = {
             panel.model: labels.get(panel.model or "", pretty_conditions(panel.label)) for panel in self.panels
         }
@@ -260,7 +260,7 @@ class MapData:
     def _draw_values(
         self, axes: Sequence[Axes], values: Any, norm: Normalize, colours: str
     ) -> tuple[QuadMesh, LegendEntries]:
-        """Draw values, of shape (axes, y, x), as colours with contour lines; returns the same."""
+        """Draw values, of shape (axes, y, x), as colours with contour lines; returns as `_draw_closest`."""
         name = symbol("abs_e_error" if self.closest else "e_error") + (" = " if self.closest else " = ±")
         entries: dict[float, tuple[Artist, str]] = {}
         for panel_axes, field in zip(axes, values, strict=True):

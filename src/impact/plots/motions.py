@@ -193,6 +193,7 @@ def _units_of(inputs: Mapping[str, object]) -> dict[str, str]:
 
 def choose_point(dataset: xr.Dataset, keys: Sequence[str]) -> Choice | None:
     """Choose the axis at whose middle a motion is drawn; None for results at fixed steps, which have no motion."""
+    # only results at fixed steps name their integrator
     return None if "integrator" in dataset.attrs else choose_line(dataset, keys)
 
 

@@ -56,7 +56,7 @@ class Figure:
     command: str
 
 
-class Planned(NamedTuple):
+class FigurePlan(NamedTuple):
     """A figure to draw: its kind, what it shows, and an index for each axis that it does not draw."""
 
     kind: Kind
@@ -80,38 +80,40 @@ class Drawing:
         plans = list(iterate_choices(self.dataset, self.keys))
         # numbered as they stand on the page: those of friction have a section of their own
         for of_friction in (False, True):
-            others: list[tuple[int, Planned, Position, PlotData | None]] = []
-            for planned in plans:
-                kind, choice, position = planned
+            more_figures: list[tuple[int, FigurePlan, Position, PlotData | None]] = []
+            for plan in plans:
+                kind, choice, position = plan
                 if kind.of_friction != of_friction:
                     continue
                 number = len(figures) + 1
                 try:
                     plot_data = get_plot_data(self.dataset, kind.name, choice, self.plugins)
-                    comparison, drawn_too = _compare_values(self, planned)
+                    comparison, more_positions = _compare_values(self, plan)
                     conditions = _condition_sentences(self.dataset, position, self.keys)
                     sentences = [kind.caption, *conditions, *comparison]
                     sentences += [f"Not drawn: {'; '.join(plot_data.not_drawn)}."] if plot_data.not_drawn else []
-                    figures.append(self.figure(number, planned, " ".join(sentences), plot_data, is_first=True))
+                    figures.append(self.figure(number, plan, " ".join(sentences), plot_data, is_first=True))
                 except ImpactError as error:
                     left_out.append(f"The figure {kind.name} is left out: {'; '.join(error.problems)}")
                     continue
-                others += [(number, self.moved(planned, index), index, known) for index, known in drawn_too]
-            for first, planned, index, known in others:
-                more = known or self.plot_data(planned)
+                more_figures += [
+                    (number, self.plan_at(plan, index), index, known) for index, known in more_positions
+                ]
+            for first, plan, index, known in more_figures:
+                more = known or self.plot_data(plan)
                 if more is not None:
                     caption = f"As Figure {first}, at {_changes_text(self.dataset, index)}."
-                    figures.append(self.figure(len(figures) + 1, planned, caption, more))
+                    figures.append(self.figure(len(figures) + 1, plan, caption, more))
         return figures, left_out
 
     def figure(
-        self, number: int, planned: Planned, caption: str, plot_data: PlotData, *, is_first: bool = False
+        self, number: int, plan: FigurePlan, caption: str, plot_data: PlotData, *, is_first: bool = False
     ) -> Figure:
         """Draw a figure; title and conditions are in the caption, and the legend beside the first of a kind.
 
         It is narrow, so that its text is legible on a phone.
         """
-        kind = planned.kind
+        kind = plan.kind
         # the legend of the closest model depends on the values
         legend = None if is_first or "y" in kind.along else "none"
         picture = draw(plot_data, Look(width="single", title=False, legend=legend))
@@ -119,13 +121,13 @@ class Drawing:
         for background in (picture.patch, *(axes.patch for axes in picture.axes)):
             background.set_visible(False)
         source = f"data:image/svg+xml;base64,{base64.b64encode(encoded(picture, 'svg')).decode()}"
-        command = self.command(number, planned, legend)
+        command = self.command(number, plan, legend)
         label = kind.caption if is_first else caption
         return Figure(label, f"Figure {number}. {caption}", source, kind.of_friction, is_first, command)
 
-    def command(self, number: int, planned: Planned, legend: str | None) -> str:
+    def command(self, number: int, plan: FigurePlan, legend: str | None) -> str:
         """Write the command that draws a figure; empty if a model is a Python value."""
-        kind, choice, _ = planned
+        kind, choice, _ = plan
         options = {"x": choice.x, "y": choice.y, "variable": choice.variable}
         words = [f"--{name}={value}" for name, value in options.items() if value is not None]
         words += [
@@ -140,10 +142,10 @@ class Drawing:
         start = command_start(self.name or "RESULT.h5", self.dataset, "plot")
         return shlex.join([*start, f"--kind={kind.name}", *words]) if start else ""
 
-    def plot_data(self, planned: Planned) -> PlotData | None:
+    def plot_data(self, plan: FigurePlan) -> PlotData | None:
         """Read the data of a figure; None where it has no values."""
         try:
-            return get_plot_data(self.dataset, planned.kind.name, planned.choice, self.plugins)
+            return get_plot_data(self.dataset, plan.kind.name, plan.choice, self.plugins)
         except ImpactError:
             return None
 
@@ -155,27 +157,27 @@ class Drawing:
         values = status.isel({dim: place for dim, place in position.items() if dim in status.dims}).values
         return bool(((values < FIRST_FAILURE) & (values != NO_IMPACT)).any())
 
-    def moved(self, planned: Planned, index: Position) -> Planned:
-        """Plan the same figure at other values of some axes: labels of axes, or the inputs of a motion."""
-        kind, choice, position = planned
+    def plan_at(self, plan: FigurePlan, index: Position) -> FigurePlan:
+        """Return the plan of the same figure at other indices of some axes."""
+        kind, choice, position = plan
         position = {**position, **index}
         if kind.source == "history":
-            return Planned(kind, replace(choice, sel=_inputs_at(self.dataset, position)), position)
+            return FigurePlan(kind, replace(choice, sel=_inputs_at(self.dataset, position)), position)
         sel = {str(dim): self.dataset[dim].values[place].item() for dim, place in position.items()}
-        return Planned(kind, replace(choice, sel={**(choice.sel or {}), **sel}), position)
+        return FigurePlan(kind, replace(choice, sel={**(choice.sel or {}), **sel}), position)
 
 
 def _compare_values(
-    drawing: Drawing, planned: Planned
+    drawing: Drawing, plan: FigurePlan
 ) -> tuple[list[str], list[tuple[Position, PlotData | None]]]:
     """Compare the numbers of a figure at the values of all other axes, at most MAX_COMPARED combinations.
 
     Returns sentences, and what is drawn too: the indices of the axes that differ, and the data if they are known.
     Motions are integrated for it: they are compared at the first and the last value of each axis alone.
     """
-    sizes, position = drawing.dataset.sizes, planned.position
+    sizes, position = drawing.dataset.sizes, plan.position
     dims = [dim for dim in position if sizes[dim] > 1]
-    if planned.kind.source == "history":
+    if plan.kind.source == "history":
         one_each = [{dim: place} for dim in dims for place in (0, sizes[dim] - 1)]
         compared = [{dim: position[dim] for dim in dims}, *({**position, **index} for index in one_each)]
     else:
@@ -185,7 +187,7 @@ def _compare_values(
         places = itertools.product(*(_spread(sizes[dim], count[dim], position[dim]) for dim in dims))
         compared = [dict(zip(dims, place, strict=True)) for place in places]
     known = {
-        tuple(index[dim] for dim in dims): drawing.plot_data(drawing.moved(planned, index)) for index in compared
+        tuple(index[dim] for dim in dims): drawing.plot_data(drawing.plan_at(plan, index)) for index in compared
     }
     tables = {index: _numbers(data) for index, data in known.items()}
     differ = []
@@ -194,7 +196,7 @@ def _compare_values(
         pairs = ((table, tables[*index[:axis], base, *index[axis + 1 :]]) for index, table in tables.items())
         if not all(_are_equal(*pair) for pair in pairs):
             differ.append(dim)
-    drawn = _drawn_too(drawing, planned, differ)
+    drawn = _more_positions(drawing, plan, differ)
     sentences = _comparison_sentences(sizes, dims, differ, drawn, len(tables))
     return sentences, [(index, known.get(tuple({**position, **index}[dim] for dim in dims))) for index in drawn]
 
@@ -224,12 +226,12 @@ def _comparison_sentences(
     return sentences
 
 
-def _drawn_too(drawing: Drawing, planned: Planned, differ: Sequence[Hashable]) -> list[Position]:
+def _more_positions(drawing: Drawing, plan: FigurePlan, differ: Sequence[Hashable]) -> list[Position]:
     """Choose the indices at which a figure is drawn too: all combinations if few, else along one axis at a time.
 
     A motion is drawn at the ends of each axis, where it is compared. Samples are not drawn one by one.
     """
-    kind, _, position = planned
+    kind, _, position = plan
     sizes, dims = drawing.dataset.sizes, [dim for dim in differ if dim != SAMPLE]
     count = 2 if kind.source == "history" else MAX_VALUES
     if kind.source != "history" and math.prod(sizes[dim] for dim in dims) - 1 <= MAX_MORE:
@@ -301,7 +303,7 @@ def at_text(point: xr.Dataset, names: Sequence[str]) -> str:
     return ", ".join(value.replace(" ", "\u00a0") for value in values)
 
 
-def iterate_choices(dataset: xr.Dataset, keys: Sequence[str]) -> Iterator[Planned]:
+def iterate_choices(dataset: xr.Dataset, keys: Sequence[str]) -> Iterator[FigurePlan]:
     """Choose the figures of a result; a motion comes last, at the middle of the axis of other figures."""
     axes = numeric_axes(dataset)
     for kind in sorted(kinds_of(dataset), key=lambda kind: kind.source == "history"):
@@ -309,7 +311,7 @@ def iterate_choices(dataset: xr.Dataset, keys: Sequence[str]) -> Iterator[Planne
         if choice is None:
             continue
         if kind.source in STUDIES:
-            yield Planned(kind, choice, {})
+            yield FigurePlan(kind, choice, {})
             continue
         is_motion = kind.source == "history"
         inputs = [choice.x] if is_motion else kind.inputs_along(choice.x, choice.y)
@@ -317,12 +319,12 @@ def iterate_choices(dataset: xr.Dataset, keys: Sequence[str]) -> Iterator[Planne
         position = _first_answered_index(dataset, keys, [*dims, *({SAMPLE} & {*kind.along})])
         if not is_motion:
             sel = {str(dim): dataset[dim].values[index].item() for dim, index in position.items()}
-            yield Planned(kind, replace(choice, sel=sel), position)
+            yield FigurePlan(kind, replace(choice, sel=sel), position)
             continue
         if choice.x:
             values = axes[choice.x].values
             position[dims[0]] = int(np.argsort(values, kind="stable")[values.size // 2])
-        yield Planned(kind, replace(choice, x=None, sel=_inputs_at(dataset, position)), position)
+        yield FigurePlan(kind, replace(choice, x=None, sel=_inputs_at(dataset, position)), position)
 
 
 def _inputs_at(dataset: xr.Dataset, position: Position) -> dict[str, float | str]:

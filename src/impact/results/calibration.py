@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
@@ -27,8 +28,8 @@ from . import schema
 
 # probability of chi2 below which a law is called rejected
 REJECTED_P = 1e-3
-# probability below which the mean of the deviations of specimens is no chance
-ONE_SIDED_P = 1e-2
+# probability below which the mean deviation of the specimens is not called chance
+OFFSET_P = 1e-2
 # residuals that are named
 NAMED_RESIDUALS = 3
 FIT_HEADINGS = ("law", "parameter", "estimate", "95 %", "chi2/dof", "p", "AICc", "weight", "loo", "status")
@@ -119,15 +120,19 @@ def _noise_notes(dataset: xr.Dataset) -> Iterator[str]:
         from scipy.special import stdtrit
 
         best = dataset.isel(model=0)
-        specimens, residuals = best["specimen"].values, best["residual"].values
-        offsets = [residuals[specimens == specimen].mean() for specimen in np.unique(specimens)]
-        mean, freedom = float(np.mean(offsets)), len(offsets) - 1
-        largest = stdtrit(freedom, 1.0 - ONE_SIDED_P / 2.0) * np.std(offsets) / max(freedom, 1) ** 0.5
+        values = best[["residual"]].assign(variance=best["sigma"] ** 2).groupby("specimen")
+        means, counts = values.mean(), values.count()
+        offsets, freedom = means["residual"].values, means.sizes["specimen"] - 1
         # with two specimens one side is no evidence
-        if freedom > 1 and abs(mean) > largest:
+        if freedom < 2:
+            return
+        mean = float(offsets.mean())
+        # by chance specimens may agree better than their measurements
+        variance = max(float(offsets.var(ddof=1)), float((means["variance"] / counts["variance"]).mean()))
+        if abs(mean) > stdtrit(freedom, 1.0 - OFFSET_P / 2.0) * math.sqrt(variance / offsets.size):
             yield (
                 f"the specimens deviate from {best['model'].item()} to one side, by {number(mean, 2)} on average: "
-                "its fit has their change, not their values; try other laws"
+                "the law fits how their values change, not the values; try other laws"
             )
         return
     yield "without a column specimen, each measured value has an excess deviation of its own"

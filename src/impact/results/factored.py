@@ -30,7 +30,7 @@ from ..contact.status import FRICTION_STATUSES, STATUSES, Status
 from ..contact.tangential import TangentialResult
 from ..contact.variables import OUTPUTS, Variable
 from ..engine.build_impacts import has_stiffness_rule, mass_at, radius_at, values_at, velocity_at
-from ..engine.inputs import Inputs, index_of
+from ..engine.inputs import Inputs, StoredStiffness, index_of
 from ..engine.trajectories import TrajectoryMap
 from ..errors import ResultError, UsageError
 from ..formatting import number, safe_text
@@ -58,7 +58,7 @@ ReadVariable = Callable[[str, slice | NDArray[np.intp]], NDArray[Any]]
 ReadParts = Callable[[str, Sequence[int]], Iterator[NDArray[Any]]]
 
 
-def stored_stiffness(inputs: Inputs, law: Law) -> tuple[tuple[int, ...], Array] | None:
+def stiffness_to_store(inputs: Inputs, law: Law) -> tuple[tuple[int, ...], Array] | None:
     """Evaluate K [N/m^n] by a law's own rule, or return None; raise a UsageError for too many values."""
     if not has_stiffness_rule(inputs, law):
         return None
@@ -76,7 +76,7 @@ def table_template(
 ) -> xr.Dataset:
     """Build the dataset of a factored file, with placeholder values, from the coordinates of the result."""
     names = [axis.name for axis in table.inputs.axes]
-    laws, stiffness = {}, [stored_stiffness(table.inputs, law) for law in table.laws]
+    laws, stiffness = {}, [stiffness_to_store(table.inputs, law) for law in table.laws]
     for law, trajectory_map, rule in zip(table.laws, table.maps, stiffness, strict=False):
         record = LawRecord(
             exponent=law.exponent,
@@ -138,7 +138,7 @@ def table_values(table: TrajectoryTable, variables: Sequence[Variable]) -> Itera
                 yield f"{prefix}_{name}", (slice(start + first, start + first + rows.size),), array
         starts[trajectory_map.record] += trajectory_map.count
     cells = [trajectory_map.of_cell for trajectory_map in table.maps if trajectory_map.of_cell is not None]
-    rules = (stored_stiffness(table.inputs, law) for law in table.laws)
+    rules = (stiffness_to_store(table.inputs, law) for law in table.laws)
     stiffness = [rule[1].reshape(-1) for rule in rules if rule is not None]
     stored: dict[str, Sequence[NDArray[Any]]] = {"trajectory_of_cell": cells, "law_stiffness": stiffness}
     for name, arrays in stored.items():
@@ -219,7 +219,7 @@ def stored_table(dataset: xr.Dataset, sizes: Mapping[str, int], read: ReadVariab
         raise ResultError("is not a readable result (pairs: not those of its models and friction laws)")
     try:
         maps = _stored_maps(inputs, [*laws.values(), *pairs], len(laws), parts)
-        inputs = replace(inputs, stiffness=_stored_stiffness(inputs, laws, parts))
+        inputs = replace(inputs, stiffness=_read_stiffness(inputs, laws, parts))
         rows: list[slice] = []
         for record_type, prefix in PREFIXES.items():
             of_type = [trajectory_map.count for trajectory_map in maps if trajectory_map.record is record_type]
@@ -273,9 +273,7 @@ def _stored_maps(
     return maps
 
 
-def _stored_stiffness(
-    inputs: Inputs, laws: Mapping[str, LawRecord], parts: ReadParts
-) -> dict[str, tuple[tuple[int, ...], Array]]:
+def _read_stiffness(inputs: Inputs, laws: Mapping[str, LawRecord], parts: ReadParts) -> dict[str, StoredStiffness]:
     """Read K of each law with a rule for it, over the axes that it depends on; see `Inputs`."""
     axes = {
         f"{key}.K": _axis_numbers(inputs, law.stiffness_axes)
@@ -285,7 +283,7 @@ def _stored_stiffness(
     shapes = [tuple(inputs.shape[axis] for axis in numbers) for numbers in axes.values()]
     values = parts("law_stiffness", [math.prod(shape) for shape in shapes])
     return {
-        name: (numbers, np.reshape(K, shape))
+        name: StoredStiffness(numbers, np.reshape(K, shape))
         for (name, numbers), shape, K in zip(axes.items(), shapes, values, strict=True)
     }
 

@@ -10,7 +10,7 @@ from ..errors import UsageError
 
 Kind = Literal["sweep", "history", "calibration", "sensitivity study", "board"]
 
-# the results of other commands than sweeps and single impacts
+# kinds of results that are neither a sweep nor a single impact
 STUDIES: tuple[Kind, ...] = ("calibration", "sensitivity study", "board")
 
 

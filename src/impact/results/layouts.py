@@ -76,7 +76,7 @@ class FactoredLayout:
 
     def check(self, plan: Plan) -> None:
         for law in plan.models:
-            factored.stored_stiffness(plan.inputs, law)
+            factored.stiffness_to_store(plan.inputs, law)
 
     def template(self, result: xr.Dataset, plan: Plan, table: TrajectoryTable) -> xr.Dataset:
         return factored.table_template(result, table, stored_variables(plan))

@@ -109,9 +109,10 @@ class Ranked:
     @property
     def name(self) -> str:
         """The model, its friction law, and the parameters that were chosen."""
+        values = {path: InputName.parse(path).word(value) for path, value in self.parameters.items()}
         chosen = (
             f"{path.rpartition('.')[2]} = {prefixed(value, self.units.get(path, '1'), 6)}"
-            for path, value in self.parameters.items()
+            for path, value in values.items()
         )
         return " with ".join(filter(None, [self.model, ", ".join(filter(None, [self.friction, *chosen]))]))
 

@@ -47,26 +47,26 @@ FIT_STATUSES = {
     "no_prediction": "the law has no result at a point",
     "at_limit": "a parameter is at an end of its allowed values, where its interval ends too",
 }
-_PARAMETERS = ("model", "parameter")
-_of_parameter = partial(Variable, dims=_PARAMETERS, unit="SI", scale="itself + interval")
-_of_law = partial(Variable, dims=("model",), scale="max(1, itself)")
-_of_point = partial(Variable, dims=("model", "point"), unit="SI", scale="measured")
-_curve = partial(Variable, dims=("model", "output_name", "grid"), unit="SI", scale="measured")
+_PARAMETER_DIMS = ("model", "parameter")
+_parameter_variable = partial(Variable, dims=_PARAMETER_DIMS, unit="SI", scale="itself + interval")
+_law_variable = partial(Variable, dims=("model",), scale="max(1, itself)")
+_point_variable = partial(Variable, dims=("model", "point"), unit="SI", scale="measured")
+_curve_variable = partial(Variable, dims=("model", "output_name", "grid"), unit="SI", scale="measured")
 CALIBRATION = by_name(
-    _of_parameter("estimate", "best value of the parameter; NaN where the law does not have it"),
-    _of_parameter("lower", "lower end of the interval of 95 % by profile likelihood"),
-    _of_parameter("upper", "upper end of the interval of 95 % by profile likelihood"),
+    _parameter_variable("estimate", "best value of the parameter; NaN where the law does not have it"),
+    _parameter_variable("lower", "lower end of the interval of 95 % by profile likelihood"),
+    _parameter_variable("upper", "upper end of the interval of 95 % by profile likelihood"),
     Variable(
         "covariance",
         "covariance in the linear approximation",
-        (*_PARAMETERS, "other_parameter"),
+        (*_PARAMETER_DIMS, "other_parameter"),
         "SI",
         "deviations",
     ),
     Variable(
         "identifiable",
         "1 if the data determine the parameter, -1 if it is not the law's",
-        _PARAMETERS,
+        _PARAMETER_DIMS,
         scale="exact",
         dtype="i1",
     ),
@@ -78,45 +78,45 @@ CALIBRATION = by_name(
         dtype="i1",
         flags={name: number for number, name in enumerate(FIT_STATUSES)},
     ),
-    _of_law("chi2_reduced", "squared residuals in variances per degree of freedom"),
-    _of_law("p_value", "probability of a larger chi2 by the noise alone", is_new=True),
-    _of_law(
+    _law_variable("chi2_reduced", "squared residuals in variances per degree of freedom"),
+    _law_variable("p_value", "probability of a larger chi2 by the noise alone", is_new=True),
+    _law_variable(
         "excess",
         "standard deviation between specimens, besides that of the measurements",
         unit="SI",
         scale="itself",
     ),
-    _of_law("aicc", "corrected information criterion of Akaike"),
-    _of_law("weight", "Akaike weight among the laws"),
-    _of_law(
+    _law_variable("aicc", "corrected information criterion of Akaike"),
+    _law_variable("weight", "Akaike weight among the laws"),
+    _law_variable(
         "loo", "root mean square of leave-one-out residuals in given standard deviations; in SI units without one"
     ),
-    _of_point("predicted", "output of the law at the point"),
-    _of_point("residual", "measured minus predicted"),
-    _of_point(
+    _point_variable("predicted", "output of the law at the point"),
+    _point_variable("residual", "measured minus predicted"),
+    _point_variable(
         "loo_residual",
         "residual of the point in the fit without it, in its own standard deviations",
         unit="1",
         scale="max(1, itself)",
         is_new=True,
     ),
-    _curve("curve", "output of the law over the varied input"),
-    _curve("curve_lower", "lower end of the band of 95 % of the curve"),
-    _curve("curve_upper", "upper end of the band of 95 % of the curve"),
+    _curve_variable("curve", "output of the law over the varied input"),
+    _curve_variable("curve_lower", "lower end of the band of 95 % of the curve"),
+    _curve_variable("curve_upper", "upper end of the band of 95 % of the curve"),
 )
-_STUDIES, _INPUTS = ("model", AXES), ("model", AXES, "input")
+_STUDY_DIMS, _INPUT_DIMS = ("model", AXES), ("model", AXES, "input")
 SENSITIVITY = by_name(
-    Variable("first", "first-order index: share of the variance that the input explains alone", _INPUTS),
-    Variable("first_lower", "lower end of the bootstrap interval of 95 % of the first-order index", _INPUTS),
-    Variable("first_upper", "upper end of the bootstrap interval of 95 % of the first-order index", _INPUTS),
-    Variable("first_half", "first-order index from the first half of the samples", _INPUTS),
-    Variable("total", "total index: share of the variance that is left if only the input is unknown", _INPUTS),
-    Variable("total_lower", "lower end of the bootstrap interval of 95 % of the total index", _INPUTS),
-    Variable("total_upper", "upper end of the bootstrap interval of 95 % of the total index", _INPUTS),
-    Variable("total_half", "total index from the first half of the samples", _INPUTS),
-    Variable("mean", "mean of the output", _STUDIES, "output"),
-    Variable("sd", "standard deviation of the output", _STUDIES, "output"),
-    Variable("quantiles", "quantiles of the output", (*_STUDIES, "quantile"), "output"),
+    Variable("first", "first-order index: share of the variance that the input explains alone", _INPUT_DIMS),
+    Variable("first_lower", "lower end of the bootstrap interval of 95 % of the first-order index", _INPUT_DIMS),
+    Variable("first_upper", "upper end of the bootstrap interval of 95 % of the first-order index", _INPUT_DIMS),
+    Variable("first_half", "first-order index from the first half of the samples", _INPUT_DIMS),
+    Variable("total", "total index: share of the variance that is left if only the input is unknown", _INPUT_DIMS),
+    Variable("total_lower", "lower end of the bootstrap interval of 95 % of the total index", _INPUT_DIMS),
+    Variable("total_upper", "upper end of the bootstrap interval of 95 % of the total index", _INPUT_DIMS),
+    Variable("total_half", "total index from the first half of the samples", _INPUT_DIMS),
+    Variable("mean", "mean of the output", _STUDY_DIMS, "output"),
+    Variable("sd", "standard deviation of the output", _STUDY_DIMS, "output"),
+    Variable("quantiles", "quantiles of the output", (*_STUDY_DIMS, "quantile"), "output"),
     Variable("failed", "points without a result; with any there is no mean and no index", dtype="i8"),
 )
 # what became of a check

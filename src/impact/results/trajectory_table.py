@@ -269,7 +269,7 @@ def _closing_speeds(inputs: Inputs) -> tuple[float, float, float]:
 
 
 def whole_stiffness(inputs: Inputs, law: Law) -> tuple[tuple[int, ...], Array | None]:
-    """Evaluate K [N/m^n] by a law's own rule, and name the axes it depends on; no K if the values are too many."""
+    """Look up or evaluate K [N/m^n] of a law over the axes that it depends on; no K if the values are too many."""
     probed = build_impacts(inputs, law, probe_index(inputs, {"n"})).K
     axes = tuple(sorted(axes_of_arrays([probed])))
     if math.prod(inputs.shape[axis] for axis in axes) > MAX_STIFFNESS_VALUES:

@@ -18,3 +18,4 @@ DEMLAB_VISCOELASTIC = (
 DEMLAB_PLASTIC = "rlrangel/DEMLab, src/interactions/force/ContactForceN_ElastoPlasticLinear.m @23e741d (2024)"
 YADE_BIBLIOGRAPHY = "c61292558/yade4deepin, doc/references.bib @f1486c0 (2025)"
 MAPLESIM_HELP = "the MapleSim help, Multibody Contact Modes (read in November 2026)"
+MODIA3D_DOCUMENTATION = "ModiaSim/Modia3D.jl, docs/src/internal/ContactForceLaw.md @a418027"

@@ -13,7 +13,7 @@ from ..force_expressions import damped
 from ..formula_calls import Formula
 from ..model import About, ForceModel
 from ..powers import power
-from .cited_sources import DYS, GHARIB_HURMUZLU, MBDYN, OPENSEES_HERTZDAMP, RAILWAY
+from .cited_sources import DYS, GHARIB_HURMUZLU, MBDYN, MODIA3D_DOCUMENTATION, OPENSEES_HERTZDAMP, RAILWAY
 
 
 def hysteresis(key: str, *, chi: Formula, **about: Unpack[About]) -> ForceModel:
@@ -166,9 +166,7 @@ FLORES_2011 = hysteresis(
     reference="Flores P, Machado M, Silva MT, Martins JM (2011) On the continuous contact force models for soft "
     "materials in multibody dynamics. Multibody Syst. Dyn. 25, 357",
     doi="10.1007/s11044-010-9237-4",
-    evidence=Evidence(
-        "seen", f"{DYS}; {MBDYN}", doi="ModiaSim/Modia3D.jl, docs/src/internal/ContactForceLaw.md @a418027"
-    ),
+    evidence=Evidence("seen", f"{DYS}; {MBDYN}", doi=MODIA3D_DOCUMENTATION),
     chi=flores_chi,
 )
 

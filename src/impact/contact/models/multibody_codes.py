@@ -16,7 +16,7 @@ from ..model import ForceModel, Parameter
 from ..powers import power, powers
 from .aliases import same_law
 from .asymmetric import approach_dashpot
-from .cited_sources import MAPLESIM_HELP, MBDYN, SIMBODY
+from .cited_sources import MAPLESIM_HELP, MBDYN, MODIA3D_DOCUMENTATION, SIMBODY
 from .dashpot import KELVIN_VOIGT_NO_TENSION
 from .hysteresis import (
     CARVALHO_MARTINS_2019,
@@ -276,7 +276,7 @@ MODIA3D_PRESENT = hysteresis(
     evidence=Evidence(
         "seen",
         f"{MODIA3D} @a418027 (v0.12.3, 2026)",
-        doi="ModiaSim/Modia3D.jl, docs/src/internal/ContactForceLaw.md @a418027",
+        doi=MODIA3D_DOCUMENTATION,
     ),
     parameters=(SMALL_SPEED, Parameter("d", "s/m", "largest damping", default=2000.0, least=0.0)),
     exponent=1.5,
@@ -295,7 +295,7 @@ MODIA3D_EXPONENTIAL = hysteresis(
     evidence=Evidence(
         "seen",
         f"{MODIA3D} at v0.4.0 (2019) and v0.5.2 (2021)",
-        doi="ModiaSim/Modia3D.jl, docs/src/internal/ContactForceLaw.md @a418027",
+        doi=MODIA3D_DOCUMENTATION,
     ),
     parameters=(SMALL_SPEED, Parameter("d", "s/m", "largest damping", default=1000.0, least=0.0)),
     exponent=1.5,
