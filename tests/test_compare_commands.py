@@ -402,7 +402,7 @@ def test_a_picture_of_differences_has_level_keys_and_few_symbols_on_lines(figure
 
 
 def test_long_keys_of_models_in_a_picture_of_differences_are_tilted() -> None:
-    keys = ["lammps-coeff-restitution-hertz", "lammps-coeff-restitution-hooke", "hertz", "flores-2011", "yade-en"]
+    keys = ["lammps-coeff-restitution-hertz", "lammps-coeff-restitution-hooke", "hertz", "yade-en"]
     result = impact.sweep(models=keys, e=[0.5, 0.9])
     figure = draw_differences(difference_data(impact.compare(result.assign(e_out=result["e_out"] + 1e-3), result)))
     labels = figure.axes[0].get_xticklabels()
