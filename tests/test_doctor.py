@@ -28,6 +28,11 @@ def test_versions_are_those_of_the_packages(cli: Run) -> None:
     }
 
 
+def test_the_text_lists_the_packages_under_their_headings(cli: Run) -> None:
+    lines = [" ".join(line.split()) for line in cli("doctor").stdout.splitlines()]
+    assert f"h5py {metadata.version('h5py')}" in lines[lines.index("package version") :]
+
+
 @pytest.mark.slow
 def test_a_code_on_the_path_is_found_with_its_version(cli: Run, tmp_path: Path) -> None:
     program = tmp_path / "lmp"

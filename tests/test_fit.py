@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import threading
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -10,6 +12,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy import stats
 
+from impact.inverse.batched_solvers import Evaluate, run_together
 from impact.inverse.fit import Bounds, DataPoints, Estimate, Fit, FitProblem, best_of, fit_all
 
 Array = NDArray[np.float64]
@@ -347,3 +350,20 @@ def test_of_equal_fits_one_that_converged_is_the_best() -> None:
     far = Estimate(np.zeros(1), 2.1, 0.0, True)
     assert best_of([far, stopped, converged]) is converged
     assert best_of([far, stopped]) is stopped
+
+
+def test_a_solver_that_fails_ends_those_that_wait() -> None:
+    def waits(evaluate: Evaluate) -> Array:
+        return evaluate("square", np.ones((1, 1)))
+
+    def fails(evaluate: Evaluate) -> Array:
+        raise ArithmeticError("no root")
+
+    def run() -> None:
+        with suppress(ArithmeticError):
+            run_together({"square": np.square}, [waits, fails])
+
+    thread = threading.Thread(target=run, daemon=True)
+    thread.start()
+    thread.join(20.0)
+    assert not thread.is_alive()

@@ -88,6 +88,7 @@ def test_the_history_of_slip_and_friction_is_that_of_the_outputs(friction: str, 
 def test_the_history_of_sliding_ends_with_the_slip_of_the_outputs_at_any_speed(v1: float) -> None:
     shot = impact.run(config(frictions=["coulomb-1785"], friction={}), at={"v1": v1, "angle": math.radians(60.0)})
     assert shot.history is not None
+    assert shot.history["slip"].values[0] == pytest.approx(v1 * math.tan(math.radians(60.0)), rel=1e-12)
     assert shot.history["slip"].values[-1] == pytest.approx(shot.values["slip_post"], rel=1e-6)
 
 

@@ -10,6 +10,7 @@ import impact
 from impact.contact.impacts import Impacts
 from impact.contact.model import ForceModel, Parameter
 from impact.contact.models import find
+from impact.contact.models.finite_element_fits import softer_poisson_ratio
 from impact.contact.output_formulas import Outputs, collide
 from impact.contact.status import Status
 
@@ -63,6 +64,12 @@ def test_johnson_yields_from_the_speed_whose_energy_is_that_of_the_first_yield(m
     below, above = impact.sweep(config)["e_out"].values.ravel()
     assert below == pytest.approx(1.0, abs=1e-8)
     assert above < 0.9
+
+
+def test_the_softer_ball_gives_its_poisson_ratio():
+    nu1, nu2 = np.array([0.2, 0.2, 0.2]), np.array([0.4, 0.4, 0.4])
+    softer = softer_poisson_ratio(nu1, nu2, np.array([1e8, 2e8, 1e8]), np.array([2e8, 1e8, 1e8]))
+    assert softer.tolist() == [0.2, 0.4, 0.2]
 
 
 @pytest.mark.parametrize("n", [1.0, 1.5, 2.0])

@@ -587,3 +587,10 @@ def test_stored_chunks_are_those_of_the_config(tmp_path: Path) -> None:
     impact.sweep_to_file(config, tmp_path / "r.h5", overrides=["output.layout=full"])
     with h5py.File(tmp_path / "r.h5") as file:
         assert file["e_out"].chunks == (1, 2, 2)
+
+
+def test_variables_name_the_scalar_coordinates_as_cf_asks(tmp_path: Path) -> None:
+    sweep = {"e": [0.2, 0.4], "v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 6e9}
+    impact.sweep_to_file({"models": ["hertz"], "sweep": sweep}, tmp_path / "r.h5")
+    with h5py.File(tmp_path / "r.h5") as file:
+        assert {"v1", "m1", "m2", "K"} <= {*file["e_out"].attrs["coordinates"].decode().split()}

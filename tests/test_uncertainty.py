@@ -100,6 +100,17 @@ def test_indices_do_not_depend_on_the_size_of_an_output() -> None:
         np.testing.assert_allclose(of_stiff[name], of_soft[name], rtol=1e-6)
 
 
+def test_an_input_that_matters_in_some_samples_alone_has_indices() -> None:
+    # the balls yield, and e depends on the speed, from some 0.06 m/s on
+    config = {
+        "models": "johnson-1985",
+        "design": {"n": 32},
+        "materials": {"steel": {"E": 2e11, "nu": 0.3, "rho": 7800.0, "yield_strength": 1e9}},
+        "sweep": {"material": "steel", "R1": 0.01, "R2": 0.01, "v1": {"uniform": [0.001, 1.0]}},
+    }
+    assert float(impact.sensitivity(config)["total"].squeeze()) > 0.5
+
+
 SIMBODY_ENDS = {"c": (0.01, 3.0), "v1": (0.05, 3.0)}
 
 
