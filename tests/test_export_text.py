@@ -197,8 +197,10 @@ def test_chrono_takes_both_materials_or_a_modulus_that_gives_the_stiffness() -> 
     assert (two["YoungModulus"], two["PoissonRatio2"]) == (1e9, 0.2)
     assert two["EffectiveCurvatureRadius"] == pytest.approx(0.03, rel=1e-15)
     # E* = 3 K/(4 √R) and E = 2 (1 − ν²) E*
-    one = impact.export("chrono", default_law("chrono"), source=config(e=0.5, K=1e9)).parameters
-    assert one["YoungModulus"] == pytest.approx(2.0 * 0.91 * 0.75e9 / math.sqrt(0.03), rel=1e-14)
+    one = impact.export("chrono", default_law("chrono"), source=config(e=0.5, K=1e9))
+    assert one.parameters["YoungModulus"] == pytest.approx(2.0 * 0.91 * 0.75e9 / math.sqrt(0.03), rel=1e-14)
+    says = "the modulus gives K = 1e+09 with a Poisson ratio of 0.3"
+    assert [says in header for header in (export.header, one.header)] == [False, True]
 
 
 @pytest.mark.parametrize("key", CODES["chrono"].laws)
@@ -258,6 +260,31 @@ def test_the_header_lists_the_defaults_of_table_1_that_enter() -> None:
     given = {"e": 0.5, "K": 1e9, "m1": 3.0, "m2": 1.0, "v1": 1.0}
     header = impact.export("chrono", "chrono-smc-hertz", at=given).header
     assert not any("Table 1" in line for line in header)
+
+
+def test_the_header_says_which_damping_was_solved_for() -> None:
+    export = impact.export("chrono", "kelvin-voigt-no-tension", at={"e": 0.6})
+    assert export.solved is not None
+    assert f"C = {export.solved['C']!r} gives the e that is wanted" in export.header
+
+
+def test_the_header_says_what_the_step_delivers_and_recommends_no_longer_one_than_needed() -> None:
+    balls = {"K": 1e8, "m1": 0.1, "m2": 0.1, "R1": 0.01, "R2": 0.01, "v1": 1.0, "e": 0.8}
+    source = {
+        "models": ["tsuji-1992"],
+        "frictions": ["lammps-mindlin"],
+        "sweep": balls | {"angle": "60 deg", "mu": 0.1},
+        "friction": {"lammps-mindlin": {"kt_over_kn": 0.8}},
+    }
+    export = impact.export("lammps", source=source, dt=5e-6, code_version="22Jul2025")
+    at_dt = export.as_dict()["beta_at_dt"]
+    delivered = f"mean beta {at_dt['mean']:.4f}, {at_dt['least']:.4f} to {at_dt['largest']:.4f}"
+    assert f"friction: lammps-mindlin, {delivered}" in export.header
+    needed = impact.timestep("tsuji-1992", source={"sweep": balls}, tol=0.01, steps_per_contact=10).needed
+    assert needed is not None
+    (line,) = (line for line in export.header if line.startswith("recommended"))
+    recommended = float(line.split()[3])
+    assert 0.99 * needed.dt < recommended <= needed.dt
 
 
 def test_the_classes_of_chrono_have_the_names_of_the_release() -> None:
