@@ -320,6 +320,27 @@ def test_the_table_and_the_json_have_the_same_content(cli: Run, fair_and_exact_f
     assert cli("recommend", path, "--tol", "1e-9", "--model", FAIR[0]).stdout.split()[-1] == "1"
 
 
+def test_a_point_is_shown_in_degrees_and_words_and_selected_by_them() -> None:
+    words = {"coulomb-1785": {"limit": ["abs", "positive"]}}
+    of_friction = {"R1": 0.1, "R2": 0.1, "mu": 0.1, "angle": {"linspace": ["10 deg", "80 deg", 8]}}
+    config = {
+        "models": "hertz",
+        "frictions": "coulomb-1785",
+        "sweep": {**BALLS, "m2": 1.0, "v1": ["5 mm/s", "1 m/s"], "e": 0.5, **of_friction},
+        "materials": {"steel": STEEL},
+        "friction": words,
+        "solver": {"rtol": 1e-4},
+    }
+    result = impact.sweep(config)
+    name = "friction.coulomb-1785.limit"
+    (ranked,) = impact.recommend(result, tol=0.4, target={"beta": 0.4})
+    assert ranked.row[-2:] == (f"v1=5 mm/s, angle=80°, {name}=abs: beta {ranked.record['beta']:.4g}", "10° to 30°")
+    assert ranked.at[name] == 0.0
+    (other,) = impact.recommend(result, tol=0.4, target={"beta": 0.4}, sel={name: "positive", "angle": "20 deg"})
+    assert (other.points, dict(other.at)) == (2, {"v1": 0.005})
+    assert f"{name} is abs, positive" in refused(result, sel={name: "all"})
+
+
 def test_a_missing_number_is_null(cli: Run, tmp_path: Path) -> None:
     result = swept("exact-hysteresis", e=None, alpha=[2.0, 3.0], m2=[1.0, math.inf])
     done = cli("recommend", stored(tmp_path, result), "--json")

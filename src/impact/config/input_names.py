@@ -8,6 +8,7 @@ from typing import Any
 
 from ..contact.frictions import frictions
 from ..contact.model import ForceModel
+from ..contact.models import catalogue
 from ..errors import did_you_mean
 from .files import as_table
 from .quantities import KeyPath, Quantity
@@ -89,15 +90,28 @@ class InputName:
             return MATERIAL_QUANTITIES[self.key]
         return None if self.key in MATERIAL_KEYS else SWEEP_QUANTITIES[self.key]
 
+    @property
+    def unit(self) -> str:
+        """Its unit; "1" of a name and of a parameter of a model that is not built in."""
+        try:
+            quantity = self.quantity(catalogue())
+        except KeyError:
+            return "1"
+        return "1" if quantity is None else quantity.unit
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """The words that its numbers stand for; empty if it is a number."""
+        law = frictions().get(self.friction)
+        return next((p.choices for p in law.parameters if p.name == self.key), ()) if law else ()
+
     def word(self, value: float | str) -> float | str:
         """Find the word that a number stands for, of a parameter that is a word; otherwise return the value.
 
         >>> InputName.parse("friction.coulomb-1785.limit").word(1.0), InputName.parse("v1").word(1.0)
         ('positive', 1.0)
         """
-        law = frictions().get(self.friction)
-        words = next((p.choices for p in law.parameters if p.name == self.key), ()) if law else ()
-        return words[int(value)] if value in range(len(words)) else value
+        return self.words[int(value)] if value in range(len(self.words)) else value
 
     def unknown_message(self, models: Mapping[str, ForceModel]) -> str:
         """Describe an input that does not exist, with the nearest name."""

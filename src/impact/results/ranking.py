@@ -89,6 +89,7 @@ class Ranked:
         unless it varies along one axis
     friction : key of the friction law; "" for a model alone
     output : the output that is ranked
+    along : the input that `served` has ranges of
     units : those of the parameters, by path, where they are known
     """
 
@@ -104,6 +105,7 @@ class Ranked:
     served: tuple[tuple[float, float], ...] | None
     friction: str = ""
     output: str = "e_out"
+    along: str = "e"
     units: Mapping[str, str] = field(default_factory=dict, repr=False, compare=False)
 
     @property
@@ -119,7 +121,8 @@ class Ranked:
     @property
     def record(self) -> dict[str, Any]:
         """The fields as plain data, without those of friction and of a target that do not apply."""
-        record = {name: value for name, value in vars(self).items() if name not in ("output", "friction", "units")}
+        left_out = ("output", "along", "friction", "units")
+        record = {name: value for name, value in vars(self).items() if name not in left_out}
         if self.output != "e_out":
             record = {self.output if name == "e_out" else name: value for name, value in record.items()}
         return record | {"share": self.share} | ({"friction": self.friction} if self.friction else {})
@@ -154,7 +157,8 @@ class Ranked:
         """The first ranges that it serves."""
         if self.served is None:
             return "–"
-        ranges = [number(least) + (f" to {number(most)}" if most > least else "") for least, most in self.served]
+        unit = InputName.parse(self.along).unit
+        ranges = [" to ".join(prefixed(end, unit, 6) for end in dict.fromkeys(ends)) for ends in self.served]
         more = f" and {len(ranges) - MAX_RANGES:,} more" if len(ranges) > MAX_RANGES else ""
         return ", ".join(ranges[:MAX_RANGES]) + more or "nowhere"
 
@@ -575,6 +579,7 @@ def _rank_law(law_data: xr.Dataset, tol: float, criterion: Criterion) -> Ranked:
         served,
         friction,
         criterion.output,
+        along,
         {path: unit for path, unit in units.items() if not names_in(unit)},
     )
 

@@ -9,7 +9,8 @@ from typing import Any, TypeVar
 import xarray as xr
 
 from ..config.input_names import InputName
-from ..formatting import number, safe_text
+from ..contact.units import names_in
+from ..formatting import prefixed, safe_text
 from .attributes import read_attribute
 
 InputValue = TypeVar("InputValue")
@@ -46,12 +47,18 @@ def inputs_at(values: xr.DataArray, position: Iterable[int]) -> dict[str, Any]:
 
 
 def describe_point(at: Mapping[str, float | str], digits: int = 12) -> str:
-    """List the inputs of a point for a message.
+    """List the inputs of a point for a message, with their units and words.
 
-    >>> describe_point({"model": "hertz", "e": 0.1 + 0.2})
-    'model=hertz, e=0.3'
+    >>> describe_point({"model": "hertz", "e": 0.1 + 0.2, "v1": 0.005, "friction.coulomb-1785.limit": 1.0})
+    'model=hertz, e=0.3, v1=5 mm/s, friction.coulomb-1785.limit=positive'
     """
-    return ", ".join(f"{safe_text(name)}={safe_text(number(value, digits), 60)}" for name, value in at.items())
+    texts = []
+    for text, value in at.items():
+        name = InputName.parse(text)
+        # an exponent n has a value for each law
+        unit = "1" if names_in(name.unit) else name.unit
+        texts.append(f"{safe_text(text)}={safe_text(prefixed(name.word(value), unit, digits), 60)}")
+    return ", ".join(texts)
 
 
 def replay_command(start: Sequence[str], at: Mapping[str, object]) -> str:

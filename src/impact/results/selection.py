@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..array_types import Mask
 from ..config.files import to_plain_data, to_plain_value
+from ..config.input_names import InputName
 from ..config.quantities import number_in
 from ..errors import UsageError, did_you_mean
 from ..formatting import argument, label, safe_text
@@ -94,8 +95,10 @@ def select(dataset: xr.Dataset, sel: Mapping[str, object]) -> xr.Dataset:
 
 
 def in_si(coordinate: xr.DataArray, value: float | str) -> float | str:
-    """Convert a text with a unit, such as "30 deg", to a number in the unit of a coordinate, if it is one."""
-    unit = coordinate.attrs.get("units")
+    """Convert a text with a unit, such as "30 deg", to that of a coordinate, and a word to its number."""
+    words, unit = InputName.parse(coordinate.name).words, coordinate.attrs.get("units")
+    if value in words:
+        return float(words.index(str(value)))
     if not isinstance(value, str) or unit is None:
         return value
     number = number_in(plain_unit(str(unit)), value)
@@ -120,7 +123,9 @@ def _nearest_values(name: str, values: np.ndarray, value: float | str) -> str:
     """List the values of an axis if they are few, the next ones to a number, or the first."""
     number = _as_number(value) if values.dtype.kind in NUMBER_DTYPE_KINDS else None
     if number is None or np.isnan(number) or values.size <= MAX_LISTED_VALUES:
-        shown = ", ".join(map(label, values[:MAX_LISTED_VALUES].tolist()))
+        shown = ", ".join(
+            label(InputName.parse(name).word(value)) for value in values[:MAX_LISTED_VALUES].tolist()
+        )
         return f"{name} is {shown}{', ...' if values.size > MAX_LISTED_VALUES else ''}"
     distinct = np.unique(values)
     below = int(np.clip(np.searchsorted(distinct, number) - 1, 0, max(distinct.size - 2, 0)))

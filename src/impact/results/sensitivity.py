@@ -10,7 +10,7 @@ import xarray as xr
 
 from ..config.grid import SAMPLE
 from ..config.input_names import InputName
-from ..contact.units import with_numbers
+from ..contact.units import names_in, with_numbers
 from ..contact.variables import OUTPUTS
 from ..engine.plan import Plan
 from ..formatting import NO_BREAK, decimals, number, safe_text
@@ -48,21 +48,14 @@ def distribution_texts(dataset: xr.Dataset) -> list[str]:
     for name, distribution in read_attribute(dataset.attrs, "design").get("distributions", {}).items():
         ((kind, numbers),) = distribution.items()
         shown = ", ".join(number(value) for value in numbers[:3]) + (", …" if len(numbers) > 3 else "")
-        unit = _unit_of_input(name)
-        if "n" in dataset.coords and dataset["n"].ndim == 0:
+        parsed = InputName.parse(name)
+        # a parameter of a law may have its own n, and other names in the exponents of its unit
+        unit = "1" if parsed.model and names_in(parsed.unit) else parsed.unit
+        if "n" in dataset.coords and dataset["n"].ndim == 0 and not parsed.owner:
             unit = with_numbers(unit, {"n": float(dataset["n"])})
         text = f"{name} = {kind}({shown}){'' if unit == '1' else f' {unit}'}"
         texts.append(safe_text(text, 80).replace(" ", NO_BREAK))
     return texts
-
-
-def _unit_of_input(name: str) -> str:
-    """Find the unit of an input by its config name; "1" for a parameter of a model."""
-    try:
-        quantity = InputName.parse(name).quantity({})
-    except KeyError:
-        return "1"
-    return "1" if quantity is None else quantity.unit
 
 
 def describe_design(dataset: xr.Dataset) -> str:
