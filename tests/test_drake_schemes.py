@@ -167,6 +167,8 @@ def test_the_command_has_the_scheme(cli: Run) -> None:
         ),
         ((POINT, "--scheme", "drake-sap"), f"does not take {POINT}, expected a law F = K δ + C δ̇ to F = 0"),
         (("hertz", "--scheme", "drake"), 'no scheme "drake"; did you mean "drake-sap"?'),
+        (("drake-sap",), "such as kelvin-voigt-no-tension, beside --scheme drake-sap"),
+        (("kick-drift",), 'got the scheme "kick-drift", expected a law such as hertz, beside --scheme kick-drift'),
     ],
 )
 def test_a_scheme_that_does_not_take_the_law_is_one_line(cli: Run, words: tuple[str, ...], message: str) -> None:

@@ -30,9 +30,11 @@ from ..config.tables import DEFAULT_RTOL, SWEEP_QUANTITIES, TOLERANCE
 from ..contact.dimensionless import dimensionless_values
 from ..contact.fixed_step import (
     DRAKE_SAP,
+    LAWS_OF_SCHEME,
     MAX_CONTACTS,
     MAX_STEPS_PER_CONTACT,
     MUJOCO_CONE,
+    SCHEMES,
     check_scheme,
     collide_at_fixed_step,
     default_scheme,
@@ -357,6 +359,10 @@ def timestep(
     if parameter is not None and (tol is None or len(given) != 1):
         raise UsageError(f"{argument('parameter')}: expected one {argument('dt')} and {argument('tol')} as well")
     plugin_set = read_plugins(plugins)
+    if model in SCHEMES:
+        expected = f"a law {LAWS_OF_SCHEME.get(model, 'such as hertz')}"
+        origin, of = argument("model"), argument("scheme", model)
+        raise UsageError(f'{origin}: got the scheme "{model}", expected {expected}, beside {of}')
     opened = open_source(source, overrides, plugin_set)
     point_source = replace(opened, config_draft=replace(opened.config_draft, has_own_scheme=True))
     point = point_with_e(point_source, find(model, plugin_set.models), at or {}, friction=friction)
