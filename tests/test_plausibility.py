@@ -82,6 +82,17 @@ def test_the_command_prints_notes_unless_it_is_quiet(cli: Run, tmp_path: Path) -
     assert (quiet.returncode, quiet.stderr) == (0, "")
 
 
+@pytest.mark.slow
+def test_a_quiet_study_prints_no_notes(cli: Run, tmp_path: Path) -> None:
+    (tmp_path / "config.toml").write_text(SWEEP + "[design]\nn = 2\n", encoding="utf-8")
+    changes = ("materials.steel.E=2.1e14", "sweep.v1.uniform=[1, 2]")
+    words = ("sensitivity", "config.toml", *(word for change in changes for word in ("--set", change)))
+    # the server of the tests ignores these warnings
+    loud, quiet = (cli(*words, *more, cwd=tmp_path, PYTHONWARNINGS="") for more in ((), ("--quiet",)))
+    assert "no material is as stiff" in loud.stderr
+    assert (quiet.returncode, quiet.stderr) == (0, "")
+
+
 def test_what_a_material_of_the_library_lacks_is_named_with_the_line_of_its_name(tmp_path: Path) -> None:
     (tmp_path / "c.toml").write_text(
         'models = "johnson-1985"\n[sweep]\nv1 = 1.0\nR1 = 0.01\nR2 = 0.01\nmaterial = "glass"\n', encoding="utf-8"
