@@ -347,6 +347,30 @@ def test_each_pair_has_a_study_and_one_without_meaning_has_not_failed() -> None:
     assert np.isnan(meaningless["mean"].item())
     assert "beta: the friction law is not combinable with the model" in str(impact.describe(study))
     assert impact.describe(study).as_dict()["studies"][0]["friction"] == "coulomb-1785"
+    # the picture has a panel for each pair
+    pair = [study.sel(model="hertz", friction="lammps-mindlin")[name].values for name in ("first", "total")]
+    panels = impact.plot(study).axes
+    assert [panel.get_title(loc="left").replace("\xa0", " ") for panel in panels] == [
+        "Hertz (1882) with Coulomb",
+        "Hertz (1882) with LAMMPS mindlin, $x_t$ = 0",
+        "Lankarani and Nikravesh, permanent indentation (1994) with Coulomb",
+    ]
+    np.testing.assert_allclose([bar.get_width() for bar in panels[1].patches], np.ravel(pair))
+    figure = impact.plot(study, models="hertz", frictions=["lammps-mindlin"])
+    assert len(figure.axes) == 1
+    np.testing.assert_allclose([bar.get_width() for bar in figure.axes[0].patches], np.ravel(pair))
+    assert "Hertz (1882)" in figure.texts[1].get_text()
+    assert "0 sticks" not in figure.texts[0].get_text()
+
+
+def test_an_uncertain_angle_is_described_in_degrees() -> None:
+    source = config(frictions="coulomb-1785", friction={}, design={"n": 2})
+    for angle, text in (
+        ({"normal": ["30 deg", "2 deg"]}, "normal(30, 2)°"),
+        ({"lognormal": ["30 deg", 1.2]}, "lognormal(30, 1.2)°"),
+    ):
+        source["sweep"]["angle"] = angle
+        assert text in str(impact.describe(impact.sensitivity(source))).replace("\xa0", " ")
 
 
 # ---- the sweep

@@ -217,6 +217,13 @@ def split_by_law(data: xr.Dataset, *, numbered: bool) -> Iterator[LawPart]:
             yield LawPart(shown, key, friction_key, pair)
 
 
+def with_model(conditions: str, data: xr.Dataset, *, numbered: bool) -> str:
+    """Name the single model of pairs in the conditions, since the names of `split_by_law` do not have it."""
+    is_single = "friction" in data.dims and data.sizes["model"] == 1
+    model = model_label(data.isel(model=0), numbered=numbered) if is_single else ""
+    return ", ".join(filter(None, (model, conditions)))
+
+
 def friction_text(key: str, inputs: Mapping[str, object], units: Mapping[str, str]) -> str:
     """Write the title of a friction law, with those of its parameters that differ from their defaults.
 

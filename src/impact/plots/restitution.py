@@ -13,7 +13,7 @@ from ..errors import UsageError
 from ..formatting import argument, label as number_label, safe_text
 from .curves import Curve, CurveData, Panel, curve_of, law_curve, x_axis_fields
 from .kinds import Choice, Kind
-from .labels import REFERENCE, LawPart, model_label, split_by_law
+from .labels import REFERENCE, LawPart, split_by_law, with_model
 from .slices import Line, choose_line, conditions_of, is_ordered, numeric_axes, read, take_line
 
 FIGURE_6 = "Final velocities comparison"
@@ -173,11 +173,7 @@ def complete(
 ) -> CurveData:
     """Complete panels with the x axis of their line, and add the title and the conditions."""
     heading = safe_text(str(dataset.attrs.get("title", "")), 140)
-    conditions = conditions_of(line.data, line.x)
-    if "friction" in line.data.dims and line.data.sizes["model"] == 1:
-        # the names of friction laws in the legend do not have it
-        model = model_label(line.data.isel(model=0), numbered=choice.equations)
-        conditions = ", ".join(filter(None, (model, conditions)))
+    conditions = with_model(conditions_of(line.data, line.x), line.data, numbered=choice.equations)
     if heading and title != FIGURE_6:
         heading, conditions = title, ": ".join(filter(None, (heading, conditions)))
     x_axis = x_axis_fields(line.coordinate, choice)

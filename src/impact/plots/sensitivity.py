@@ -20,9 +20,18 @@ from ..results.selection import select, select_laws
 from ..results.sensitivity import distribution_texts
 from .data import LegendEntries, Points
 from .kinds import Choice, Kind
-from .labels import axis_text, model_label, number_axis, pretty_conditions, symbol
+from .labels import (
+    LawPart,
+    axis_text,
+    number_axis,
+    pretty_conditions,
+    split_by_law,
+    symbol,
+    with_model,
+    words_of,
+)
 from .slices import conditions_of
-from .style import tint
+from .style import law_key, tint
 
 # bars of an input, and their colours
 BARS = {"first": "First-order index", "total": "Total index"}
@@ -35,18 +44,24 @@ MAX_PANELS = 8
 
 @dataclass(frozen=True)
 class BarPanel:
-    """The indices of one model: its name and key, and by index the values and the ends of their intervals."""
+    """The indices of one model or pair: its names, and by index the values and the ends of their intervals."""
 
     label: str
     model: str
+    friction: str  # key of the friction law of a pair
     values: Mapping[str, tuple[float, ...]]
     lower: Mapping[str, tuple[float, ...]]
     upper: Mapping[str, tuple[float, ...]]
 
+    @property
+    def law(self) -> str:
+        """Its name in the picture, see `impact.plots.style.law_key`."""
+        return law_key(self.model, self.friction)
+
 
 @dataclass(frozen=True)
 class BarData:
-    """The data of a picture of Sobol indices: a panel for each model, with bars for each input."""
+    """The data of a picture of Sobol indices: a panel for each model or pair, with bars for each input."""
 
     title: str
     conditions: str
@@ -65,13 +80,14 @@ class BarData:
 
     @property
     def laws(self) -> dict[str, str]:
-        return {panel.model: panel.label for panel in self.panels}
+        return {panel.law: panel.label for panel in self.panels}
 
     def long_table(self) -> pd.DataFrame:
         """Make a row for each bar."""
         parts = [
             {
                 "model": panel.model,
+                **({"friction": panel.friction} if panel.friction else {}),
                 "input": self.inputs,
                 "index": index,
                 "value": panel.values[index],
@@ -85,12 +101,12 @@ class BarData:
 
     def wide_table(self) -> pd.DataFrame:
         """Make a row for each input, with columns for each index of each model and the ends of its interval."""
-        ends = {"value": "", "lower": "_lower", "upper": "_upper"}
-        table = self.long_table().pivot(index="input", columns=["model", "index"], values=[*ends])
-        columns = [(end, panel.model, index) for panel in self.panels for index in BARS for end in ends]
-        table = table.loc[list(self.inputs), columns]
-        table.columns = pd.Index([heading(f"{index}{ends[end]}", model, "1") for end, model, index in columns])
-        return table.reset_index()
+        columns: dict[str, tuple[str | float, ...]] = {"input": self.inputs}
+        for panel in self.panels:
+            for index in BARS:
+                for end, of_index in (("", panel.values), ("_lower", panel.lower), ("_upper", panel.upper)):
+                    columns[heading(f"{index}{end}", panel.law)] = of_index[index]
+        return pd.DataFrame(columns)
 
     def place_panels(self, figure: Figure, width: float) -> tuple[list[Axes], float]:
         all_axes = figure.subplots(self.panel_count, sharex=True, squeeze=False)
@@ -113,9 +129,7 @@ class BarData:
                     error_kw={"ecolor": tint(1.0), "elinewidth": 0.9, "capsize": 2.5, "capthick": 0.9},
                 )
                 entries.setdefault(name, bars.patches[0])
-            axes.set_title(
-                labels.get(panel.model) or pretty_conditions(panel.label), loc="left", fontsize="medium"
-            )
+            axes.set_title(labels.get(panel.law) or pretty_conditions(panel.label), loc="left", fontsize="medium")
             inputs = [labels.get(name) or (symbol(name) if "." not in name else name) for name in self.inputs]
             axes.set_yticks(positions, inputs)
             axes.set_xlim(left=min(0.0, axes.get_xlim()[0]))
@@ -133,40 +147,44 @@ def sensitivity_bars(dataset: xr.Dataset, choice: Choice) -> BarData:
     for name, value in (("x", choice.x), ("y", choice.y), ("log", choice.log)):
         if value:
             raise UsageError(f"{argument(name)}: does not apply to the picture of a sensitivity study")
-    data = select(select_laws(dataset, choice.models), choice.sel or {}).load()
-    data = data.isel({dim: 0 for dim in data["mean"].dims if dim != "model"})
+    data = select(select_laws(dataset, choice.models, choice.frictions), choice.sel or {}).load()
+    laws = {"model", "friction"} & {*data["mean"].dims}
+    data = data.isel({dim: 0 for dim in data.dims if dim not in (*laws, "input", "quantile")})
     panels: list[BarPanel] = []
     not_drawn: list[str] = []
-    for number in range(data.sizes["model"]):
-        law = data.isel(model=number)
-        key = str(law["model"].item())
-        if not np.isfinite(law["total"].values).any():
-            reason = "samples failed" if int(law["failed"]) else "which does not depend on the inputs"
-            not_drawn.append(f"{key}, {reason}")
+    for law in split_by_law(data, numbered=choice.equations):
+        if not np.isfinite(law.data["total"].values).any():
+            reason = "which does not depend on the inputs"
+            if int(law.data["failed"]):
+                reason = "samples failed"
+            elif np.isnan(law.data["mean"]):
+                reason = "not combinable"
+            not_drawn.append(f"{law.key}, {reason}")
         elif len(panels) == MAX_PANELS:
-            not_drawn.append(f"{key}, beyond {MAX_PANELS} models")
+            not_drawn.append(f"{law.key}, beyond {MAX_PANELS} laws")
         else:
-            panels.append(_bar_panel(law, choice))
+            panels.append(_bar_panel(law))
     if not panels:
         raise UsageError(f"nothing to draw: {'; '.join(not_drawn)}")
     inputs = tuple(str(name).removeprefix("sweep.").removeprefix("model.") for name in data["input"].values)
-    meaning = OUTPUTS[data.attrs["of"]].meaning
+    meaning = words_of({"long_name": OUTPUTS[data.attrs["of"]].meaning}, data.attrs["of"])
     conditions = [", ".join(distribution_texts(data)), conditions_of(data.drop_vars("quantile"))]
     return BarData(
         f"Which uncertain input matters: {meaning}",
-        ", ".join(filter(None, conditions)),
+        with_model(", ".join(filter(None, conditions)), data, numbered=choice.equations),
         inputs,
         tuple(panels),
         tuple(not_drawn),
     )
 
 
-def _bar_panel(law: xr.Dataset, choice: Choice) -> BarPanel:
-    """Read the indices of one model and the ends of their intervals."""
+def _bar_panel(law: LawPart) -> BarPanel:
+    """Read the indices of one model or pair and the ends of their intervals."""
     values, lower, upper = (
-        {name: tuple(law[f"{name}{end}"].values.tolist()) for name in BARS} for end in ("", "_lower", "_upper")
+        {name: tuple(law.data[f"{name}{end}"].values.tolist()) for name in BARS}
+        for end in ("", "_lower", "_upper")
     )
-    return BarPanel(model_label(law, numbered=choice.equations), str(law["model"].item()), values, lower, upper)
+    return BarPanel(law.label, law.model, law.friction, values, lower, upper)
 
 
 SENSITIVITY = Kind(

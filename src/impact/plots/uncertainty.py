@@ -16,7 +16,7 @@ from ..results.selection import select
 from ..results.sensitivity import distribution_texts
 from .curves import Curve, CurveData, Panel, curve_of, law_curve, x_axis_fields
 from .kinds import Choice, Kind
-from .labels import split_by_law
+from .labels import split_by_law, with_model, words_of
 from .slices import choose_line, conditions_of, numeric_axes, read, take_line
 
 # ends of the band, and points of a distribution function that are drawn
@@ -38,7 +38,7 @@ def uncertainty_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     keep = (SAMPLE, "friction") if "friction" in dataset[name].dims else (SAMPLE,)
     line, x_name, not_drawn = take_line(dataset, replace(choice, x=x or SAMPLE), keep)
     line = read(line, [name])
-    meaning = "Delivered restitution" if name == "e_out" else OUTPUTS[name].meaning.capitalize()
+    meaning = "Delivered restitution" if name == "e_out" else words_of(line[name].attrs, name).capitalize()
     curves: list[Curve] = []
     for law in split_by_law(line, numbered=choice.equations):
         samples = np.asarray(law.data[name].transpose(..., SAMPLE).values, float)
@@ -80,6 +80,7 @@ def uncertainty_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
         )
     title = safe_text(str(dataset.attrs.get("title", "")), 140)
     conditions = ", ".join(filter(None, (", ".join(distribution_texts(dataset)), conditions_of(line, x_name))))
+    conditions = with_model(conditions, line, numbered=choice.equations)
     return CurveData(
         f"Uncertain inputs: {meaning[0].lower()}{meaning[1:]}",
         ": ".join(filter(None, (title, conditions))),

@@ -13,7 +13,7 @@ from ..config.input_names import InputName
 from ..contact.units import names_in, with_numbers
 from ..contact.variables import OUTPUTS
 from ..engine.plan import Plan
-from ..formatting import NO_BREAK, decimals, number, safe_text
+from ..formatting import NO_BREAK, decimals, number, safe_text, scaled_unit
 from .attributes import read_attribute
 from .schema import SENSITIVITY, plan_coordinates, provenance_attributes, template
 
@@ -47,13 +47,17 @@ def distribution_texts(dataset: xr.Dataset) -> list[str]:
     texts = []
     for name, distribution in read_attribute(dataset.attrs, "design").get("distributions", {}).items():
         ((kind, numbers),) = distribution.items()
-        shown = ", ".join(number(value) for value in numbers[:3]) + (", …" if len(numbers) > 3 else "")
         parsed = InputName.parse(name)
         # a parameter of a law may have its own n, and other names in the exponents of its unit
         unit = "1" if parsed.model and names_in(parsed.unit) else parsed.unit
         if "n" in dataset.coords and dataset["n"].ndim == 0 and not parsed.owner:
             unit = with_numbers(unit, {"n": float(dataset["n"])})
-        text = f"{name} = {kind}({shown}){'' if unit == '1' else f' {unit}'}"
+        # degrees for rad, but a geometric standard deviation has no unit; no prefix for others
+        size, unit = scaled_unit(unit, 1.0)
+        sizes = (size, 1.0 if kind == "lognormal" else size, size)
+        shown = ", ".join(number(value / of) for value, of in zip(numbers, sizes, strict=False))
+        shown += ", …" if len(numbers) > len(sizes) else ""
+        text = f"{name} = {kind}({shown}){'' if unit == '1' else unit if unit == '°' else f' {unit}'}"
         texts.append(safe_text(text, 80).replace(" ", NO_BREAK))
     return texts
 
