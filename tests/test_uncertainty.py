@@ -501,6 +501,20 @@ def test_without_another_axis_the_picture_is_the_distribution_function(samples: 
     np.testing.assert_allclose(axes.lines[0].get_ydata(), (np.arange(64) + 0.5) / 64)
 
 
+def test_a_law_has_no_studies_along_parameters_of_other_laws() -> None:
+    config = {
+        "models": ["kelvin-voigt", "kuwabara-kono-1987"],
+        "design": {"n": 2},
+        "sweep": {"v1": {"uniform": [1.0, 2.0]}, "m1": 1.0, "m2": 1.0, "R1": 0.1, "R2": 0.1, "material": "steel"},
+        "model": {"kelvin-voigt": {"K": 1e6, "C": [50.0, 80.0]}, "kuwabara-kono-1987": {"A": [1e-6, 2e-6, 3e-6]}},
+    }
+    studies = impact.describe(impact.sensitivity(config)).as_dict()["studies"]
+    assert [study["at"] for study in studies] == [
+        *({"kelvin-voigt.C": value} for value in (50.0, 80.0)),
+        *({"kuwabara-kono-1987.A": value} for value in (1e-6, 2e-6, 3e-6)),
+    ]
+
+
 @pytest.mark.slow
 def test_a_study_is_stored_drawn_and_reported(cli: Run, tmp_path: Path) -> None:
     (tmp_path / "c.toml").write_text(TEXT)

@@ -9,13 +9,13 @@ import numpy as np
 import xarray as xr
 
 from ..config.grid import SAMPLE
-from ..config.input_names import InputName
+from ..config.input_names import InputName, is_foreign
 from ..contact.units import names_in, with_numbers
 from ..contact.variables import OUTPUTS
 from ..engine.plan import Plan
 from ..formatting import NO_BREAK, decimals, number, safe_text, scaled_unit
 from .attributes import read_attribute
-from .schema import SENSITIVITY, plan_coordinates, provenance_attributes, template
+from .schema import SENSITIVITY, columns_along, plan_coordinates, provenance_attributes, template
 
 # probabilities of the quantiles
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
@@ -72,11 +72,16 @@ def describe_design(dataset: xr.Dataset) -> str:
 
 
 def iterate_studies(dataset: xr.Dataset) -> Iterator[tuple[dict[str, float | str], xr.Dataset]]:
-    """Yield the model and the point of each study, and the study."""
+    """Yield the model and the point of each study, and the study; once along parameters of other laws."""
     dims = list(map(str, dataset["mean"].dims))
+    columns = {dim: columns_along(dataset, dim) for dim in dims}
     for index in np.ndindex(*(dataset.sizes[dim] for dim in dims)):
         study = dataset.isel(dict(zip(dims, index, strict=True)))
-        yield {dim: study[dim].item() for dim in dims}, study
+        point = {dim: study[dim].item() for dim in dims}
+        keys = str(study["model"].item()), str(point.get("friction", ""))
+        foreign = [position for position, dim in enumerate(dims) if is_foreign(columns[dim], *keys)]
+        if not any(index[position] for position in foreign):
+            yield {dim: point[dim] for position, dim in enumerate(dims) if position not in foreign}, study
 
 
 INDEX_HEADINGS = ("input", "first-order", "95 %", "total", "95 %", "first-order, n/2", "total, n/2")
