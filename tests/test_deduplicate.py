@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from impact.config.load import read_config
 from impact.contact.impacts import Impacts
 from impact.engine import trajectories as trajectories_module
 from impact.engine.build_impacts import build_impacts
+from impact.engine.execute import integrate_columns
 from impact.engine.plan import Plan
 from impact.engine.run import Run
 from impact.results.estimate import estimate
@@ -208,6 +210,20 @@ def test_the_trajectories_of_a_plan_of_any_size_are_counted() -> None:
     # all points are written in the full layout only; a point takes more than 1 ns
     assert full.seconds > 1e-9 * plan.points > estimated.seconds
     assert [model.axes for model in estimated.models] == [("e",), ("v1",)]
+
+
+def test_the_time_is_estimated_from_a_model_of_many_trajectories(monkeypatch: pytest.MonkeyPatch) -> None:
+    sizes = []
+
+    def integrate(*inputs: Any) -> Any:
+        collisions, others = integrate_columns(*inputs)
+        sizes.append(collisions.status.size)
+        return collisions, others
+
+    monkeypatch.setattr("impact.results.estimate.integrate_columns", integrate)
+    sweep = {"e": {"linspace": [0.1, 0.9, 50]}, "v1": [1.0, 2.0], "m1": 1.0, "m2": 1.0, "K": 6e9}
+    estimate({"models": ["lankarani-nikravesh-1990", "hertz", "tsuji-1992"], "sweep": sweep})
+    assert sizes == [50, 50]
 
 
 def test_an_exponent_gives_the_same_bits_beside_other_exponents() -> None:

@@ -165,8 +165,10 @@ def estimate(
     """
     require_counts(jobs=jobs)
     plan = read_plan(source, overrides, plugins, Run(max_points=max_points, on_note=on_note or warn))
-    # a range in the middle, to avoid the extreme values at both ends
-    chosen = plan.ranges[len(plan.ranges) // 2]
+    # one of the largest ranges, as a few trajectories take as long as many; the middle one avoids extreme values
+    largest = max(block.size for block in plan.ranges)
+    whole = [block for block in plan.ranges if block.size == largest]
+    chosen = whole[len(whole) // 2]
     law = plan.laws[chosen.model]
     # the first run loads or compiles the core
     for _ in range(2):
