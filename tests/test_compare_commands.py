@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import re
 import shlex
@@ -399,6 +400,24 @@ def test_a_picture_of_differences_has_level_keys_and_few_symbols_on_lines(figure
     counts = sorted(int(each.sum()) for each in drawn)
     assert counts[0] == 1
     assert all(10 <= count <= 16 for count in counts[1:])
+
+
+def test_a_picture_of_differences_has_degrees_and_words() -> None:
+    balls = {"m1": 1.0, "m2": 1.0, "R1": 1.0, "R2": 1.0, "K": 1e6, "v1": 1.0}
+    config = {
+        "models": "hertz",
+        "frictions": "coulomb-1785",
+        "sweep": {**balls, "mu": 0.1, "angle": [0.0, math.pi / 3]},
+        "friction": {"coulomb-1785": {"limit": ["abs", "positive"]}},
+    }
+    result = impact.sweep(config)
+    moved = result.assign(u1_post=result["u1_post"] + 1e-3)
+    over_angle, over_limit = draw_differences(difference_data(impact.compare(moved, result))).axes
+    assert over_angle.get_xlabel().endswith("(°)")
+    np.testing.assert_allclose(over_angle.lines[1].get_xdata(), [0.0, 60.0])
+    assert [label.get_text() for label in over_limit.get_xticklabels()] == ["abs", "positive"]
+    (beta,) = impact.plot(result, kind="beta", x="friction.coulomb-1785.limit", sel={"angle": "60 deg"}).axes
+    assert [label.get_text() for label in beta.get_xticklabels()] == ["abs", "positive"]
 
 
 def test_long_keys_of_models_in_a_picture_of_differences_are_tilted() -> None:

@@ -13,8 +13,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from ..comparison.verdict import Verdict
+from ..config.input_names import InputName
 from ..errors import UsageError
-from ..formatting import number, safe_text
+from ..formatting import number, safe_text, scaled_unit
 from ..results.schema import SCHEMA
 from .labels import annotate_right_edge, axis_text, escape_mathtext, number_axis, words_of
 from .layout import Picture
@@ -76,15 +77,19 @@ def difference_data(verdict: Verdict) -> DifferenceData:
     panels = []
     for axis in axes:
         coordinate = along[axis][axis]
+        input_name = InputName.parse(axis)
         is_numeric = coordinate.dtype.kind in "fiu" and bool(np.isfinite(coordinate.values).all())
+        is_numeric = is_numeric and not input_name.words
         order = np.argsort(coordinate.values, kind="stable") if is_numeric else np.arange(coordinate.size)
         values = coordinate.values[order]
-        names = () if is_numeric else tuple(safe_text(number(value), MAX_NAME_LENGTH) for value in values.tolist())
+        # degrees for rad, no prefix for other units
+        size, unit = scaled_unit(unit_of(coordinate), 1.0)
+        texts = () if is_numeric else map(number, map(input_name.word, values.tolist()))
         panels.append(
             DifferencePanel(
-                label=axis_text(words_of(coordinate.attrs, axis), axis, unit_of(coordinate), {}),
-                values=tuple(values.tolist()) if is_numeric else tuple(range(len(values))),
-                names=names,
+                label=axis_text(words_of(coordinate.attrs, axis), axis, unit, {}),
+                values=tuple((values / size).tolist()) if is_numeric else tuple(range(len(values))),
+                names=tuple(safe_text(text, MAX_NAME_LENGTH) for text in texts),
                 ratios={n: tuple(along[axis][n].values[order].tolist()) for n in shown if n in along[axis]},
             )
         )

@@ -257,7 +257,10 @@ def label_axis(
     """Write the label of an axis, and its numbers with one prefix of the unit for all of them."""
     size, shown = (1.0, unit) if log else scaled_unit(unit, largest)
     axis.set_label_text(axis_text(meaning, name, shown, labels))
-    number_axis(axis, size, log=log)
+    if words := InputName.parse(name).words:
+        axis.set_ticks(range(len(words)), words)
+    else:
+        number_axis(axis, size, log=log)
 
 
 def number_axis(axis: Axis, size: float = 1.0, *, log: bool = False) -> None:
