@@ -335,7 +335,7 @@ def test_a_point_is_shown_in_degrees_and_words_and_selected_by_them() -> None:
     name = "friction.coulomb-1785.limit"
     (ranked,) = impact.recommend(result, tol=0.4, target={"beta": 0.4})
     assert ranked.row[-2:] == (f"v1=5 mm/s, angle=80°, {name}=abs: beta {ranked.record['beta']:.4g}", "10° to 30°")
-    assert ranked.at[name] == 0.0
+    assert (ranked.at[name], ranked.record["at"][name], ranked.record["parameters"]) == (0.0, "abs", {name: "abs"})
     (other,) = impact.recommend(result, tol=0.4, target={"beta": 0.4}, sel={name: "positive", "angle": "20 deg"})
     assert (other.points, dict(other.at)) == (2, {"v1": 0.005})
     assert f"{name} is abs, positive" in refused(result, sel={name: "all"})

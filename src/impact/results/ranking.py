@@ -111,18 +111,18 @@ class Ranked:
     @property
     def name(self) -> str:
         """The model, its friction law, and the parameters that were chosen."""
-        values = {path: InputName.parse(path).word(value) for path, value in self.parameters.items()}
         chosen = (
             f"{path.rpartition('.')[2]} = {prefixed(value, self.units.get(path, '1'), 6)}"
-            for path, value in values.items()
+            for path, value in _with_words(self.parameters).items()
         )
         return " with ".join(filter(None, [self.model, ", ".join(filter(None, [self.friction, *chosen]))]))
 
     @property
     def record(self) -> dict[str, Any]:
-        """The fields as plain data, without those of friction and of a target that do not apply."""
+        """The fields as plain data, with words, without those of friction and of a target that do not apply."""
         left_out = ("output", "along", "friction", "units")
         record = {name: value for name, value in vars(self).items() if name not in left_out}
+        record |= {inputs: _with_words(record[inputs]) for inputs in ("parameters", "at")}
         if self.output != "e_out":
             record = {self.output if name == "e_out" else name: value for name, value in record.items()}
         return record | {"share": self.share} | ({"friction": self.friction} if self.friction else {})
@@ -252,6 +252,11 @@ class Ranking(Displayed, Sequence[Ranked]):
 
     def _repr_html_(self) -> str:
         return html_of([self.headline, self._table(self.models)])
+
+
+def _with_words(inputs: Mapping[str, float | str]) -> dict[str, float | str]:
+    """Put the words of parameters in place of their numbers."""
+    return {name: InputName.parse(name).word(value) for name, value in inputs.items()}
 
 
 def error_floor(dataset: xr.Dataset) -> float:
