@@ -112,11 +112,15 @@ def pretty(text: str) -> str:
 
 
 def pretty_conditions(text: str) -> str:
-    """Write conditions with their symbols in italics; a property is that of its material."""
+    """Write conditions with their symbols in italics; a property is that of its material, a parameter of its law.
+
+    >>> pretty_conditions(f"kelvin-voigt.K{NO_BREAK}={NO_BREAK}1").replace(NO_BREAK, " ")
+    '$K$ of kelvin-voigt = 1'
+    """
 
     def shown(name: re.Match[str]) -> str:
-        material = re.fullmatch(r"materials\.(.+)\.\w+", name[1])
-        return (symbol(name[1]) or name[1]) + (f" of {material[1]}" if material else "")
+        owner = InputName.parse(name[1]).owner
+        return (symbol(name[1]) or name[1]) + (f"{NO_BREAK}of{NO_BREAK}{owner}" if owner else "")
 
     text = pretty(text).replace(f"={NO_BREAK}-", f"={NO_BREAK}−")
     return re.sub(rf"([A-Za-z][\w.-]*)(?={NO_BREAK}={NO_BREAK})", shown, text)
