@@ -463,11 +463,16 @@ def test_failed_samples_are_counted_and_not_averaged(cli: Run, tmp_path: Path) -
         assert study["mean"] is None
         assert {index["total"] for index in study["indices"]} == {None}
     swept = impact.sweep(tmp_path / "c.toml", overrides=["sweep.v1.normal=[0.05, 0.05]"])
-    (axes,) = impact.plot(swept).axes
-    requested, *drawn = (line.get_ydata() for line in axes.lines if np.size(line.get_xdata()) == 2)
-    assert np.isfinite(requested).all()
-    assert drawn
-    assert np.isnan(drawn).all()
+    with pytest.raises(UsageError, match=r"nothing to draw: gonthier-2004, where \d+ samples have no result"):
+        impact.plot(swept)
+    # a band has a gap
+    is_first = (swept["model"] == "gonthier-2004") & (swept["e"] == 0.3) & (swept["sample"] == 5)
+    good = impact.sweep(tmp_path / "c.toml")
+    (axes,) = impact.plot(good.assign(e_out=good["e_out"].where(~is_first))).axes
+    requested, gap, *edges, whole, _, _ = (line.get_ydata() for line in axes.lines if len(line.get_xdata()) == 2)
+    assert np.isfinite([requested, whole]).all()
+    assert np.isnan([gap, *edges])[:, 0].all()
+    assert np.isfinite([gap, *edges])[:, 1].all()
 
 
 def test_the_json_names_the_output_the_law_and_the_inputs(cli: Run, tmp_path: Path) -> None:

@@ -54,6 +54,8 @@ def uncertainty_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
             curves.append(law_curve(law, law.data[x], median, name, band=(least, largest)))
         failed = int(np.isnan(samples).sum())
         not_drawn += (f"{law.key}, where {failed:,} samples have no result",) if failed else ()
+    if not any(np.isfinite([curve.x, curve.y]).all(axis=0).any() for curve in curves):
+        raise UsageError(f"nothing to draw: {'; '.join(not_drawn)}")
     if x is None:
         panel = Panel(
             meaning,
