@@ -583,6 +583,16 @@ def test_lammps_searches_for_neighbours_within_a_tenth_of_the_smaller_radius(R1:
     assert float(skin) == pytest.approx(5e-4, rel=1e-12)
 
 
+def test_the_balls_of_a_script_stay_within_its_box() -> None:
+    balls = {"e": 0.6, "v1": 1.0, "v2": -1.0, "m1": 0.1, "m2": 0.1, "R1": 0.01, "R2": 0.01, "K": 1e3}
+    script = impact.export("lammps", at=balls, script=True).script
+    assert script is not None
+    (reach,) = re.findall(r"^region +box block -(\S+) ", script, re.MULTILINE)
+    (dt,) = re.findall(r"^timestep +(\S+)", script, re.MULTILINE)
+    (steps,) = re.findall(r"^run +(\d+)", script, re.MULTILINE)
+    assert float(reach) > 0.02 + 1.0 * float(dt) * int(steps)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", CODES)
 def test_of_the_texts_of_a_caller_only_the_release_is_written(name: str) -> None:
