@@ -583,6 +583,16 @@ def test_lammps_searches_for_neighbours_within_a_tenth_of_the_smaller_radius(R1:
     assert float(skin) == pytest.approx(5e-4, rel=1e-12)
 
 
+@pytest.mark.parametrize("materials", [("soft", "soft"), ("soft", "hard")])
+def test_a_script_of_yade_makes_the_materials_that_its_balls_have(materials: tuple[str, str]) -> None:
+    config = source(*materials) | {"models": default_law("yade")}
+    script = impact.export("yade", source=config, script=True).script
+    assert script is not None
+    made = {*re.findall(r"(material\d) = ", script)}
+    assert made == {*re.findall(r"(material\d)\b(?! = )", script)}
+    assert len(made) == len({*materials})
+
+
 def test_the_balls_of_a_script_stay_within_its_box() -> None:
     balls = {"e": 0.6, "v1": 1.0, "v2": -1.0, "m1": 0.1, "m2": 0.1, "R1": 0.01, "R2": 0.01, "K": 1e3}
     script = impact.export("lammps", at=balls, script=True).script
