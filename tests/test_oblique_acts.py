@@ -92,6 +92,20 @@ def test_the_history_of_sliding_ends_with_the_slip_of_the_outputs_at_any_speed(v
     assert shot.history["slip"].values[-1] == pytest.approx(shot.values["slip_post"], rel=1e-6)
 
 
+def test_a_law_with_other_parameters_in_its_restitution_has_a_history_of_slip() -> None:
+    """The elastic-plastic law of Johnson has an unloading branch, whose parameters the approach does not have."""
+    source = config(models="johnson-1985", frictions=["lammps-mindlin"], K=None)
+    source["sweep"] = {k: v for k, v in source["sweep"].items() if k not in ("K", "e")} | {"material": "steel"}
+    shot = impact.run(source)
+    assert shot.history is not None
+    assert shot.values["permanent_indentation"] > 0.0
+    assert shot.history["slip"].values[-1] == pytest.approx(shot.values["slip_post"], rel=1e-6)
+    # a trapezoid of the friction is the change of the slip, to the accuracy of its steps
+    change = np.trapezoid(shot.history["f"].values, shot.history["t"].values) / shot.derived["m_t"]
+    slip = shot.history["slip"].values
+    assert abs(change) == pytest.approx(abs(slip[-1] - slip[0]), rel=1e-3)
+
+
 def test_the_history_has_the_mirrored_slip_of_a_mirrored_impact() -> None:
     source = config(frictions=["lammps-mindlin"])
     del source["sweep"]["angle"]

@@ -150,7 +150,7 @@ def integrate_slip(
         values = {**dimensionless_values(model, impacts), **friction_values(pair, oblique)}
     values = {name: np.broadcast_to(value, 1) for name, value in values.items()}
     recorded = record_friction(pair, float(impacts.n[0]), values, rtol=rtol, max_steps=max_steps)
-    steps = tuple(step for part in recorded for step in part.steps)
+    steps = _all_steps(recorded)
     grid: int | Array | None = times
     if times is None and steps:
         numbers, fractions = _fractions(steps)
@@ -167,15 +167,18 @@ def integrate_slip(
     return history, _coulomb_history(history, oblique, bool(values[LIMIT_POSITIVE][0]), impulse)
 
 
+def _all_steps(recorded: Sequence[RecordedSlip]) -> list[Step]:
+    """List the steps of all phases, without their params, of which the phases may have different numbers."""
+    return [replace(step, params=()) for part in recorded for step in part.steps]
+
+
 def _slip_history(
     history: History, pair: Pair, oblique: ObliqueImpacts, recorded: Sequence[RecordedSlip]
 ) -> SlipHistory:
     """Find slip and friction of an impact over the times of its history, from the steps of the joint motion."""
     impacts, g0 = oblique.impacts, oblique.slip.item()
     unit_t = (impacts.length / impacts.v0).item()
-    numbers, fractions = _fractions_at(
-        [step for part in recorded for step in part.steps], history.t / unit_t, TIME_ROW
-    )
+    numbers, fractions = _fractions_at(_all_steps(recorded), history.t / unit_t, TIME_ROW)
     rows: list[Array] = []
     first = 0
     for part in recorded:
