@@ -327,6 +327,18 @@ def test_calibrate_recovers_mu_and_the_stiffness_and_finds_the_law(tmp_path: Pat
     xr.testing.assert_equal(impact.load(tmp_path / "fit.h5").load(), result)
 
 
+@pytest.fixture(scope="module")
+def fitted() -> xr.Dataset:
+    """A calibration of a pair of laws by two measured values."""
+    fit = config(models="hertz", frictions="coulomb-1785", mu={"fit": [0.01, 0.5]}, friction={})
+    return impact.calibrate({**fit, "data": {"columns": {"beta": [-0.6, -0.59]}}})
+
+
+def test_a_calibration_of_pairs_is_repeated_from_its_file(fitted: xr.Dataset, tmp_path: Path) -> None:
+    impact.save(fitted, tmp_path / "fit.h5")
+    assert impact.rerun(tmp_path / "fit.h5").equal
+
+
 @pytest.mark.long
 def test_calibrate_has_the_same_bits_in_any_number_of_processes() -> None:
     fit = config(models="hertz", frictions=["coulomb-1785", "drake-regularized"], mu={"fit": [0.01, 0.5]})

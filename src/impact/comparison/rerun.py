@@ -62,9 +62,10 @@ def rerun(
     """
     stored = load(result)
     plugin_set = read_plugins(plugins)
-    # models by key, because "all" may include new models; the tolerances that were used
-    keys = stored["model"].values.tolist() if "model" in stored.dims else []
-    changes = [f"models={json.dumps(keys)}"]
+    # laws by key, because "all" may include new ones; a calibration has pairs, MODEL with FRICTION, along `model`
+    keys = [key.split(" with ") for key in stored["model"].values.tolist()] if "model" in stored.dims else [[]]
+    laws = zip(("models", "frictions"), map(dict.fromkeys, zip(*keys, strict=True)), strict=False)
+    changes = [f"{name}={json.dumps(list(table))}" for name, table in laws]
     changes += [f"solver.{name}={stored.attrs.get(name)}" for name in ("rtol", "max_steps")]
     if kind_of(stored) == "calibration":
         new = _repeat_calibration(stored, changes, plugin_set, str(result))
