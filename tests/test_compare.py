@@ -457,6 +457,15 @@ def test_impacts_without_slip_have_no_tangential_restitution_and_are_equal() -> 
     assert impact.compare(swept, swept, tol=0.0).equal
 
 
+def test_a_friction_law_of_one_result_is_no_difference_of_the_laws_in_both() -> None:
+    inputs = {"v1": 2.0, "u1": 1.0, "m1": 1.0, "m2": 3.0, "K": 1e6, "mu": 0.3}
+    both = {"models": "hertz", "frictions": ["coulomb-1785", "cundall-strack-1979"], "sweep": inputs}
+    more = impact.sweep({**both, "friction": {"cundall-strack-1979": {"k_t": 3e3}}})
+    fewer = impact.sweep({**both, "frictions": "coulomb-1785"})
+    assert impact.compare(more, fewer, subset=True).equal
+    assert impact.compare(more, fewer).headline == "not equal: labels (friction)"
+
+
 def test_residuals_are_judged_by_their_bound(by_hand: xr.Dataset) -> None:
     for name in ("energy_residual", "closed_form_error"):
         # both below the bound, on either side of zero

@@ -121,9 +121,10 @@ def align_sweeps(new: xr.Dataset, baseline: xr.Dataset, *, subset: bool) -> Alig
 
 
 def _drop_foreign_axes(result: xr.Dataset, other: xr.Dataset) -> xr.Dataset:
-    """Drop the parameters of models that the other result lacks; other models do not depend on them."""
-    models = {str(key) for key in np.ravel(other["model"].values)}
-    foreign = [str(name) for name in result.coords if InputName.parse(name).model not in models | {""}]
+    """Drop the parameters of laws that the other result lacks; other laws do not depend on them."""
+    own = {str(key) for dim in LAW_DIMS if dim in other.coords for key in np.ravel(other[dim].values)}
+    names = {str(name): InputName.parse(name) for name in result.coords}
+    foreign = [name for name, parsed in names.items() if not {parsed.model, parsed.friction} <= own | {""}]
     return result.isel({name: 0 for name in foreign if name in result.dims}).drop_vars(foreign)
 
 
