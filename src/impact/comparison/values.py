@@ -14,7 +14,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ..contact.status import Status
+from ..contact.status import FIRST_FAILURE, Status
 from ..contact.variables import Variable
 from ..errors import UsageError
 from ..results import slabs
@@ -236,12 +236,13 @@ def _scale(variable: Variable, aligned: Alignment, region: Region, shape: tuple[
 
 
 def _may_be_missing(variable: Variable, aligned: Alignment, region: Region) -> NDArray[Any] | bool:
-    """Find where NaNs in both are equal: the statuses are equal, and the status or the law explains the NaN."""
+    """Find where NaNs in both are equal: the same status explains them, or the law if neither has failed."""
     results = (aligned.new, aligned.baseline)
     if not variable.per_model or not all(variable.status in result.dataset for result in results):
         return True
     new, baseline = (result.read(variable.status, region) for result in results)
-    return np.asarray((new == baseline) & ((baseline != Status.OK) | variable.may_be_nan))
+    is_explained = (new == baseline) & (baseline != Status.OK)
+    return np.asarray(is_explained | (variable.may_be_nan & (np.maximum(new, baseline) < FIRST_FAILURE)))
 
 
 def _worst_of_slab(
