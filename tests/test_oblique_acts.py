@@ -162,7 +162,14 @@ def test_the_command_runs_an_oblique_impact_without_a_config(cli: Run, tmp_path:
             ("run", "--model", "bilinear", "--friction", "lammps-linear-nohistory", "--at", "mu=0.3"),
             "the contact force has no dashpot",
         ),
-        (("solve", "--model", "hertz", "--for", "mu", "--target", "e_out=1"), 'no parameter "mu"'),
+        (
+            ("solve", "--model", "hertz", "--for", "mu", "--target", "e_out=1"),
+            'hertz has no parameter "mu"; expected --friction KEY',
+        ),
+        (
+            ("solve", "--model", "hertz", "--for", "mu", "--target", "beta=0", "--friction", "coulomb-1785"),
+            "no beta at any value of mu: -g1/g0 has no value at these inputs",
+        ),
         (("solve", "--model", "tsuji-1992", "--for", "e", "--target", "beta=0"), "expected --friction KEY"),
         (("recommend", "central.h5", "--target", "beta=0"), "its sweep has no frictions"),
         (("recommend", "central.h5", "--target", "v1_post=0"), "expected an output of the order of 1"),

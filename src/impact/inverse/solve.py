@@ -228,9 +228,9 @@ def unknown_of(model: ForceModel, name: str, friction: FrictionLaw | None = None
         unknowns["e"] = Parameter("e", "1", "restitution to enter", default=0.5, least=0.0, most=1.0)
     if name not in unknowns:
         laws = _laws(model.key, friction.key if friction else "")
-        raise UsageError(
-            f'{argument("name")}: {laws} has no parameter "{name}"; {did_you_mean(name, list(unknowns))}'
-        )
+        needs_friction = friction is None and (name == "mu" or InputName.parse(name).friction)
+        hint = f"expected {argument('friction', 'KEY')}" if needs_friction else did_you_mean(name, list(unknowns))
+        raise UsageError(f'{argument("name")}: {laws} has no parameter "{name}"; {hint}')
     return unknowns[name]
 
 
@@ -374,9 +374,12 @@ class SolveProblem:
     def raise_failure(self, values: Array, conditions: NDArray[np.intp] | None = None) -> NoReturn:
         """Raise a UsageError with the most frequent status of the integrations that fail."""
         outputs = self.evaluate(values, conditions, is_scan=True)
-        of_friction = OUTPUTS[self.variable].of_friction
-        statuses = outputs[OUTPUTS[self.variable].status][np.isnan(outputs[self.variable])]
-        reason = (FrictionStatus if of_friction else Status)(int(np.bincount(statuses).argmax())).meaning
+        variable = OUTPUTS[self.variable]
+        statuses = outputs[variable.status][np.isnan(outputs[self.variable])]
+        status = (FrictionStatus if variable.of_friction else Status)(int(np.bincount(statuses).argmax()))
+        # of balls whose contact points do not slip before the impact beta is 0/0
+        is_undefined = status == Status.OK
+        reason = f"{variable.equation or 'it'} has no value at these inputs" if is_undefined else status.meaning
         laws = _laws(self.model.key, self.friction)
         raise UsageError(f"{laws}: no {self.variable} at any value of {self.unknown.name}: {reason}")
 
