@@ -423,6 +423,9 @@ def test_a_result_that_cannot_be_ranked_is_refused(hertz: xr.Dataset) -> None:
     assert refused(incomplete) == (
         "this result has no e_error, status; sweep without [output] variables, or add them"
     )
+    assert refused(hertz, target={"e_energetic": 0.5}) == (
+        "this result has no e_energetic; list them in [output] variables"
+    )
     misaligned = hertz.copy()
     misaligned["status"] = misaligned["status"].isel(m2=0, drop=True)
     assert "do not lie along the axes" in refused(misaligned)

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 
-from ..contact.variables import OUTPUTS
 from ..errors import UsageError
 from ..formatting import argument, label as number_label, safe_text
+from ..results.selection import require_outputs
 from .curves import Curve, CurveData, Panel, curve_of, law_curve, x_axis_fields
 from .kinds import Choice, Kind
 from .labels import REFERENCE, LawPart, split_by_law, with_model
@@ -147,13 +147,7 @@ def _have_equal_values(curve: Curve, other: Curve) -> bool:
 def read_line(dataset: xr.Dataset, choice: Choice, *names: str, keep: Sequence[str] = ()) -> Line:
     """Cut a line through a result and read some variables; `keep` as in `take_line`."""
     line = take_line(dataset, choice, keep)
-    missing = [name for name in names if name not in dataset]
-    if missing:
-        is_requested = any(OUTPUTS[name].on_request for name in missing)
-        advice = (
-            "list them in [output] variables" if is_requested else "sweep without [output] variables, or add them"
-        )
-        raise UsageError(f"this result has no {', '.join(missing)}; {advice}")
+    require_outputs(dataset, names)
     return line._replace(data=read(line.data, names))
 
 

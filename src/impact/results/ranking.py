@@ -27,7 +27,7 @@ from ..formatting import argument, number, percentage, prefixed, safe_text
 from .kinds import require_sweep
 from .replay_command import describe_point
 from .schema import columns_along, plain_unit
-from .selection import LawDim, as_keys, law_positions, select
+from .selection import LawDim, as_keys, law_positions, require_outputs, select
 from .slabs import Slab, distinct_points, is_computed, over_varying_dims, slabs, varying_dims
 from .xarray_backend import result_of
 
@@ -381,11 +381,10 @@ def _check_rankable(dataset: xr.Dataset, criterion: Criterion) -> None:
         raise UsageError("got a time history, expected the result of a sweep")
     if "model" not in dataset.dims:
         raise UsageError("model is not an axis of this result; select models as a list, sel(model=[...])")
-    missing = [name for name in criterion.names if name not in dataset]
-    if missing and OUTPUTS[criterion.names[0]].of_friction and "friction" not in dataset.dims:
-        raise UsageError(f"this result has no {missing[0]}: its sweep has no frictions")
-    if missing:
-        raise UsageError(f"this result has no {', '.join(missing)}; sweep without [output] variables, or add them")
+    name = criterion.names[0]
+    if name not in dataset and OUTPUTS[name].of_friction and "friction" not in dataset.dims:
+        raise UsageError(f"this result has no {name}: its sweep has no frictions")
+    require_outputs(dataset, criterion.names)
     if criterion.target is not None:
         return
     if "e" not in dataset.coords or not _uses_e(dataset):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -12,6 +12,7 @@ from ..array_types import Mask
 from ..config.files import to_plain_data, to_plain_value
 from ..config.input_names import InputName
 from ..config.quantities import number_in
+from ..contact.variables import OUTPUTS
 from ..errors import UsageError, did_you_mean
 from ..formatting import argument, label, safe_text
 from .schema import plain_unit
@@ -58,6 +59,17 @@ def law_positions(laws: object, dataset: xr.Dataset, dim: LawDim = "model") -> l
     """Find the positions of the `chosen_laws`, in the order in which they are named."""
     keys = chosen_laws(None, dataset, dim)
     return [keys.index(key) for key in chosen_laws(laws, dataset, dim)]
+
+
+def require_outputs(dataset: xr.Dataset, names: Iterable[str]) -> None:
+    """Refuse a result that lacks some outputs, with what stores them."""
+    missing = [name for name in names if name not in dataset]
+    if missing:
+        is_requested = any(OUTPUTS[name].on_request for name in missing)
+        advice = (
+            "list them in [output] variables" if is_requested else "sweep without [output] variables, or add them"
+        )
+        raise UsageError(f"this result has no {', '.join(missing)}; {advice}")
 
 
 def select_laws(dataset: xr.Dataset, models: object = None, frictions: object = None) -> xr.Dataset:
