@@ -71,6 +71,11 @@ class Variable:
     is_new: bool = False
 
     @property
+    def short_meaning(self) -> str:
+        """Its meaning up to a semicolon, after which are remarks on its values."""
+        return self.meaning.partition(";")[0]
+
+    @property
     def per_model(self) -> bool:
         """Whether it depends on the model, or on the axes only."""
         return "model" in self.dims

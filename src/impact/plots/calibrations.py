@@ -18,9 +18,9 @@ from ..results.selection import chosen_laws
 from .curves import CurveData, Panel, curve_of, x_axis_fields
 from .data import Points
 from .kinds import Choice, Kind
-from .labels import model_label
-from .slices import conditions_of
-from .style import is_geometric
+from .labels import friction_text, model_label
+from .slices import conditions_of, scalars_of, units_of
+from .style import WITH, is_geometric
 
 # laws that are drawn unless the user names them
 MAX_LAWS = 5
@@ -65,7 +65,7 @@ def _panels(data: xr.Dataset, name: str, varied: str, choice: Choice) -> tuple[P
     curves, residuals = [], []
     for index, key in enumerate(map(str, data["model"].values)):
         law = data.isel(model=index)
-        label = ", ".join(filter(None, (model_label(law, numbered=choice.equations), _remark(law))))
+        label = ", ".join(filter(None, (_law_label(law, choice), _remark(law))))
         y = law["predicted"]
         band: list[xr.DataArray] = []
         if varied:
@@ -79,7 +79,7 @@ def _panels(data: xr.Dataset, name: str, varied: str, choice: Choice) -> tuple[P
         _is_logarithmic(x, grid) if varied and not choice.log else "x" in choice.log and bool((x > 0.0).all())
     )
     values = Panel(
-        y_label="Delivered restitution" if name == "e_out" else OUTPUTS[name].meaning.capitalize(),
+        y_label="Delivered restitution" if name == "e_out" else OUTPUTS[name].short_meaning.capitalize(),
         curves=tuple(curves),
         y_unit=OUTPUTS[name].unit,
         y_name=name,
@@ -96,6 +96,15 @@ def _panels(data: xr.Dataset, name: str, varied: str, choice: Choice) -> tuple[P
         height=RESIDUAL_HEIGHT,
         **axis,
     )
+
+
+def _law_label(law: xr.Dataset, choice: Choice) -> str:
+    """Write the name of a law, or of a pair of laws."""
+    label = model_label(law, numbered=choice.equations)
+    if "friction" not in law.coords:
+        return label
+    key = str(law["friction"].item())
+    return f"{label}{WITH}{friction_text(key, scalars_of(law, f'friction.{key}.'), units_of(law))}"
 
 
 def _is_logarithmic(measured: Array, grid: Array) -> bool:

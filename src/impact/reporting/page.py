@@ -227,7 +227,7 @@ def _encoded(values: NDArray[Any]) -> dict[str, Any]:
 
 
 def _output(name: str) -> dict[str, str]:
-    meaning = OUTPUTS[name].meaning
+    meaning = OUTPUTS[name].short_meaning
     return {"name": name, "label": meaning[:1].upper() + meaning[1:], "unit": OUTPUTS[name].unit}
 
 

@@ -194,7 +194,7 @@ class Impact(Displayed):
             is_left_out = variable.dtype != "f8" or (variable.may_be_nan and value != value)
             if name not in self.values or is_left_out or name in ("e_kinetic", "e_energetic"):
                 continue
-            meaning = variable.meaning.partition(";")[0]
+            meaning = variable.short_meaning
             if variable.scale == "bounded by 10 rtol":
                 checks.append((name, number(value, OUTPUT_DIGITS), meaning))
             else:
