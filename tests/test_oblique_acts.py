@@ -205,6 +205,13 @@ def test_solve_finds_the_mu_that_slides_with_a_given_beta() -> None:
 
 
 @pytest.mark.slow
+def test_a_target_of_the_command_may_have_a_unit(cli: Run) -> None:
+    words = ("solve", "--model", "hertz", "--friction", "coulomb-1785", "--for", "mu", "--at", "angle=60 deg")
+    (root,) = json.loads(cli(*words, "--target", "rebound_angle=55 deg", "--json").stdout)["roots"]
+    # elastic balls that slide throughout lose 2 mu v0 of their tangential velocity
+    assert root["value"] == pytest.approx((math.tan(ANGLE) - math.tan(math.radians(55.0))) / 2.0)
+
+
 def test_solve_finds_a_slip_speed_of_a_friction_law() -> None:
     """Its natural size is a speed, that of the impact, and not a number of the contact law."""
     law = {"drake-regularized": {"v_s": 0.01}}

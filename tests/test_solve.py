@@ -292,7 +292,8 @@ def test_the_page_prints_what_the_commands_print(cli: Run) -> None:
     [
         (("--for", "dampratios", "--target", "e_out=0.6"), '--for: mujoco-solref has no parameter "dampratios"'),
         (("--for", "dampratio", "--target", "e_ot=0.6"), '--target: no output "e_ot"; did you mean "e_out"?'),
-        (("--for", "dampratio", "--target", "e_out"), 'got "e_out", expected NAME=NUMBER'),
+        (("--for", "dampratio", "--target", "e_out"), 'got "e_out", expected NAME=VALUE, such as e_out=0.6'),
+        (("--for", "dampratio", "--target", "e_out=0.6 m"), '--target e_out: got "0.6 m", expected a bare number'),
         (("--for", "dampratio", "--target", "e_out=0.6", "--over", "v1=1:2"), "expected NAME=FIRST:LAST:COUNT"),
         (("--for", "dampratio", "--target", "e_out=0.6", "--over", "v9=1:2:3"), "v9"),
         (("--for", "dampratio", "--target", "e_out=0.6", "--at", "v1=-1"), "the balls do not approach"),

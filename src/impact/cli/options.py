@@ -20,7 +20,7 @@ class NamedValue(NamedTuple):
     value: Any
 
 
-def parse_setting(word: str) -> NamedValue:
+def parse_setting(word: str, example: str = "m2=1.0") -> NamedValue:
     """Parse NAME=VALUE; a value that reads as a number is one.
 
     >>> parse_setting("m2=1e3"), parse_setting("material=steel")
@@ -28,7 +28,7 @@ def parse_setting(word: str) -> NamedValue:
     """
     name, _, value = word.partition("=")
     if not name or not value:
-        raise invalid_value(word, "NAME=VALUE, such as m2=1.0")
+        raise invalid_value(word, f"NAME=VALUE, such as {example}")
     try:
         return NamedValue(name, float(value))
     except ValueError:
@@ -36,16 +36,12 @@ def parse_setting(word: str) -> NamedValue:
 
 
 def parse_target(word: str) -> NamedValue:
-    """Parse NAME=NUMBER, where the number may be in percent.
+    """Parse NAME=VALUE, where a text is a number with a unit, which the command reads.
 
-    >>> parse_target("e_out=0.6")
-    NamedValue(name='e_out', value=0.6)
+    >>> parse_target("e_out=0.6"), parse_target("rebound_angle=30 deg")
+    (NamedValue(name='e_out', value=0.6), NamedValue(name='rebound_angle', value='30 deg'))
     """
-    name, _, text = word.partition("=")
-    value = _float_or_nan(text)
-    if not name or math.isnan(value):
-        raise invalid_value(word, "NAME=NUMBER, such as e_out=0.6")
-    return NamedValue(name, value)
+    return parse_setting(word, "e_out=0.6")
 
 
 def parse_range(word: str) -> NamedValue:
