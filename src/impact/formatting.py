@@ -99,10 +99,10 @@ def type_of(value: object) -> str:
 def decimals(value: float, places: int = 4) -> str:
     """Format a number with `places` decimals, for columns whose numbers are compared; NaN is a dash.
 
-    >>> decimals(0.5), decimals(-1e-9), decimals(float("nan"))
-    ('0.5000', '0.0000', '–')
+    >>> decimals(0.5), decimals(float("nan"))
+    ('0.5000', '–')
     """
-    return "–" if value != value else f"{value:z.{places}f}"
+    return "–" if value != value else f"{value:.{places}f}"
 
 
 def percentage(share: float) -> str:

@@ -118,7 +118,7 @@ class BarData:
         for axes, panel in zip(all_axes, self.panels, strict=True):
             for offset, (index, name) in zip((0.5, -0.5), BARS.items(), strict=True):
                 values = np.asarray(panel.values[index])
-                # a percentile interval need not hold its estimate
+                # an estimate may be outside of its interval, which ends at 0 or 1
                 ends = np.maximum([values - panel.lower[index], panel.upper[index] - values], 0.0)
                 bars = axes.barh(
                     positions + offset * BAR_HEIGHT,

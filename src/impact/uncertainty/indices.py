@@ -68,7 +68,8 @@ def indices_of(values: Array, seed: int | None = None) -> Indices:
     lower = upper = np.full_like(estimates, np.nan)
     if seed is not None:
         ends = 0.5 - 0.5 * CONFIDENCE, 0.5 + 0.5 * CONFIDENCE
-        lower, upper = np.quantile(resampled, ends, axis=1)
+        # as the indices are, while an estimate may lie outside
+        lower, upper = np.clip(np.quantile(resampled, ends, axis=1), 0.0, 1.0)
     pairs = (np.split(array, 2, axis=1) for array in (estimates, lower, upper))
     (first, total), (first_lower, total_lower), (first_upper, total_upper) = pairs
     return Indices(first, total, first_lower, first_upper, total_lower, total_upper)
