@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-import warnings
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
@@ -43,8 +42,6 @@ class Execution:
         selected = [f"{name} {value}" for name, value in values.items() if value not in (1, None)]
         if len(selected) > 1:
             raise UsageError(f"{selected[0]}: got {selected[1]} as well, expected one of the two")
-        if self.quiet:
-            warnings.simplefilter("ignore", impact.ImpactWarning)
 
     def _executor(self) -> AbstractContextManager[ExecutorSpec]:
         """Choose the executor; the size of a cluster is printed on stderr when it is entered."""

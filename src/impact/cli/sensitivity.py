@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import Annotated
 
@@ -41,7 +42,9 @@ def sensitivity(
     Of several outputs each has its own tables, and --json is a list.
     """
     outputs = list(dict.fromkeys(of or ["e_out"]))
-    with exits.catch_signals() as should_stop:
+    with exits.catch_signals() as should_stop, warnings.catch_warnings():
+        if quiet:
+            warnings.simplefilter("ignore", impact.ImpactWarning)
         from ..uncertainty.sensitivity import sensitivities
 
         results = sensitivities(
