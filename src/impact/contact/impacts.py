@@ -64,10 +64,11 @@ class Impacts:
         arrays = {name: getattr(self, name)[chosen] for name in INPUTS}
         return Impacts(**arrays, parameters={name: a[chosen] for name, a in self.parameters.items()})
 
-    def broadcast(self) -> Impacts:
-        """Give every field the shape of all of them."""
-        arrays = {name: np.broadcast_to(getattr(self, name), self.shape) for name in INPUTS}
-        parameters = {name: np.broadcast_to(array, self.shape) for name, array in self.parameters.items()}
+    def broadcast(self, shape: tuple[int, ...] | None = None) -> Impacts:
+        """Give every field a shape, by default that of all of them."""
+        shape = self.shape if shape is None else shape
+        arrays = {name: np.broadcast_to(getattr(self, name), shape) for name in INPUTS}
+        parameters = {name: np.broadcast_to(array, shape) for name, array in self.parameters.items()}
         return Impacts(**arrays, parameters=parameters)
 
     @cached_property

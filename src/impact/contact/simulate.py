@@ -84,8 +84,8 @@ def simulate(
     Parameters
     ----------
     n : compliance exponents, shape (k,)
-    values : `dimensionless_values` of the impacts, by name, each of shape (k,); for a scheme also `PHASE`, and one
-        of `STEPS_PER_CONTACT` and `STEP`
+    values : `dimensionless_values` of the impacts, by name, each of shape (k,); for a scheme also `PHASE`, and
+        `STEPS_PER_CONTACT` or `STEP`; with both, the first only limits the number of steps
     status : by `check_inputs`, shape (k,); impacts that are not OK are not integrated
     compute : computes distinct collisions of the continuous law in place of the integration, such as an
         `InterpolatedCollisions`
@@ -289,11 +289,13 @@ def collide_at_fixed_steps(
     law_values = with_coefficients(model, with_units(of_law, n), count)
     status = check_coefficients(model, law_values, of_law, count)
     status[status == LIMIT] = Status.OK
-    if STEPS_PER_CONTACT in values:
+    if STEP not in values:
         times, status = contact_times(slice(None), count)
         step = times / values[STEPS_PER_CONTACT]
     else:
-        times, step = np.full(count, LINEAR_CONTACT_TIME), values[STEP]
+        step = values[STEP]
+        per_contact = values.get(STEPS_PER_CONTACT)
+        times = np.full(count, LINEAR_CONTACT_TIME) if per_contact is None else step * per_contact
     result = replace(CollisionResult.blank(count), status=status)
 
     def collide(rows: NDArray[np.intp]) -> None:
@@ -314,7 +316,7 @@ def collide_at_fixed_steps(
     active = np.flatnonzero(status == STATUS_OK)
     if active.size:
         collide(active)
-    if STEP in values:
+    if STEPS_PER_CONTACT not in values:
         # the contact time is needed only where the balls do not separate within many of those of a linear spring
         unfinished = np.flatnonzero(result.status == Status.NOT_SEPARATED)
         if unfinished.size:

@@ -169,9 +169,9 @@ def verify_scripts(problem: ExportProblem, program: str, dt: float, n_phases: in
             predicted=(problem.e_continuous,),
             uncertainty=max(uncertainty, FLOOR, tolerance),
         )
-    predicted = (
-        np.full(measured.shape, problem.e_continuous) if code.scheme is None else problem.law.restitution(steps)
-    )
+    predicted = np.full(measured.shape, problem.e_continuous)
+    if code.scheme is not None:
+        (predicted,) = problem.law.outputs(steps, "e_out")
     verification = Verification(
         program=program,
         dt=tuple(np.repeat(steps, n_phases).tolist()),
@@ -193,7 +193,7 @@ def _with_friction(
     """
     oblique = problem.law.oblique
     assert oblique is not None
-    predicted = problem.law.tangential_restitution(steps)
+    (predicted,) = problem.law.outputs(steps, "beta")
     exact, impact = verification.uncertainty, problem.law.impact
     v0, slip = float(impact.v0[0]), float(oblique.impact.slip.item())
     speed = math.hypot(v0, float((oblique.impact.u1 - oblique.impact.u2).item()))

@@ -11,11 +11,12 @@ one is a power of the other for laws with a single time scale.
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cache, partial
 from pathlib import Path
-from typing import Any, SupportsFloat
+from typing import Any, NamedTuple, SupportsFloat
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -27,38 +28,32 @@ from ..config.files import read_number, read_numbers
 from ..config.input_names import InputName
 from ..config.load import Config
 from ..config.tables import DEFAULT_RTOL, SWEEP_QUANTITIES, TOLERANCE
-from ..contact.dimensionless import dimensionless_values
+from ..contact import simulate
 from ..contact.fixed_step import (
     DRAKE_SAP,
     LAWS_OF_SCHEME,
-    MAX_CONTACTS,
     MAX_STEPS_PER_CONTACT,
     MUJOCO_CONE,
     SCHEMES,
     check_scheme,
-    collide_at_fixed_step,
     default_scheme,
     friction_problem,
 )
-from ..contact.fixed_step_slip import FixedStepSlip
 from ..contact.formula_calls import argument_names
-from ..contact.friction import Pair, friction_values
+from ..contact.friction import Pair
 from ..contact.impacts import Impacts
 from ..contact.model import ForceModel, Parameter
 from ..contact.models import find
 from ..contact.output_formulas import collide
-from ..contact.records import CollisionResult
 from ..contact.rigid import ObliqueImpacts
-from ..contact.simulate import PHASE, STEP
-from ..contact.status import FIRST_FAILURE, STATUS_OK, FrictionStatus, Status
-from ..contact.tangential import simulate_friction
+from ..contact.status import FIRST_FAILURE, FrictionStatus, Status
 from ..contact.units import with_numbers
 from ..contact.variables import CENTRAL_OUTPUTS
 from ..display import Block, Displayed, Table
 from ..engine.build_impacts import build_impacts, build_oblique, rayleigh_time_at
 from ..engine.plan import Plan
 from ..engine.plugins import read_plugins
-from ..errors import UsageError
+from ..errors import ModelError, UsageError
 from ..formatting import argument, decimals, number, quantity, rounded
 from ..results.single_impact import open_source
 from .solve import PointWithE, config_name, point_with_e, solve_damping, unknown_of, warn_of_point
@@ -395,37 +390,11 @@ def timestep(
     )
 
 
-@dataclass(frozen=True)
-class ObliqueLaw:
+class ObliqueLaw(NamedTuple):
     """A pair of laws, and the inputs of one oblique impact."""
 
     pair: Pair
     impact: ObliqueImpacts
-
-    def values(self, count: int) -> dict[str, Array]:
-        """Compute the values of the tangential problem for many steps or phases."""
-        values = friction_values(self.pair, self.impact)
-        return {name: np.broadcast_to(column.ravel(), count) for name, column in values.items()}
-
-    def restitution(self, values: Mapping[str, Array], scheme: str, max_steps: int) -> Array:
-        """Compute beta of impacts at fixed steps, from the values of the normal problem and of the steps."""
-        count = values[STEP].size
-        result = simulate_friction(
-            self.pair,
-            np.full(count, float(self.impact.impacts.n[0])),
-            {**values, **self.values(count)},
-            np.full(count, STATUS_OK, np.int8),
-            rtol=DEFAULT_RTOL,
-            max_steps=max_steps,
-            integrator=scheme,
-        )
-        with np.errstate(all="ignore"):
-            G0 = np.abs(self.impact.G0.ravel())
-            # Coulomb's friction ends where the slip does
-            slides = np.fmax(G0 - result.sliding_impulse, 0.0)
-            beta: Array = -(slides if self.pair.friction.kind == "coulomb" else result.slip) / G0
-        # 0.0 in place of -0.0
-        return np.where(np.isinf(G0), -1.0, beta) + 0.0
 
 
 @dataclass(frozen=True)
@@ -465,48 +434,43 @@ class FixedStepLaw:
         """The requested e; NaN for a law without one."""
         return float(self.impact.e[0]) if self.has_e else math.nan
 
-    def restitution(self, dt: Array, e: Array | None = None) -> Array:
-        """Compute the delivered restitution at steps dt [s] over all phases, shape (k, phases)."""
-        return self.collide(dt, e).e_out.reshape(dt.size, self.phases)
-
-    def collide(self, dt: Array, e: Array | None = None) -> CollisionResult:
-        """Collide at steps dt [s] with the e to ask for at each, over all phases, shape (k,) to (k phases,)."""
-        values = self._values(dt)
-        if e is not None:
-            values["e"] = np.repeat(e, self.phases)
-        step, phase = values.pop(STEP), values.pop(PHASE)
-        n, slip = float(self.impact.n[0]), None
-        if self.oblique is not None and self.is_coupled:
-            slip = FixedStepSlip.of(self.oblique.pair.form(n), self.oblique.values(step.size), step.size)
-        return collide_at_fixed_step(self.model, n, values, step, phase, self._max_steps(dt), self.scheme, slip)
-
-    def tangential_restitution(self, dt: Array) -> Array:
-        """Compute beta at steps dt [s] over all phases, shape (k, phases); NaN without a friction law."""
-        if self.oblique is None:
-            return np.full((dt.size, self.phases), np.nan)
-        beta = self.oblique.restitution(self._values(dt), self.scheme, self._max_steps(dt))
-        return beta.reshape(dt.size, self.phases)
-
-    def _values(self, dt: Array) -> dict[str, Array]:
-        """Compute the values of the normal problem and of the steps, over all phases, shape (k phases,)."""
-        phase, count = (np.arange(self.phases) + 0.5) / self.phases, dt.size * self.phases
-        values = {
-            name: np.broadcast_to(value, count)
-            for name, value in dimensionless_values(self.model, self.impact).items()
+    def outputs(self, dt: Array, *names: str, e: Array | None = None) -> list[NDArray[Any]]:
+        """Compute outputs by name at steps dt [s] with the e to ask for at each, of shape (k, phases)."""
+        step, phase = np.repeat(dt / self.impact.time, self.phases), (np.arange(self.phases) + 0.5) / self.phases
+        impact = self.impact if e is None else replace(self.impact, e=np.repeat(e, self.phases))
+        impact, oblique = impact.broadcast(step.shape), None
+        # friction is not integrated for what does not depend on it
+        if self.oblique is not None and (self.is_coupled or "beta" in names):
+            oblique = ObliqueLaw(self.oblique.pair, replace(self.oblique.impact, impacts=impact))
+        fixed_step = {
+            simulate.STEP: step,
+            simulate.STEPS_PER_CONTACT: np.full(step.shape, self.contact_time / dt.min()),
+            simulate.PHASE: np.tile(phase, dt.size),
         }
-        return {**values, STEP: np.repeat(dt / self.impact.time[0], self.phases), PHASE: np.tile(phase, dt.size)}
-
-    def _max_steps(self, dt: Array) -> int:
-        return math.ceil(MAX_CONTACTS * max(self.contact_time / float(dt.min()), 1.0))
+        errors: dict[str, str] = {}
+        outputs = collide(
+            self.model,
+            impact,
+            rtol=DEFAULT_RTOL,
+            # those in a contact are the limit
+            max_steps=sys.maxsize,
+            collapse=False,
+            integrator=self.scheme,
+            fixed_step=fixed_step,
+            errors=errors,
+            names=names,
+            oblique=oblique,
+        )
+        for error in errors.values():
+            raise ModelError(error)
+        return [np.broadcast_to(outputs[name], step.shape).reshape(-1, self.phases) for name in names]
 
 
 def timestep_rows(law: FixedStepLaw, dt: Sequence[float]) -> tuple[TimestepRow, ...]:
     """Find what a law delivers at steps dt [s], and the e to ask for."""
     steps = np.array(dt)
-    result = law.collide(steps)
-    delivered = result.e_out.reshape(steps.size, law.phases)
-    statuses = result.status.reshape(steps.size, law.phases)
-    betas = law.tangential_restitution(steps)
+    delivered, statuses, *friction = law.outputs(steps, "e_out", "status", *(["beta"] if law.oblique else []))
+    betas = friction[0] if friction else np.full(delivered.shape, np.nan)
     e_compensated = compensated_e(law, steps)
     return tuple(
         TimestepRow(
@@ -540,7 +504,8 @@ def compensated_e(law: FixedStepLaw, dt: Array) -> Array:
 
     def distance(e: Array, steps: Array) -> Array:
         e, steps = np.broadcast_arrays(e, steps)
-        means: Array = law.restitution(steps.ravel(), e.ravel()).mean(axis=1)
+        (delivered,) = law.outputs(steps.ravel(), "e_out", e=e.ravel())
+        means: Array = delivered.mean(axis=1)
         return means.reshape(e.shape) - target
 
     scan = np.linspace(MIN_E, 1.0, N_SCAN)
@@ -572,7 +537,7 @@ def needed_steps(
     @cache
     def log_error(steps: int) -> float:
         """The logarithm of the largest error over the tolerance; inf where a phase has no rebound."""
-        e = law.restitution(np.array([law.contact_time / steps]))
+        (e,) = law.outputs(np.array([law.contact_time / steps]), "e_out")
         error = float(np.abs(e - target).max()) / (tol * target)
         return math.log(error or EXACT_ERROR) if math.isfinite(error) else math.inf
 
@@ -782,7 +747,7 @@ def fixed_step_law(
         rtol=config.solver.rtol,
         max_steps=config.solver.max_steps,
         names=(*CENTRAL_OUTPUTS, *(("beta", "friction_status") if continuous else ())),
-        oblique=(continuous.pair, continuous.impact) if continuous else None,
+        oblique=continuous,
     )
     values = {name: array.ravel()[0].item() for name, array in outputs.items()}
     status = Status(values["status"])
