@@ -14,11 +14,27 @@ import mpmath as mp
 import numpy as np
 import pytest
 
+from impact.contact.closed_forms.hysteresis import approach_damped_restitution
 from impact.contact.impacts import Impacts, stiffness
 from impact.contact.materials import effective_mass, hertz_stiffness, sphere_radius
 from impact.contact.model import ForceModel
 from impact.contact.models import catalogue
 from impact.ode.problem import Problem
+
+
+def contact_time_ratio(n: float) -> float:
+    """Contact time without damping over δₘ/v₀: 2 √π Γ(1 + 1/(n+1))/Γ(1/2 + 1/(n+1))."""
+    q = 1.0 / (n + 1.0)
+    return 2.0 * math.sqrt(math.pi) * math.gamma(1.0 + q) / math.gamma(0.5 + q)
+
+
+def damped_peak_indentation(chi, n: float):
+    """Peak indentation of F = K δⁿ (1 + χ δ̇/v₀) in units of (m v₀²/K)^(1/(n+1)).
+
+    The elastic work up to the peak, xₘ^(n+1)/(n+1), is half the square of the restitution without damping on
+    restitution.
+    """
+    return np.power((n + 1.0) * 0.5 * np.square(approach_damped_restitution(chi)), 1.0 / (n + 1.0))
 
 
 @dataclass(frozen=True)

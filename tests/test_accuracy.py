@@ -8,8 +8,7 @@ from scipy.optimize import minimize_scalar
 
 from impact.config.tables import DEFAULT_RTOL
 from impact.contact import motion
-from impact.contact.closed_forms.elastic import contact_time_ratio, peak_indentation
-from impact.contact.closed_forms.hysteresis import damped_peak_indentation
+from impact.contact.closed_forms.elastic import peak_indentation
 from impact.contact.impacts import Impacts
 from impact.contact.models import find
 from impact.contact.models.hysteresis import hysteresis
@@ -19,7 +18,14 @@ from impact.contact.simulate import integrate_collisions
 from impact.contact.status import Status
 from impact.contact.velocity_coordinates import STRONG_DAMPING
 
-from .problems import LAWS, hysteresis_reference, table1_impacts, with_parameters
+from .problems import (
+    LAWS,
+    contact_time_ratio,
+    damped_peak_indentation,
+    hysteresis_reference,
+    table1_impacts,
+    with_parameters,
+)
 
 EXPONENTS = (1.0, 1.3, 1.5, 2.0, 3.0)
 E_GRID = np.unique([*np.geomspace(0.001, 0.1, 60), *np.linspace(0.05, 1.0, 191)])

@@ -6,14 +6,15 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from impact.contact.closed_forms.elastic import contact_time_ratio, peak_indentation
+from impact.contact.closed_forms.elastic import peak_indentation
 from impact.contact.closed_forms.hysteresis import (
     SERIES_BELOW_CHI,
     SERIES_FROM_E,
-    damped_peak_indentation,
     delivered_restitution,
     exact_damping_ratio,
 )
+
+from .problems import contact_time_ratio, damped_peak_indentation
 
 DIGITS = 80
 EXPONENTS = (1.0, 1.3, 1.5, 2.0, 3.0)

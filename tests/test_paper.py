@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from impact.contact.closed_forms.elastic import contact_time_ratio, peak_indentation
+from impact.contact.closed_forms.elastic import peak_indentation
 from impact.contact.history import integrate_history
 from impact.contact.impacts import Impacts
 from impact.contact.impulse import velocities_after, velocities_at
@@ -17,7 +17,7 @@ from impact.contact.models import find
 from impact.contact.output_formulas import Outputs, collide
 from impact.contact.status import Status
 
-from .problems import LAWS, table1_impacts, with_parameters
+from .problems import LAWS, contact_time_ratio, table1_impacts, with_parameters
 
 RTOL, MAX_STEPS = 1e-10, 100_000
 HYSTERESIS_LAWS = {

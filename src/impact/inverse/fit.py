@@ -82,13 +82,6 @@ class Bounds:
         between = np.where(u == 1.0, self.upper, between)
         return np.where(self.is_log, np.clip(lower * (upper / lower) ** u, lower, upper), between)
 
-    def units(self, values: Array) -> Array:
-        """Convert parameters to u, shape (..., p)."""
-        lower, upper = np.where(self.is_log, self.lower, 1.0), np.where(self.is_log, self.upper, np.e)
-        positive = np.where(self.is_log, values, 1.0)
-        log_u = np.log(positive / lower) / np.log(upper / lower)
-        return np.where(self.is_log, log_u, (values - self.lower) / (self.upper - self.lower))
-
     def slope(self, u: Array) -> Array:
         """Differentiate each parameter by its u, shape (p,)."""
         lower, upper = np.where(self.is_log, self.lower, 1.0), np.where(self.is_log, self.upper, np.e)

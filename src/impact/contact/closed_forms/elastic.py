@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from ...array_types import Array
@@ -16,13 +14,3 @@ def peak_indentation(m: Array, v0: Array, K: Array, n: float | Array) -> Array:
     0.0001008542975
     """
     return np.power((n + 1.0) * 0.5 * m * v0 / K * v0, 1.0 / (n + 1.0))
-
-
-def contact_time_ratio(n: float) -> float:
-    """Contact time without damping over δₘ/v₀: 2 √π Γ(1 + 1/(n+1))/Γ(1/2 + 1/(n+1)).
-
-    >>> round(contact_time_ratio(1.5), 5)
-    2.94328
-    """
-    q = 1.0 / (n + 1.0)
-    return 2.0 * math.sqrt(math.pi) * math.gamma(1.0 + q) / math.gamma(0.5 + q)

@@ -84,17 +84,6 @@ def _work_to_peak(chi: Array) -> Array:
     return np.where(np.isinf(chi), 0.0, integral)
 
 
-def damped_peak_indentation(chi: Array, n: float) -> Array:
-    """Peak indentation of F = K δⁿ (1 + χ δ̇/v₀) in units of (m v₀²/K)^(1/(n+1)).
-
-    From the same integral as `delivered_restitution`, up to v = 0: xₘ^(n+1)/(n+1) = (χ − ln(1 + χ))/χ².
-
-    >>> print(damped_peak_indentation(np.array([1.0]), 1.5).round(6))
-    [0.89939]
-    """
-    return np.asarray(np.power((n + 1.0) * _work_to_peak(np.asarray(chi, dtype=float)), 1.0 / (n + 1.0)))
-
-
 def approach_damped_restitution(chi: Array | float) -> Array:
     """The restitution delivered where F = K δⁿ (1 + χ δ̇/v₀) on approach only, and F = K δⁿ on restitution.
 
