@@ -565,7 +565,7 @@ def test_bless_accepts_failed_points_only_with_allow_failed(forked: ForkServer, 
     impact.save(impact.sweep(SMALL | {"sweep": sweep}), tmp_path / "new.h5")
     words = ["bless", "new.h5", "base.h5", "--reason", "first"]
     done = forked(*words, cwd=tmp_path)
-    at = f"model={KEY}, alpha=0.6, v1=2 (invalid_parameter)"
+    at = f"model={KEY}, alpha=0.6 s/m, v1=2 m/s (invalid_parameter)"
     message = f"new.h5: 1 of 8 points failed, the first at {at}; expected none, or --allow-failed\n"
     assert (done.returncode, done.stdout, done.stderr) == (2, "", message)
     assert not (tmp_path / "base.h5").exists()
