@@ -82,8 +82,8 @@ def test_workers_started_by_ssh_give_the_expected_result(folder: Path) -> None:
     (folder / "bin" / "ssh").write_text(SSH)
     (folder / "bin" / "ssh").chmod(0o755)
     printed = run(folder, "bash", "by_ssh.sh", PATH=f"{folder / 'bin'}{os.pathsep}{os.environ['PATH']}")
-    # the sweep begins with the first worker, and others may join it later
-    assert re.search(r"^\d+ workers?; dashboard: ", printed, re.MULTILINE)
+    # workers may join the sweep later, on a busy machine the first one, too
+    assert re.search(r"^(\d+ workers?|0 workers, waits for some); dashboard: ", printed, re.MULTILINE)
     assert has_expected_result(folder)
 
 
