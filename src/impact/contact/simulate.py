@@ -85,7 +85,7 @@ def simulate(
     ----------
     n : compliance exponents, shape (k,)
     values : `dimensionless_values` of the impacts, by name, each of shape (k,); for a scheme also `PHASE`, and
-        `STEPS_PER_CONTACT` or `STEP`; with both, the first only limits the number of steps
+        `STEPS_PER_CONTACT` or `STEP`; with both, `STEPS_PER_CONTACT` only limits the number of steps
     status : by `check_inputs`, shape (k,); impacts that are not OK are not integrated
     compute : computes distinct collisions of the continuous law in place of the integration, such as an
         `InterpolatedCollisions`

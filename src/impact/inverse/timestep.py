@@ -452,7 +452,7 @@ class FixedStepLaw:
             self.model,
             impact,
             rtol=DEFAULT_RTOL,
-            # those in a contact are the limit
+            # the steps in a contact limit their number
             max_steps=sys.maxsize,
             collapse=False,
             integrator=self.scheme,

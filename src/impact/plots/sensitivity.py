@@ -28,7 +28,6 @@ from .labels import (
     split_by_law,
     symbol,
     with_model,
-    words_of,
 )
 from .slices import conditions_of
 from .style import law_key, tint
@@ -167,7 +166,7 @@ def sensitivity_bars(dataset: xr.Dataset, choice: Choice) -> BarData:
     if not panels:
         raise UsageError(f"nothing to draw: {'; '.join(not_drawn)}")
     inputs = tuple(str(name).removeprefix("sweep.").removeprefix("model.") for name in data["input"].values)
-    meaning = words_of({"long_name": OUTPUTS[data.attrs["of"]].meaning}, data.attrs["of"])
+    meaning = OUTPUTS[data.attrs["of"]].short_meaning
     conditions = [", ".join(distribution_texts(data)), conditions_of(data.drop_vars("quantile"))]
     return BarData(
         f"Which uncertain input matters: {meaning}",
