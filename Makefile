@@ -4,6 +4,7 @@ export PYTHONDONTWRITEBYTECODE :=
 PYTHON ?= python3
 VENV ?= .venv
 PEERS ?= .venv-peers
+ROOM ?= 2000000
 SITE ?= .venv-site
 BIN := $(VENV)/bin
 RESULTS ?= results
@@ -100,12 +101,14 @@ $(VENV)/dev: pyproject.toml
 	@touch $@
 
 # Some of the codes are on PyPI; on Debian `apt-get install liggghts yade` adds two. Each wheel is installed
-# separately, so that a missing one does not prevent the others, and outside $(VENV), whose versions could change
+# separately, so that a missing one does not prevent the others, and outside $(VENV), whose versions could change.
+# They take 2.3 GB; ROOM kB of the disk stay free for what else runs
 $(PEERS)/peers: pyproject.toml | $(VENV)/dev
 	test -x $(PEERS)/bin/python || $(PYTHON) -m venv $(PEERS)
 	@$(BIN)/python -c 'import tomllib; print(*tomllib.load(open("pyproject.toml", "rb"))["project"]["optional-dependencies"]["peers"], sep="\n")' | { \
 		missing=0; \
 		while read -r wheel; do \
+			test "$$(df -Pk $(PEERS) | awk 'NR == 2 { print $$4 }')" -gt $(ROOM) || { echo "not installed: $$wheel: less than $(ROOM) kB are free"; missing=1; continue; }; \
 			$(PEERS)/bin/python -m pip install --quiet --disable-pip-version-check "$$wheel" < /dev/null || { echo "not installed: $$wheel"; missing=1; }; \
 		done; \
 		test $$missing = 1 || touch $@; \
