@@ -286,8 +286,8 @@ def test_run_repeats_a_point_of_a_result(cli: Run, tmp_path: Path) -> None:
             "impact sweep: Invalid value for '--jobs' / '-j': got \"0\", expected a whole number of at least 1",
         ),
         (
-            ["recommend", "a.h5", "--tol", "x"],
-            "impact recommend: Invalid value for '--tol': got \"x\", expected a number, such as 0.02 or 2%; ",
+            ["timestep", "--model", "hertz", "--tol", "x"],
+            "impact timestep: Invalid value for '--tol': got \"x\", expected a number, such as 0.02 or 2%; ",
         ),
     ],
 )

@@ -306,6 +306,22 @@ def test_the_ranking_by_e_error_has_no_word_of_friction(swept: dict[str, xr.Data
     assert [law.name for law in e_out.best] == ["tsuji-1992", "lankarani-nikravesh-1994"]
 
 
+def test_angles_of_a_ranking_are_in_degrees() -> None:
+    one_pair = {"models": ["hertz"], "frictions": ["coulomb-1785"], "friction": {}}
+    source = config(**one_pair, angle={"linspace": ["10 deg", "60 deg", 6]})
+    result = impact.sweep(source)
+    target = {"rebound_angle": "20 deg"}
+    ranking = impact.recommend(result, target=target, tol="0.5 deg")
+    assert ranking.tol == math.radians(0.5)
+    assert ranking.headline.startswith("no pair gives rebound_angle = 20° within 0.5°")
+    assert ranking.headings[1] == "points within 0.5°"
+    law = ranking.models[0]
+    assert law.row[2] == f"{math.degrees(law.max_error):.3g}°"
+    assert law.row[5].endswith(f"rebound_angle {math.degrees(law.e_out):.4g}°")
+    with pytest.raises(impact.ImpactError, match=re.escape('tol: got "1 m", expected a unit of rad')):
+        impact.recommend(result, target=target, tol="1 m")
+
+
 # ---- calibrate
 
 

@@ -438,7 +438,7 @@ def test_an_error_of_the_command_is_one_line(cli: Run, tmp_path: Path) -> None:
     path = stored(tmp_path, swept("hertz", e=None))
     for words, line in (
         ([path], "this sweep has no requested e, which the ranking needs; add e or alpha\n"),
-        ([path, "--tol", "-1"], "tol: got -1.0, expected a number > 0\n"),
+        ([path, "--tol", "-1"], "--tol: got -1.0, expected a number > 0\n"),
         (
             [path, "--sel", "m2"],
             "impact recommend: Invalid value for '--sel': got \"m2\", expected NAME=VALUE, such as m2=1.0; "

@@ -310,6 +310,18 @@ def test_at_selects_a_case_by_its_number_and_a_material_by_its_property(cli: Run
     assert collision.first == ("materials.steel.E",)
 
 
+def test_at_fixes_an_uncertain_input() -> None:
+    uncertain = {"e": {"normal": [0.8, 0.02]}, "v1": {"uniform": [0.5, 1.5]}, "m1": 0.1, "m2": 0.2, "K": 1e8}
+    source = {"models": ["tsuji-1992"], "sweep": uncertain, "design": {"n": 16}}
+    fixed = {"models": ["tsuji-1992"], "sweep": {**uncertain, "e": 0.7, "v1": 2.0}}
+    runs = (impact.run(source, at={"e": 0.7, "v1": 2.0}), impact.run(fixed))
+    # as text, in which NaN is equal to NaN
+    assert len({json.dumps(run.as_dict()) for run in runs}) == 1
+    some = impact.run(impact.sweep(source), at={"e": 0.7})
+    assert (some.point["e"], some.first) == (0.7, ("v1",))
+    assert 0.5 <= some.point["v1"] <= 1.5
+
+
 def test_values_of_numpy_are_values() -> None:
     e, speeds = np.float64(0.6), np.array([1.0, 2.0])
     assert impact.run(model="bilinear", at={"e": e}).point == impact.run(model="bilinear", at={"e": 0.6}).point

@@ -13,9 +13,11 @@ from . import exits, options
 def recommend(
     result: options.Result,
     tol: Annotated[
-        float,
-        options.number("VALUE", "Largest accepted |e_out − e|, or distance from the target, such as 0.02 or 2%."),
-    ] = 0.01,
+        str,
+        options.value(
+            "VALUE", "Largest accepted |e_out − e|, or distance from the target, such as 0.02, 2% or 1deg."
+        ),
+    ] = "0.01",
     target: Annotated[
         options.NamedValue | None,
         options.target("The wanted output, such as beta=0.4. \\[default: e_out, compared with e]"),

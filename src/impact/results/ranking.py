@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Hashable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, SupportsFloat, overload
@@ -23,7 +23,7 @@ from ..contact.units import names_in
 from ..contact.variables import OUTPUTS
 from ..display import Block, Displayed, Table, html_of
 from ..errors import UsageError, did_you_mean
-from ..formatting import argument, number, percentage, prefixed, safe_text
+from ..formatting import argument, percentage, prefixed, safe_text
 from .kinds import require_sweep
 from .replay_command import describe_point
 from .schema import columns_along, plain_unit
@@ -67,7 +67,16 @@ class Criterion:
 
     @property
     def text(self) -> str:
-        return "e" if self.target is None else f"{self.output} = {number(self.target)}"
+        return "e" if self.target is None else f"{self.output} = {self.shown(self.target)}"
+
+    @property
+    def tolerance(self) -> Quantity:
+        """The quantity of the tolerance, in the unit of the output."""
+        return replace(TOLERANCE, unit=OUTPUTS[self.output].unit, meaning="largest accepted difference")
+
+    def shown(self, value: float, digits: int = 6) -> str:
+        """Write a value of the output, or an error of it."""
+        return prefixed(value, OUTPUTS[self.output].unit, digits)
 
 
 BY_ERROR = Criterion()
@@ -147,9 +156,14 @@ class Ranked:
         >>> Ranked("hertz", {}, 10, 1, 0, 0.45, 0.9, {"e": 1 / 9}, 1.0, ((8 / 9, 1.0),)).row[-2:]
         ('e=0.111111: e_out 1', '0.888889 to 1')
         """
-        errors = map(_error_text, (self.max_error, self.mean_error))
+        shown = Criterion(self.output).shown
+        # the digits of an error of the integrator mean nothing
+        errors = (
+            "<1e-9" if 0.0 < error < MIN_ERROR_FLOOR else shown(error, 3)
+            for error in (self.max_error, self.mean_error)
+        )
         has_worst = self.at and self.max_error > MIN_ERROR_FLOOR
-        worst = f"{describe_point(self.at, 6)}: {self.output} {number(self.e_out, 4)}" if has_worst else "–"
+        worst = f"{describe_point(self.at, 6)}: {self.output} {shown(self.e_out, 4)}" if has_worst else "–"
         return (self.name, percentage(self.share), *errors, f"{self.failed:,}", worst, self._served_text)
 
     @property
@@ -190,14 +204,15 @@ class Ranking(Displayed, Sequence[Ranked]):
     @property
     def headings(self) -> tuple[str, ...]:
         """Headings of a table of `Ranked.row`; the first and the last two columns are text, the others numbers."""
+        tol = self.criterion.shown(self.tol)
         return (
             "model",
-            f"points within {number(self.tol)}",
+            f"points within {tol}",
             "max error",
             "mean error",
             "failed",
             "worst point",
-            f"{self.criterion.along} within {number(self.tol)}",
+            f"{self.criterion.along} within {tol}",
         )
 
     @property
@@ -209,7 +224,7 @@ class Ranking(Displayed, Sequence[Ranked]):
     def headline(self) -> str:
         """The result in a sentence."""
         first = self.models[0]
-        tol, points = number(self.tol), f"{first.points:,} points"
+        tol, points = self.criterion.shown(self.tol), f"{first.points:,} points"
         alone = "the only point" if first.points == 1 else ""
         if self.best:
             verb = "give" if len(self.best) > 1 else "gives"
@@ -289,7 +304,7 @@ def recommend(
     Parameters
     ----------
     dataset : a result, or its file
-    tol : largest accepted |e_out - e|, or distance from the target
+    tol : largest accepted |e_out - e|, or distance from the target, which may have its unit
     sel : values of axes, such as `{"m2": 1.0}`; by default all values of an axis are ranked
     models : keys of the models to rank; by default all
     target : the value of one output, such as `{"beta": 0.4}`; by default e_out is compared with the e asked for
@@ -311,8 +326,8 @@ def recommend(
     """
     dataset = result_of(dataset)
     require_sweep(dataset, "recommend")
-    tol = read_number(tol, TOLERANCE, "tol")
     criterion = BY_ERROR if target is None else _criterion_of(target)
+    tol = read_number(tol, criterion.tolerance, argument("tol"))
     if as_keys(frictions) and not OUTPUTS[criterion.names[0]].of_friction:
         origin, of = argument("frictions"), argument("target")
         raise UsageError(f"{origin}: expected a {of} that depends on friction, such as beta=0.4")
@@ -406,11 +421,6 @@ def _listed(models: Sequence[Ranked]) -> str:
     others = len(models) - MAX_NAMED
     names += [f"{others} other{'s' * (others > 1)}"] if others > 0 else []
     return " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))
-
-
-def _error_text(error: float) -> str:
-    """Write an error; the digits of one of the integrator mean nothing."""
-    return "<1e-9" if 0.0 < error < MIN_ERROR_FLOOR else number(error, 3)
 
 
 def _uses_e(dataset: xr.Dataset) -> bool:

@@ -671,6 +671,7 @@ def single_point(
     settings += [
         Setting(InputName.parse(name).path, values, argument("over", key=name)) for name, values in over.items()
     ]
+    is_uncertain = any(distribution_paths(draft.data))
     draft = draft.with_settings(settings)
     if isinstance(draft.table("sweep").get("cases"), str):
         # the inputs that vary together are the columns of the file
@@ -684,6 +685,8 @@ def single_point(
     for name, value in sorted({**labels, **fixed}.items(), key=lambda item: item[0] == "K"):
         if name not in joint and not is_case(name):
             draft = draft.with_settings([_setting_at(draft, name, value, law, source.at_name)])
+    if is_uncertain and not any(distribution_paths(draft.data)):
+        draft = replace(draft, data={key: value for key, value in draft.data.items() if key != "design"})
     config = build(draft)
     for name in fixed:
         if is_case(name) and name not in {axis.numbered for axis in config.axes}:
@@ -706,14 +709,11 @@ def _input_name(name: str, model: ForceModel | None, friction: FrictionLaw | Non
 
 
 def _joint_inputs(draft: Draft) -> set[str]:
-    """Name the inputs that vary together: in zip groups, in a table of cases, and as samples."""
+    """Name the inputs that vary together: in zip groups and in a table of cases."""
     sweep = draft.table("sweep")
     groups = sweep.get("zip")
     zipped = [name for group in groups for name in listed_names(group)] if isinstance(groups, list) else []
-    names = {str(InputName.parse(name)) for name in (*zipped, *as_table(sweep.get("cases")))}
-    if "design" in draft.data:
-        names |= {str(InputName.of_path(path)) for path in distribution_paths(draft.data)}
-    return names
+    return {str(InputName.parse(name)) for name in (*zipped, *as_table(sweep.get("cases")))}
 
 
 def _setting_at(draft: Draft, name: str, value: float | str, law: ForceModel | None, at_name: str) -> Setting:
