@@ -14,6 +14,7 @@ import xarray as xr
 
 import impact
 from impact.errors import ConfigError, UsageError
+from impact.results.schema import FIT_STATUSES
 
 from .conftest import Run
 
@@ -355,6 +356,26 @@ def test_calibrate_recovers_mu_and_the_stiffness_and_finds_the_law(tmp_path: Pat
     np.testing.assert_allclose(again["e_t"].values, measured["e_t"].values, rtol=1e-4)
     impact.save(result, tmp_path / "fit.h5")
     xr.testing.assert_equal(impact.load(tmp_path / "fit.h5").load(), result)
+
+
+def test_calibrate_says_which_pair_cannot_be_combined_and_why() -> None:
+    source: dict[str, Any] = {
+        "models": ["kelvin-voigt", "tsuji-1992"],
+        "frictions": ["lammps-mindlin"],
+        "sweep": {"e": 0.8, "v1": 1.0, "u1": 0.5, "m1": 0.1, "m2": 0.2, "R1": 0.01, "mu": {"fit": [0.05, 0.6]}},
+        "model": {"kelvin-voigt": {"C": 1000.0}},
+        "data": {"columns": {"beta": [0.1, 0.12]}},
+    }
+    source["sweep"] |= {"material": "steel"}
+    source["materials"] = {"steel": {"E": 2.1e11, "nu": 0.3, "rho": 7850.0}}
+    reason = "kelvin-voigt with lammps-mindlin: 8 G* a needs a contact force of n = 1.5; set k_t"
+    with pytest.warns(impact.ImpactWarning, match=re.escape(f"{reason}; these points are NaN")):
+        result = impact.calibrate(source)
+    statuses = dict(zip(result["model"].values.tolist(), result["fit_status"].values.tolist(), strict=True))
+    no_prediction = list(FIT_STATUSES).index("no_prediction")
+    assert [law for law, status in statuses.items() if status == no_prediction] == [reason.partition(":")[0]]
+    with pytest.raises(impact.ConfigError, match=re.escape(f"config: frictions: {reason}")):
+        impact.calibrate({**source, "models": ["kelvin-voigt"]})
 
 
 @pytest.fixture(scope="module")

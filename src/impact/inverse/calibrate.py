@@ -120,7 +120,8 @@ def calibrate(
             best_file = argument("best", "FILE")
             raise UsageError(f"{argument('model')}: set without {best_file}, which is written for that law")
         position_of_law(list(laws_to_fit(config)), model, argument("model"))
-    for note in config.notes:
+    name = str(source) if isinstance(source, str | Path) else "config"
+    for note in (*config.notes, *Plan(config).pair_notes(f"{name}: frictions")):
         warn(note)
     result = calibrate_config(config, plugin_set.of(config.models), jobs)
     if output is not None and Path(output).suffix.lower() in TABLE_SUFFIXES:
