@@ -306,6 +306,19 @@ def test_compare_reports_a_changed_restitution(cli: Run, folder: Path, layout: s
     assert f"model=tsuji-1992, friction={SPRING}, angle=" in done.stdout
 
 
+def test_a_verdict_has_the_word_of_a_point_as_plain_data() -> None:
+    source = {
+        "models": ["hertz"],
+        "frictions": ["coulomb-1785"],
+        "sweep": {"v1": 1.0, "u1": 0.5, "mu": 0.2, "m1": 0.1, "m2": 0.2, "K": 1e8},
+        "friction": {"coulomb-1785": {"limit": ["positive", "abs"]}},
+    }
+    new, baseline = impact.sweep(source), impact.sweep(source)
+    new["beta"][{"friction.coulomb-1785.limit": 1}] += 1e-3
+    (differs,) = (row for row in impact.compare(new, baseline).as_dict()["variables"] if not row["equal"])
+    assert (differs["name"], differs["at"]["friction.coulomb-1785.limit"]) == ("beta", "abs")
+
+
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::impact.ImpactWarning")
 @pytest.mark.parametrize("extreme", [1e-170, 1e160])

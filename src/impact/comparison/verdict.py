@@ -9,6 +9,7 @@ from typing import Any, Literal, get_args
 
 import xarray as xr
 
+from ..config.input_names import with_words
 from ..contact.status import Status
 from ..contact.units import names_in
 from ..contact.variables import OUTPUTS
@@ -223,7 +224,7 @@ class Verdict(Displayed):
                     **{"times" if name == "ratio" else name: value for name, value in vars(variable).items()},
                     "at": {
                         safe_text(name): safe_text(value, 2000) if isinstance(value, str) else value
-                        for name, value in variable.at.items()
+                        for name, value in with_words(variable.at).items()
                     },
                     "equal": variable.is_equal,
                     "text": variable.text,

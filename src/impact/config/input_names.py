@@ -127,6 +127,11 @@ class InputName:
         return f"no such input; {did_you_mean(name, names)}"
 
 
+def with_words(inputs: Mapping[str, float | str]) -> dict[str, float | str]:
+    """Put the words of parameters in place of the numbers that stand for them; inputs are by config name."""
+    return {name: InputName.parse(name).word(value) for name, value in inputs.items()}
+
+
 def is_foreign(names: Iterable[str], model: str, friction: str = "") -> bool:
     """Check whether inputs that vary together are parameters of other laws only, of a model or a pair."""
     applies = [InputName.parse(name).applies_to(model, friction) for name in names]

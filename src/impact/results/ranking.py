@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..array_types import Mask
 from ..config.files import read_number
-from ..config.input_names import InputName, is_foreign
+from ..config.input_names import InputName, is_foreign, with_words
 from ..config.quantities import Quantity
 from ..config.tables import TOLERANCE
 from ..contact.status import FIRST_FAILURE, FrictionStatus, Status
@@ -122,7 +122,7 @@ class Ranked:
         """The model, its friction law, and the parameters that were chosen."""
         chosen = (
             f"{path.rpartition('.')[2]} = {prefixed(value, self.units.get(path, '1'), 6)}"
-            for path, value in _with_words(self.parameters).items()
+            for path, value in with_words(self.parameters).items()
         )
         return " with ".join(filter(None, [self.model, ", ".join(filter(None, [self.friction, *chosen]))]))
 
@@ -131,7 +131,7 @@ class Ranked:
         """The fields as plain data, with words, without those of friction and of a target that do not apply."""
         left_out = ("output", "along", "friction", "units")
         record = {name: value for name, value in vars(self).items() if name not in left_out}
-        record |= {inputs: _with_words(record[inputs]) for inputs in ("parameters", "at")}
+        record |= {inputs: with_words(record[inputs]) for inputs in ("parameters", "at")}
         if self.output != "e_out":
             record = {self.output if name == "e_out" else name: value for name, value in record.items()}
         return record | {"share": self.share} | ({"friction": self.friction} if self.friction else {})
@@ -267,11 +267,6 @@ class Ranking(Displayed, Sequence[Ranked]):
 
     def _repr_html_(self) -> str:
         return html_of([self.headline, self._table(self.models)])
-
-
-def _with_words(inputs: Mapping[str, float | str]) -> dict[str, float | str]:
-    """Put the words of parameters in place of their numbers."""
-    return {name: InputName.parse(name).word(value) for name, value in inputs.items()}
 
 
 def error_floor(dataset: xr.Dataset) -> float:

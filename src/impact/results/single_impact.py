@@ -29,7 +29,7 @@ from ..config.draft import (
 )
 from ..config.files import as_table, to_plain_value
 from ..config.grid import Axis
-from ..config.input_names import SWEEP_INPUTS, InputName, input_values
+from ..config.input_names import SWEEP_INPUTS, InputName, input_values, with_words
 from ..config.load import Config, build, inline_files
 from ..config.rules import has_other_stiffness
 from ..config.tables import DEFAULT_RTOL, MATERIAL_QUANTITIES, SWEEP_DEFAULTS, expand_models, law_quantities
@@ -388,8 +388,7 @@ def run_single_impact(plan: Plan, first: tuple[str, ...], times: int | None = No
             history = integrate_history(law, impacts, rtol=rtol, max_steps=max_steps, times=times)
     v0 = impacts.v0[0].item()
     # a law may have its own n, which replaces that of the config
-    point = {**config.scalars, "n": impacts.n[0].item()}
-    point = {name: InputName.parse(name).word(value) for name, value in point.items()}
+    point = with_words({**config.scalars, "n": impacts.n[0].item()})
     if "alpha" in config.scalars:
         point["e"] = impacts.e[0].item()
     derived = _derived_quantities(law, impacts, values, history)
