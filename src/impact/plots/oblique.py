@@ -64,8 +64,10 @@ def impulse_ratio_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
 
 def spin_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     """Read the spins after the impact of the balls that turn; see `beta_curves`."""
-    line, pairs = _pairs_along(dataset, choice, *SPINS)
-    turning = [name for name in SPINS if any(_varies(pair.data[name].values) for pair in pairs)] or [*SPINS[:1]]
+    # the spin of a wall need not be stored
+    spins = [name for name in SPINS if name in dataset] or SPINS
+    line, pairs = _pairs_along(dataset, choice, *spins)
+    turning = [name for name in spins if any(_varies(pair.data[name].values) for pair in pairs)] or [*spins[:1]]
     ends = dict(zip(SPINS, ("ω₁⁺", "ω₂⁺"), strict=True)) if len(turning) > 1 else {}
     curves = [curve for name in turning for curve in _panel(line, pairs, name, "", end=ends.get(name, "")).curves]
     y_name = "omega_post" if ends else turning[0]
