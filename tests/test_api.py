@@ -305,7 +305,7 @@ def test_an_error_of_the_program_is_not_reported_as_one_of_the_model(monkeypatch
     def broken(*_: object, **__: object) -> None:
         raise KeyError("of our own")
 
-    monkeypatch.setattr("impact.contact.simulate.integrate_phases", broken)
+    monkeypatch.setattr("impact.contact.simulate.integrate_collisions", broken)
     with pytest.raises(KeyError, match="of our own"):
         impact.sweep({"models": "hertz", "sweep": SWEEP, "solver": COARSE})
 

@@ -16,17 +16,15 @@ from numpy.typing import NDArray
 from ..array_types import Array
 from ..ode.problem import Params, Problem, Step
 from . import motion
-from .dimensionless import dimensionless_values, with_coefficients, with_units
+from .dimensionless import dimensionless_values
 from .fixed_step_slip import LIMIT_POSITIVE
 from .friction import Pair, friction_values
 from .impacts import Impacts
-from .model import ForceModel
 from .rigid import ObliqueImpacts
-from .simulate import integrate_phases
+from .simulate import RecordedMotion
 from .slip_motion import LEAST_S, SLIP_ROW, TIME_ROW
 from .status import Status
 from .tangential import RecordedSlip, record_friction, simulate_friction
-from .velocity_coordinates import is_strong
 
 # points at which a step is sampled, and Gauss points by which it is integrated
 SAMPLES_PER_STEP, GAUSS_POINTS = 4, 5
@@ -73,21 +71,15 @@ class SlipHistory:
     mode: NDArray[np.int8]
 
 
-def integrate_history(
-    model: ForceModel, impacts: Impacts, *, rtol: float, max_steps: int, times: int | Array | None = None
-) -> History | None:
-    """Integrate one impact (a batch of length one); None if the balls miss, or the result is a limit.
+def history_of(recorded: RecordedMotion, impacts: Impacts, times: int | Array | None = None) -> History | None:
+    """Find the history of one impact (a batch of length one) from its motion; None if the balls do not separate.
 
     `times` is the number of uniform points in time, or increasing times in the contact's own unit; by default
     there are SAMPLES_PER_STEP per step.
     """
-    n = float(impacts.n[0])
-    with np.errstate(all="ignore"):
-        values = with_coefficients(model, with_units(dimensionless_values(model, impacts), n), 1)
-        law = motion.MotionLaw.of(model, n, bool(is_strong(model, values, 1)[0]))
-        params = tuple(np.asarray(values[name]) for name in law.names)
-        result, phases = integrate_phases(law, params, 1, rtol, max_steps, record=True)
-    if phases.restitution is None or result.status[0] != Status.OK:
+    law, params, phases = recorded
+    params, back_params = (tuple(column[:1] for column in columns) for columns in (params, phases.params))
+    if phases.restitution is None or phases.status[0] != Status.OK:
         return None
     peak_time, duration = (float(phase.state[2, 0]) for phase in (phases.approach, phases.restitution))
     approach_times = restitution_times = None
@@ -101,17 +93,17 @@ def integrate_history(
         back_law,
         motion.restitution_problem(back_law),
         phases.restitution.recorded,
-        phases.params,
+        back_params,
         restitution_times,
     )
 
     residual = (
-        phases.params[motion.UNLOADING_PARAMS.index("residual") - len(motion.UNLOADING_PARAMS)]
-        if model.unloading
+        back_params[motion.UNLOADING_PARAMS.index("residual") - len(motion.UNLOADING_PARAMS)]
+        if law.model.unloading
         else np.zeros(1)
     )
     unit_t = impacts.length / impacts.v0
-    t = np.concatenate([approach.t, phases.approach.state[2] + restitution.t]) * unit_t
+    t = np.concatenate([approach.t, phases.approach.state[2, :1] + restitution.t]) * unit_t
     delta = np.concatenate([approach.x, residual + restitution.x]) * impacts.length
     v = np.concatenate([approach.v, restitution.v]) * impacts.v0
     force = np.concatenate([approach.F, restitution.F]) * (impacts.m * impacts.v0 / unit_t)
@@ -139,15 +131,21 @@ def integrate_history(
 
 
 def integrate_slip(
-    pair: Pair, oblique: ObliqueImpacts, *, rtol: float, max_steps: int, times: int | None = None
+    pair: Pair,
+    oblique: ObliqueImpacts,
+    recorded_motion: RecordedMotion,
+    *,
+    rtol: float,
+    max_steps: int,
+    times: int | None = None,
 ) -> tuple[History | None, SlipHistory | None]:
-    """Integrate one oblique impact (a batch of length one): its history, and slip and friction over it.
+    """Integrate the slip of one impact (a batch of length one): its history, and slip and friction over it.
 
     Without `times` there are SAMPLES_PER_STEP per step of the joint motion.
     """
-    impacts, model = oblique.impacts, pair.model
+    impacts = oblique.impacts
     with np.errstate(all="ignore"):
-        values = {**dimensionless_values(model, impacts), **friction_values(pair, oblique)}
+        values = {**dimensionless_values(pair.model, impacts), **friction_values(pair, oblique)}
     values = {name: np.broadcast_to(value, 1) for name, value in values.items()}
     recorded = record_friction(pair, float(impacts.n[0]), values, rtol=rtol, max_steps=max_steps)
     steps = _all_steps(recorded)
@@ -155,7 +153,7 @@ def integrate_slip(
     if times is None and steps:
         numbers, fractions = _fractions(steps)
         grid = np.maximum.accumulate(Step.each(steps, numbers).at(fractions)[TIME_ROW])
-    history = integrate_history(model, impacts, rtol=rtol, max_steps=max_steps, times=grid)
+    history = history_of(recorded_motion, impacts, grid)
     if history is None:
         return None, None
     if steps:

@@ -19,7 +19,7 @@ from .model import ForceModel, Law
 from .powers import all_within
 from .records import CollisionResult
 from .rigid import ObliqueImpacts
-from .simulate import ComputeCollisions, simulate
+from .simulate import ComputeCollisions, RecordedMotion, simulate
 from .status import FIRST_FAILURE, LIMIT, NO_IMPACT, STATUS_OK
 from .tangential import TangentialResult, simulate_friction
 from .variables import CENTRAL_OUTPUTS
@@ -83,6 +83,7 @@ def collide(
     names: Iterable[str] = CENTRAL_OUTPUTS,
     oblique: tuple[Pair, ObliqueImpacts] | None = None,
     compute: ComputeCollisions | None = None,
+    recorded: list[RecordedMotion] | None = None,
 ) -> Outputs:
     """Simulate impacts by a law: their `outputs`; one that fails has NaN and a status, and affects no other.
 
@@ -95,7 +96,7 @@ def collide(
     integrator : "exact", the continuous law with error control, or one of `impact.contact.fixed_step.SCHEMES`
     fixed_step : the phase and the step of a scheme by name, see `impact.contact.simulate.simulate`, of shape (n,)
     errors : receives a line for each distinct error of the law, see `impact.contact.formula_calls.describe_error`
-    compute : see `impact.contact.simulate.simulate`
+    compute, recorded : see `impact.contact.simulate.simulate`
     oblique : the model with a friction law, and the tangential inputs of the impacts, for outputs of friction
     """
     with np.errstate(all="ignore"):
@@ -116,6 +117,7 @@ def collide(
         integrator=integrator,
         errors=errors,
         compute=compute,
+        recorded=recorded,
     )
     if oblique is None:
         return outputs(model, impacts, result, names, checked)

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,6 +78,7 @@ def simulate(
     integrator: str = EXACT,
     errors: dict[str, str] | None = None,
     compute: ComputeCollisions | None = None,
+    recorded: list[RecordedMotion] | None = None,
 ) -> CollisionResult:
     """Integrate impacts by a law; one that fails has a status, and affects no other.
 
@@ -89,8 +90,9 @@ def simulate(
     status : by `check_inputs`, shape (k,); impacts that are not OK are not integrated
     compute : computes distinct collisions of the continuous law in place of the integration, such as an
         `InterpolatedCollisions`
+    recorded : receives the motion, of a single impact
     """
-    integrate = partial(integrate_collisions, rtol=rtol, max_steps=max_steps, core=core)
+    integrate = partial(integrate_collisions, rtol=rtol, max_steps=max_steps, core=core, recorded=recorded)
     simulate_part: SimulatePart[CollisionResult] = partial(
         _simulate_distinct, model, compute=compute or integrate, separates_strong=compute is None
     )
@@ -347,27 +349,29 @@ def check_coefficients(
     return status
 
 
-def integrate_phases(
+def integrate_collisions(
     law: motion.MotionLaw,
     params: Params,
     n: int,
+    *,
     rtol: float,
     max_steps: int,
-    record: bool = False,
     never_separates: NDArray[np.bool_] | bool = False,
     core: str = "numpy",
-) -> tuple[CollisionResult, Phases]:
+    recorded: list[RecordedMotion] | None = None,
+) -> CollisionResult:
     """Integrate n impacts, with params of shape (n,), through approach and restitution.
 
     Impacts of the mask `never_separates` are known to stay together, where they do not part. The core "numba"
-    integrates the phases that have a form for it compiled, unless they are recorded.
+    integrates the phases that have a form for it compiled, unless they are recorded: `recorded` receives the
+    motion of impacts that are all equal.
     """
     back = motion.restitution_law(law)
     forms: tuple[dispatch.Form | None, dispatch.Form | None] = (None, None)
-    if core == "numba" and not record:
+    if core == "numba" and recorded is None:
         forms = dispatch.approach_form(law), dispatch.restitution_form(back)
     workspace = None if all(forms) else Workspace.of(n)
-    run = partial(integrate, rtol=rtol, max_steps=max_steps, record=record, workspace=workspace)
+    run = partial(integrate, rtol=rtol, max_steps=max_steps, record=recorded is not None, workspace=workspace)
 
     def solve(
         law: motion.MotionLaw, problem: Problem, start: Array, params: Params, recovery: Recovery | None
@@ -402,23 +406,8 @@ def integrate_phases(
         result.steps[rows] += restitution.steps
         if law.model.release == "force":
             result.permanent[rows] += motion.indentation(law, restitution.state[0])
-    return result, phases
-
-
-def integrate_collisions(
-    law: motion.MotionLaw,
-    params: Params,
-    n: int,
-    *,
-    rtol: float,
-    max_steps: int,
-    never_separates: NDArray[np.bool_] | bool = False,
-    core: str = "numpy",
-) -> CollisionResult:
-    """Integrate n impacts; see `integrate_phases`."""
-    result, _ = integrate_phases(
-        law, params, n, rtol=rtol, max_steps=max_steps, never_separates=never_separates, core=core
-    )
+    if recorded is not None:
+        recorded.append(RecordedMotion(law, params, phases))
     return result
 
 
@@ -445,6 +434,14 @@ class Phases:
     status: NDArray[np.int8]
 
 
+class RecordedMotion(NamedTuple):
+    """The motion of equal impacts: the law and the params of their approach, and both phases with their steps."""
+
+    law: motion.MotionLaw
+    params: Params
+    phases: Phases
+
+
 # integrates a phase: its law, problem, start, params and, on restitution, the Recovery
 SolvePhase = Callable[[motion.MotionLaw, Problem, Array, Params, Recovery | None], Solution]
 
@@ -456,7 +453,7 @@ def solve_phases(
     solve: SolvePhase,
     never_separates: NDArray[np.bool_] | bool,
 ) -> Phases:
-    """Solve approach and restitution of n impacts, see `integrate_phases`."""
+    """Solve approach and restitution of n impacts, see `integrate_collisions`."""
     back = motion.restitution_law(law)
     approach = solve(law, motion.approach_problem(law), motion.start_of_approach(law, params, n), params, None)
     peak = motion.indentation(law, approach.state[0])

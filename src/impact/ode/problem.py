@@ -107,12 +107,12 @@ class Step:
 
     @classmethod
     def of(cls, start: Array, length: Array, stages: list[Array], params: Params) -> Step:
-        """Copy a step to its whole length; missing rows of a stage are zero, since they have no weight."""
-        rows = np.zeros((len(stages), *start.shape))
+        """Copy a step of the first trajectory; missing rows of a stage are zero, since they have no weight."""
+        rows = np.zeros((len(stages), len(start), 1))
         for target, stage in zip(rows, stages, strict=True):
-            target[: len(stage)] = stage[: len(start)]
-        params = tuple(np.array(column) for column in params)
-        return cls(start.copy(), length, rows, np.ones(1), params)
+            target[: len(stage)] = stage[: len(start), :1]
+        params = tuple(column[:1].copy() for column in params)
+        return cls(start[:, :1].copy(), length[:1], rows, np.ones(1), params)
 
     @classmethod
     def each(cls, steps: Sequence[Step], numbers: NDArray[np.intp]) -> Step:

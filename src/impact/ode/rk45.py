@@ -75,7 +75,7 @@ def integrate(
     params : arguments of the rates per trajectory, each of shape (n,)
     rtol : local error per step, relative to max(|y|, floor)
     max_steps : attempted steps after which a trajectory fails
-    record : whether to keep every accepted step for the interpolant; for a single trajectory
+    record : whether to keep every accepted step for the interpolant; of the first trajectory, all are equal
     workspace : memory of an earlier call for as many trajectories or more
     """
     n = start.shape[1]
@@ -140,7 +140,7 @@ def _advance(problem: Problem, state: State, rtol: float, record: bool) -> Step 
         state.termination[small & (state.termination == RUNNING)] = Termination.STEP_UNDERFLOW
     state.steps += accepted
     if step is not None and ended.size:
-        step = replace(step, end=1.0 + offset)
+        step = replace(step, end=1.0 + offset[:1])
     _move_to_ends(state, trial)
     return step if step is not None and accepted[0] else None
 

@@ -37,13 +37,14 @@ from ..contact.fixed_step import EXACT
 from ..contact.force_expressions import unload_to_residual, unload_with_stiffness
 from ..contact.friction import FrictionLaw, Pair
 from ..contact.frictions import find_friction
-from ..contact.history import History, SlipHistory, integrate_history, integrate_slip
+from ..contact.history import History, SlipHistory, history_of, integrate_slip
 from ..contact.impacts import Impacts
 from ..contact.materials import Material
 from ..contact.model import ForceModel, with_base_quantities
 from ..contact.models import find
 from ..contact.output_formulas import collide
 from ..contact.rigid import ObliqueImpacts
+from ..contact.simulate import RecordedMotion
 from ..contact.status import FIRST_FAILURE, FrictionStatus, Status
 from ..contact.units import with_numbers
 from ..contact.variables import CENTRAL_OUTPUTS, HISTORY, OUTPUTS, SLIP_HISTORY, Variable
@@ -363,6 +364,7 @@ def run_single_impact(plan: Plan, first: tuple[str, ...], times: int | None = No
         oblique = pair, build_oblique(plan.inputs, impacts, (), pair.friction)
     solver = config.solver
     errors: dict[str, str] = {}
+    recorded: list[RecordedMotion] = []
     collision = collide(
         law,
         impacts,
@@ -373,19 +375,21 @@ def run_single_impact(plan: Plan, first: tuple[str, ...], times: int | None = No
         errors=errors,
         names=OUTPUTS if oblique else CENTRAL_OUTPUTS,
         oblique=oblique,
+        # a history is that of the continuous law
+        recorded=recorded if solver.integrator == EXACT else None,
     )
     values = {name: array[0].item() for name, array in collision.items()}
     for error in errors.values():
         warn(error)
     history = slip = None
-    # a history is that of the continuous law
     has_slip = values.get("friction_status", FrictionStatus.OK) < FIRST_FAILURE
-    if values["status"] == Status.OK and solver.integrator == EXACT and has_slip:
-        rtol, max_steps = solver.rtol, solver.max_steps
+    if values["status"] == Status.OK and recorded and has_slip:
         if oblique:
-            history, slip = integrate_slip(*oblique, rtol=rtol, max_steps=max_steps, times=times)
+            history, slip = integrate_slip(
+                *oblique, recorded[0], rtol=solver.rtol, max_steps=solver.max_steps, times=times
+            )
         else:
-            history = integrate_history(law, impacts, rtol=rtol, max_steps=max_steps, times=times)
+            history = history_of(recorded[0], impacts, times)
     v0 = impacts.v0[0].item()
     # a law may have its own n, which replaces that of the config
     point = with_words({**config.scalars, "n": impacts.n[0].item()})
