@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import shlex
 from collections.abc import Callable
 
@@ -231,6 +232,12 @@ def test_the_ends_of_a_range_of_materials_are_named() -> None:
 def test_a_range_that_does_not_count_is_refused() -> None:
     with pytest.raises(UsageError, match="over: alpha does not count if e is solved for"):
         impact.solve("tsuji-1992", "e", {"e_out": 0.6}, over={"alpha": [0.1, 0.2]})
+
+
+@pytest.mark.parametrize("value", [1.0, "1 m/s", np.float64(1.0)])
+def test_a_range_of_one_value_is_refused(value: object) -> None:
+    with pytest.raises(UsageError, match=re.escape('over["v1"]: got one value, expected a list or a range')):
+        impact.solve("tsuji-1992", "e", {"e_out": 0.6}, over={"v1": value})
 
 
 def test_the_text_has_a_line_for_each_root() -> None:

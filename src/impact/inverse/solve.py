@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from scipy.optimize import elementwise, minimize_scalar
 
 from ..array_types import Array, Mask
+from ..config.files import to_plain_data
 from ..config.input_names import InputName
 from ..config.load import Config
 from ..contact.fixed_step import EXACT
@@ -199,6 +200,9 @@ def solve(
     unknown = unknown_of(law, name, friction_law)
     inputs = {**placeholder(law, unknown), **(at or {})}
     config, _ = single_point(point_source, model, inputs, over, friction=friction)
+    for over_name, values in (over or {}).items():
+        if not isinstance(to_plain_data(values)[0], list | dict):
+            raise UsageError(f"{argument('over', key=over_name)}: got one value, expected a list or a range")
     if over and not config.axes:
         raise UsageError(f"{argument('over')}: {next(iter(over))} does not count if {unknown.name} is solved for")
     return solve_input(config, unknown, target)
