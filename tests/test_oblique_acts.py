@@ -205,6 +205,13 @@ def test_solve_finds_the_mu_that_slides_with_a_given_beta() -> None:
     assert str(sticks).startswith("hertz with coulomb-1785: no value of mu gives beta = 0.4; beta is from -1 to 0")
 
 
+def test_solve_writes_a_target_with_its_unit() -> None:
+    steep = impact.solve("hertz", "mu", {"rebound_angle": "20 deg"}, friction="coulomb-1785", source=CONFIG)
+    text = str(steep)
+    assert "no value of mu gives rebound_angle = 20°; rebound_angle is from " in text
+    assert text.endswith("to 60°")
+
+
 @pytest.mark.slow
 def test_a_target_of_the_command_may_have_a_unit(cli: Run) -> None:
     words = ("solve", "--model", "hertz", "--friction", "coulomb-1785", "--for", "mu", "--at", "angle=60 deg")

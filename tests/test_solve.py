@@ -243,7 +243,7 @@ def test_a_range_of_one_value_is_refused(value: object) -> None:
 def test_the_text_has_a_line_for_each_root() -> None:
     result = impact.solve("mujoco-solref", "dampratio", {"contact_time": 0.01})
     (root,) = result.roots
-    assert str(result) == f"dampratio = {root.value:.10g}: contact_time = 0.01, e_out = {root.e_out:.6g}"
+    assert str(result) == f"dampratio = {root.value:.10g}: contact_time = 10 ms, e_out = {root.e_out:.6g}"
 
 
 @pytest.mark.slow

@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal, NoReturn, TypeAlias
 
@@ -33,7 +34,7 @@ from ..contact.interpolant import NODE_MAX_STEPS, Interpolant
 from ..contact.model import ForceModel, Parameter
 from ..contact.models import find
 from ..contact.status import FrictionStatus, Status
-from ..contact.units import with_numbers
+from ..contact.units import names_in, with_numbers
 from ..contact.variables import OUTPUTS
 from ..display import Block, Displayed
 from ..engine.build_impacts import build_impacts
@@ -41,7 +42,7 @@ from ..engine.inputs import Inputs
 from ..engine.plan import Plan
 from ..engine.plugins import read_plugins
 from ..errors import UsageError, did_you_mean
-from ..formatting import argument, number, quantity, safe_text
+from ..formatting import argument, number, prefixed, quantity, safe_text
 from ..results.ranking import target_value
 from ..results.single_impact import PointSource, open_source, single_point, warn_of_ignored_e
 from .prepared import outputs_at, trial_inputs
@@ -119,7 +120,11 @@ class SolveResult(Displayed):
     def sections(self, width: int) -> Iterator[Block]:
         """Write a line for each root, or the range that can be attained."""
         ((variable, value),) = self.target.items()
-        target = f"{variable} = {number(value)}"
+        unit = OUTPUTS[variable].unit if variable in OUTPUTS else "1"
+        # an exponent n has a value for each law; ends of a range have six digits in rad, which are five in degrees
+        digits = 5 if unit == "rad" else 6
+        written = partial(prefixed, unit="1" if names_in(unit) else unit, digits=digits)
+        target = f"{variable} = {written(value)}"
         for root in self.roots:
             # a minimum has half the digits of a root
             line = f"{self.name} = {quantity(root.value, self.unit, 10 if self.over is None else 6)}"
@@ -130,12 +135,12 @@ class SolveResult(Displayed):
             else:
                 name = next(iter(self.over[0]))
                 ends = (
-                    f"{number(condition[variable])} at {name} = {safe_text(number(condition[name]), 60)}"
+                    f"{written(condition[variable])} at {name} = {safe_text(number(condition[name]), 60)}"
                     for condition in (self.over[0], self.over[-1])
                 )
                 yield f"{line}: {variable} from {' to '.join(ends)}"
         if not self.roots:
-            smallest, largest = map(number, self.attainable)
+            smallest, largest = map(written, self.attainable)
             attained = f"{variable} is from {smallest} to {largest}"
             yield f"{_laws(self.model, self.friction)}: no value of {self.name} gives {target}; {attained}"
 
