@@ -451,6 +451,8 @@ def test_a_board_is_stored_and_compared(cli: Run, tmp_path: Path) -> None:
     assert loaded.identical(board.dataset)
     assert dict(loaded.sizes) == {"engine": 2, "check": len(board.engines[0]["checks"])}
     assert impact.describe(loaded).as_dict() == board.as_dict()
+    with pytest.raises(UsageError, match=r"impact\.report writes the page of a board"):
+        impact.explore(loaded)
     assert impact.compare(older, older).equal
     verdict = impact.compare(newer, older)
     assert not verdict.equal

@@ -22,6 +22,7 @@ from ..engine.plan import Plan
 from ..engine.plugins import Plugins, read_plugins
 from ..errors import ImpactError, UsageError, did_you_mean
 from ..formatting import prefixed, safe_text
+from ..results.kinds import kind_of
 from ..results.provenance import changed_plugins, config_of_part, stored_config
 from ..results.selection import chosen_laws, in_si, select
 from ..results.sweep import sweep_in_memory
@@ -86,7 +87,9 @@ def explore(
         raise UsageError('needs ipywidgets; pip install "impact-sweep[notebook]"') from None
     dataset = result_of(dataset)
     if "model" not in dataset.dims:
-        raise UsageError("expected the result of a sweep, with models; impact.plot draws a time history")
+        is_board = kind_of(dataset) == "board"
+        advice = "impact.report writes the page of a board" if is_board else "impact.plot draws a time history"
+        raise UsageError(f"expected the result of a sweep, with models; {advice}")
     kinds, axes, plugin_set = kinds_to_offer(dataset), axes_of(dataset), read_plugins(plugins)
     if kind is not None and kind not in kinds:
         raise UsageError(f'kind: no kind "{kind}" of this result; {did_you_mean(kind, kinds)}')
