@@ -11,7 +11,7 @@ from typing import Any
 from ..display import Block, Displayed, Table
 from ..errors import UsageError, did_you_mean
 from ..exporters import liggghts, yade
-from ..exporters.programs import Program, python_package
+from ..exporters.programs import Program, find_program, python_package
 from ..formatting import argument
 from .adapters import SERVE, python_command
 
@@ -48,7 +48,7 @@ class Engine:
         """Make the command of the adapter, in the requested interpreter or in this one, or for its program."""
         found = self.program.find(program)
         if found is None and program is not None:
-            raise UsageError(f'{argument("program")}: no program "{program}"')
+            raise _no_program(program)
         if found is None or self.program.version_of(found) is None:
             place = "on the path" if found is None else f"in {found}" if self.is_package else f"as {found}"
             missing = f"{self.name}: {self.title} is not installed {place}"
@@ -148,6 +148,10 @@ ENGINES: Mapping[str, Engine] = {
 }
 
 
+def _no_program(program: str | None) -> UsageError:
+    return UsageError(f'{argument("program")}: no program "{program}"')
+
+
 def find_engine(name: str) -> Engine:
     if name not in ENGINES:
         raise UsageError(
@@ -208,8 +212,14 @@ def conform_engines(program: str | None = None) -> Engines:
     -------
     Engines : one for each engine; `print` shows a table
 
+    Raises
+    ------
+    UsageError : there is no such interpreter
+
     >>> import impact
     >>> impact.conform_engines().records()[0]["install"]
     'pip install pymunk'
     """
+    if find_program("python", program) is None:
+        raise _no_program(program)
     return Engines(program)
