@@ -254,7 +254,7 @@ def test_friction_laws_are_selected_as_models_are(
         ("central.h5", "-k", "beta"): "this result has no friction; sweep a config with frictions = [...]",
         ("beads.h5", "-k", "psi"): "this result has no psi1, psi2; list them in [output] variables",
         ("beads.h5", "-k", "beta", "--sel", "angle=9 deg"): "no angle = 9 deg in this result; the nearest are "
-        "0.13962634016 and 0.261799387799",
+        "8° and 15°",
     }
     for options, message in refused.items():
         failed = cli("plot", *options, "-o", "b.svg", cwd=tmp_path)

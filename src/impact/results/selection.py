@@ -14,7 +14,7 @@ from ..config.input_names import InputName
 from ..config.quantities import number_in
 from ..contact.variables import OUTPUTS
 from ..errors import UsageError, did_you_mean
-from ..formatting import argument, label, safe_text
+from ..formatting import argument, prefixed, safe_text
 from .schema import plain_unit
 
 if TYPE_CHECKING:
@@ -100,7 +100,7 @@ def select(dataset: xr.Dataset, sel: Mapping[str, object]) -> xr.Dataset:
         if dim in masks and same.any():
             same &= masks[dim]
         if not same.any():
-            shown = safe_text(_nearest_values(name, values, number))
+            shown = safe_text(_nearest_values(dataset[name], number))
             raise UsageError(f"no {name} = {plain} in this result; {shown}")
         masks[dim] = same
     return dataset.isel({dim: _matching_positions(dataset[dim], same) for dim, same in masks.items()})
@@ -131,18 +131,20 @@ def _matches_value(values: np.ndarray, value: float | str) -> Mask:
     return np.asarray(np.isclose(values, np.nan if number is None else number, rtol=SELECTION_RTOL, atol=0.0))
 
 
-def _nearest_values(name: str, values: np.ndarray, value: float | str) -> str:
-    """List the values of an axis if they are few, the next ones to a number, or the first."""
+def _nearest_values(coordinate: xr.DataArray, value: float | str) -> str:
+    """List the values of an axis if they are few, the next ones to a number, or the first; angles in degrees."""
+    name, values = coordinate.name, coordinate.values
+    unit = "rad" if coordinate.attrs.get("units") == "rad" else "1"
     number = _as_number(value) if values.dtype.kind in NUMBER_DTYPE_KINDS else None
     if number is None or np.isnan(number) or values.size <= MAX_LISTED_VALUES:
         shown = ", ".join(
-            label(InputName.parse(name).word(value)) for value in values[:MAX_LISTED_VALUES].tolist()
+            prefixed(InputName.parse(name).word(value), unit) for value in values[:MAX_LISTED_VALUES].tolist()
         )
         return f"{name} is {shown}{', ...' if values.size > MAX_LISTED_VALUES else ''}"
     distinct = np.unique(values)
     below = int(np.clip(np.searchsorted(distinct, number) - 1, 0, max(distinct.size - 2, 0)))
     nearest = distinct[below : below + 2]
-    return f"the nearest are {' and '.join(map(label, nearest.tolist()))}"
+    return f"the nearest are {' and '.join(prefixed(label, unit) for label in nearest.tolist())}"
 
 
 def _as_number(value: float | str) -> float | None:
