@@ -415,6 +415,16 @@ def test_a_model_keeps_its_look_where_it_is_free(coarse: xr.Dataset) -> None:
     assert look() == look(models=["gharib-hurmuzlu-2012"])
 
 
+def test_a_variable_or_an_axis_that_no_picture_shows_is_refused(coarse: xr.Dataset, tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="variable: does not apply to final-velocities, expected the kind"):
+        impact.plot(coarse, variable="peak_force")
+    with pytest.raises(UsageError, match="y: does not apply to loop, expected the kind map or validity"):
+        impact.plot(coarse, kind="loop", y="e")
+    impact.save(coarse, file := tmp_path / "coarse.h5")
+    with pytest.raises(UsageError, match="variable: does not apply to error and loop"):
+        impact.plot_to_files(file, kinds=["error", "loop"], variable="peak_force")
+
+
 def test_the_slice_is_chosen_and_named(wide: xr.Dataset) -> None:
     assert "v1 = 1 m/s, m1 = m2 = 1 kg" in conditions_of(get_curve_data(wide))
     other = get_curve_data(wide, sel={"v1": 2.0, "material2": "hard", "m2": np.inf}, models=["hertz"])

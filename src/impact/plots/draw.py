@@ -23,7 +23,7 @@ from ..results.single_impact import Impact, histories
 from ..results.xarray_backend import result_of
 from .curves import CurveData
 from .data import LegendEntries, PlotData, Points, read_points
-from .kinds import DEFAULT_LEGENDS, STUDIES, Choice, Look, default_kind, find_kind
+from .kinds import DEFAULT_LEGENDS, STUDIES, Choice, Look, check_choice, default_kind, find_kind
 from .labels import (
     check_labels,
     escape_mathtext,
@@ -115,7 +115,9 @@ def plot(
     dataset = result_of(dataset)
     choice = Choice(x, y, variable, sel, models, log, equations, frictions)
     look = Look(width, height, style, ax is None if title is None else title, labels, legend, decimal)
-    return draw(get_plot_data(dataset, kind or default_kind(dataset).name, choice, plugins), look, points, ax)
+    kind = kind or default_kind(dataset).name
+    check_choice(choice, [find_kind(kind)])
+    return draw(get_plot_data(dataset, kind, choice, plugins), look, points, ax)
 
 
 def get_plot_data(

@@ -17,7 +17,7 @@ from ..formatting import argument
 from ..results.xarray_backend import load
 from .data import PlotData, check_data_form, encode_table, read_points
 from .draw import draw, get_plot_data, label_keys
-from .kinds import Choice, Look, check_kind, default_kind, find_kind
+from .kinds import Choice, Look, check_choice, check_kind, default_kind, find_kind
 from .labels import check_labels
 from .style import check_picture, save_figure
 
@@ -118,6 +118,7 @@ def plot_to_files(
     measured = None if points is None else read_points(points)
     dataset = load(result)
     kinds = kinds or [default_kind(dataset).name]
+    check_choice(choice, [find_kind(kind) for kind in kinds])
     if output.suffix.lower() == ".gif" and set(kinds) != {"animation"}:
         raise UsageError(f"{output}: a .gif is an animation, expected {argument('kind', 'animation')}")
     plot_data, left_out = _read_kinds(kinds, dataset, choice, plugins)

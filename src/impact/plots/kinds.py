@@ -159,6 +159,14 @@ def check_kind(name: str) -> None:
         raise UsageError(f'{argument("kind")}: no kind "{name}"; {did_you_mean(name, list(KINDS))}')
 
 
+def check_choice(choice: Choice, kinds: Sequence[Kind]) -> None:
+    """Refuse a second axis or a variable that none of some kinds of picture shows."""
+    for name, names in {"y": ("map", "validity"), "variable": ("map", "uncertainty")}.items():
+        if getattr(choice, name) is not None and not any(kind.name in names for kind in kinds):
+            shown, expected = " and ".join(kind.name for kind in kinds), " or ".join(names)
+            raise UsageError(f"{argument(name)}: does not apply to {shown}, expected the kind {expected}")
+
+
 def find_kind(name: str) -> Kind:
     check_kind(name)
     module = import_module(f".{KINDS[name]}", __package__)
