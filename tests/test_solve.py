@@ -308,3 +308,18 @@ def test_the_page_prints_what_the_commands_print(cli: Run) -> None:
 )
 def test_bad_input_is_one_line(cli: Run, words: tuple[str, ...], message: str) -> None:
     assert_refused(cli("solve", "--model", "mujoco-solref", *words), message)
+
+
+@pytest.mark.parametrize(
+    ("name", "at", "note"),
+    [
+        ("A", {"kuwabara-kono-1987.A": 1e-5}, "A is solved for, and this value changes nothing"),
+        ("A", {"A": 1e-5}, "A is solved for, and this value changes nothing"),
+        ("A", {"e": 0.7}, "e is not an input of kuwabara-kono-1987, and changes nothing"),
+    ],
+)
+def test_a_given_value_that_changes_nothing_is_noted(name: str, at: dict[str, float], note: str) -> None:
+    without = impact.solve("kuwabara-kono-1987", name, {"e_out": 0.6})
+    with pytest.warns(impact.ImpactWarning, match=re.escape(note)):
+        result = impact.solve("kuwabara-kono-1987", name, {"e_out": 0.6}, at=at)
+    assert result.roots == without.roots

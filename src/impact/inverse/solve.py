@@ -41,10 +41,17 @@ from ..engine.build_impacts import build_impacts
 from ..engine.inputs import Inputs
 from ..engine.plan import Plan
 from ..engine.plugins import read_plugins
-from ..errors import UsageError, did_you_mean
+from ..errors import UsageError, did_you_mean, warn
 from ..formatting import argument, number, prefixed, quantity, safe_text
 from ..results.ranking import target_value
-from ..results.single_impact import PointSource, open_source, single_point, warn_of_ignored_e
+from ..results.single_impact import (
+    PointSource,
+    ignores_e,
+    input_name,
+    open_source,
+    single_point,
+    warn_of_ignored_e,
+)
 from .prepared import outputs_at, trial_inputs
 
 # values that are tried before roots are refined: powers of ten times the contact's own unit of the parameter
@@ -203,8 +210,13 @@ def solve(
         find_friction(friction) if friction is not None else next(iter(point_source.draft(model).frictions), None)
     )
     unknown = unknown_of(law, name, friction_law)
+    for given in at or {}:
+        if {config_name(law, unknown), unknown.name} & {given, str(input_name(given, law, friction_law))}:
+            warn(f"{argument('at', key=given)}: {name} is solved for, and this value changes nothing")
     inputs = {**placeholder(law, unknown), **(at or {})}
     config, _ = single_point(point_source, model, inputs, over, friction=friction)
+    if "e" in (at or {}) and ignores_e(config):
+        warn(f"{argument('at', key='e')}: e is not an input of {law.key}, and changes nothing")
     for over_name, values in (over or {}).items():
         if not isinstance(to_plain_data(values)[0], list | dict):
             raise UsageError(f"{argument('over', key=over_name)}: got one value, expected a list or a range")

@@ -334,12 +334,17 @@ def run(
     return impact
 
 
+def ignores_e(config: Config) -> bool:
+    """Whether the law of a config has another damping than e; an elastic law has none to find."""
+    law = config.models[0]
+    is_used = "e" in with_base_quantities(law.quantities) or any(law.may_use_e for law in config.frictions)
+    return bool(law.damping) and not is_used
+
+
 def warn_of_ignored_e(config: Config, e_out: float) -> None:
     """Warn if the law of a config without axes has another damping than e, and delivers another restitution."""
     law, e = config.models[0], config.scalars.get("e", math.nan)
-    is_used = "e" in with_base_quantities(law.quantities) or any(law.may_use_e for law in config.frictions)
-    # an elastic law has no damping to find
-    if is_used or not law.damping or not isinstance(e, float):
+    if not ignores_e(config) or not isinstance(e, float):
         return
     if e != e or e_out != e_out or number(e_out) == number(e):
         return
@@ -661,7 +666,7 @@ def single_point(
     law = None if model is None else find(model, source.plugins.models)
     friction_law = None if friction is None else find_friction(friction)
     laws = (law or next(iter(draft.models), None), friction_law or next(iter(draft.frictions), None))
-    fixed = {str(_input_name(name, *laws)): to_plain_value(value) for name, value in (at or {}).items()}
+    fixed = {str(input_name(name, *laws)): to_plain_value(value) for name, value in (at or {}).items()}
     for name, value in fixed.items():
         if isinstance(value, dict | list):
             raise UsageError(f"{argument(source.at_name, {name: value})}: got several values, expected one")
@@ -670,7 +675,7 @@ def single_point(
     settings = [] if law is None else [Setting(("models",), [law.key], argument("model", law.key))]
     if friction_law is not None:
         settings.append(Setting(("frictions",), [friction_law.key], argument("friction", friction)))
-    over = {str(_input_name(name, *laws)): values for name, values in (over or {}).items()}
+    over = {str(input_name(name, *laws)): values for name, values in (over or {}).items()}
     settings += [
         Setting(InputName.parse(name).path, values, argument("over", key=name)) for name, values in over.items()
     ]
@@ -700,7 +705,7 @@ def single_point(
     return config, defaulted
 
 
-def _input_name(name: str, model: ForceModel | None, friction: FrictionLaw | None) -> InputName:
+def input_name(name: str, model: ForceModel | None, friction: FrictionLaw | None) -> InputName:
     """Read a config name, in which a parameter of the chosen law needs no key of it."""
     parsed = InputName.parse(name)
     if parsed.owner or parsed.key in SWEEP_INPUTS:
