@@ -416,10 +416,14 @@ def test_a_model_keeps_its_look_where_it_is_free(coarse: xr.Dataset) -> None:
 
 
 def test_a_variable_or_an_axis_that_no_picture_shows_is_refused(coarse: xr.Dataset, tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match="variable: does not apply to final-velocities, expected the kind"):
+    with pytest.raises(
+        UsageError, match="variable: does not apply to final-velocities, expected a kind among map, uncertainty"
+    ):
         impact.plot(coarse, variable="peak_force")
-    with pytest.raises(UsageError, match="y: does not apply to loop, expected the kind map or validity"):
+    with pytest.raises(UsageError, match="y: does not apply to loop, expected a kind among map, validity"):
         impact.plot(coarse, kind="loop", y="e")
+    with pytest.raises(UsageError, match="x: does not apply to history, expected a kind among final-velocities, "):
+        impact.plot(coarse, kind="history", x="e")
     impact.save(coarse, file := tmp_path / "coarse.h5")
     with pytest.raises(UsageError, match="variable: does not apply to error and loop"):
         impact.plot_to_files(file, kinds=["error", "loop"], variable="peak_force")

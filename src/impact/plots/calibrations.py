@@ -35,9 +35,8 @@ def calibration_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     """Read measured values over the varied input or their number, the best laws, and their residuals."""
     if kind_of(dataset) != "calibration":
         raise UsageError("this result is no calibration: impact calibrate writes those")
-    for name, value in (("sel", choice.sel), ("x", choice.x), ("y", choice.y)):
-        if value:
-            raise UsageError(f"{argument(name)}: does not apply to the picture of a calibration")
+    if choice.sel:
+        raise UsageError(f"{argument('sel')}: does not apply to the picture of a calibration")
     keys = chosen_laws(None, dataset)
     wanted = chosen_laws(choice.models, dataset) if choice.models else keys[:MAX_LAWS]
     shown = [key for key in keys if key in wanted]

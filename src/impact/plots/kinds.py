@@ -160,11 +160,17 @@ def check_kind(name: str) -> None:
 
 
 def check_choice(choice: Choice, kinds: Sequence[Kind]) -> None:
-    """Refuse a second axis or a variable that none of some kinds of picture shows."""
-    for name, names in {"y": ("map", "validity"), "variable": ("map", "uncertainty")}.items():
-        if getattr(choice, name) is not None and not any(kind.name in names for kind in kinds):
-            shown, expected = " and ".join(kind.name for kind in kinds), " or ".join(names)
-            raise UsageError(f"{argument(name)}: does not apply to {shown}, expected the kind {expected}")
+    """Refuse an axis or a variable that none of some kinds of picture shows."""
+    shows: dict[str, Callable[[Kind], bool]] = {
+        "x": lambda kind: bool(kind.along),
+        "y": lambda kind: "y" in kind.along,
+        "variable": lambda kind: kind.name in ("map", "uncertainty"),
+    }
+    for name, shows_it in shows.items():
+        if getattr(choice, name) is not None and not any(map(shows_it, kinds)):
+            drawn, others = " and ".join(kind.name for kind in kinds), filter(shows_it, map(find_kind, KINDS))
+            expected = ", ".join(kind.name for kind in others)
+            raise UsageError(f"{argument(name)}: does not apply to {drawn}, expected a kind among {expected}")
 
 
 def find_kind(name: str) -> Kind:

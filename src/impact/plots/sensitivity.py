@@ -143,9 +143,8 @@ def sensitivity_bars(dataset: xr.Dataset, choice: Choice) -> BarData:
     """Read the first-order and total indices of each uncertain input, with their intervals."""
     if kind_of(dataset) != "sensitivity study":
         raise UsageError("this result is no sensitivity study: impact sensitivity -o writes those")
-    for name, value in (("x", choice.x), ("y", choice.y), ("log", choice.log)):
-        if value:
-            raise UsageError(f"{argument(name)}: does not apply to the picture of a sensitivity study")
+    if choice.log:
+        raise UsageError(f"{argument('log')}: does not apply to the picture of a sensitivity study")
     data = select(select_laws(dataset, choice.models, choice.frictions), choice.sel or {}).load()
     laws = {"model", "friction"} & {*data["mean"].dims}
     data = data.isel({dim: 0 for dim in data.dims if dim not in (*laws, "input", "quantile")})
