@@ -118,6 +118,13 @@ def test_parameters_and_properties_are_zipped_by_their_paths() -> None:
     ]
 
 
+@pytest.mark.parametrize("name", ["kelvin-voigt.C", "materials.other.E"])
+def test_a_zip_group_keeps_its_inputs_where_a_law_or_a_material_of_it_is_not_selected(name: str) -> None:
+    lists = ("sweep.v1=[1, 2]", "model.kelvin-voigt.C=[3, 4]", "models=hertz")
+    (axis,) = read(TEXT, *lists, f'sweep.zip=[["{name}", "v1"]]').axes
+    assert axis.columns == {"v1": (1, 2)}
+
+
 def test_a_table_of_cases_is_one_axis_and_crosses_the_others(tmp_path: Path) -> None:
     config = cases(tmp_path)
     assert [axis.name for axis in config.axes] == ["e", "case"]

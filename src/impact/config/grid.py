@@ -87,6 +87,8 @@ def build_grid(
     scalars = {name: value for name, value in values.items() if isinstance(value, float | str)}
     together = dict.fromkeys(cases, "a column of cases") | dict.fromkeys(samples, "an uncertain input")
     member_of, problems = _zip_groups(groups, axis_sizes, together, draft.input_names)
+    # parameters of laws, and properties of materials, that are not selected have no values here
+    member_of = {name: [other for other in group if other in values] for name, group in member_of.items()}
     for numbered in (cases, samples):
         columns_of = [name for name in values if name in numbered]
         member_of |= dict.fromkeys(columns_of, columns_of)
