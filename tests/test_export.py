@@ -426,6 +426,15 @@ def test_a_law_of_the_catalogue_is_exported_under_the_name_of_the_code() -> None
     assert export.model == "lammps-coeff-restitution-hertz"
 
 
+def test_a_law_exported_under_the_name_of_the_code_keeps_its_parameters() -> None:
+    law = "kelvin-voigt-no-tension"
+    tables = {"model": {law: {"K": 1e6, "C": [20.0, 30.0]}}, "materials": {"a": {"E": 1e9, "nu": 0.3, "rho": 1e3}}}
+    config = {"models": law, "sweep": {"v1": 1.0, "m1": 1.0, "m2": 1.0, "material": "a"}, **tables}
+    assert [impact.export("yade", source=config).parameters[name] for name in ("kn", "cn")] == [2e6, 40.0]
+    part = impact.sweep(config).sel({f"{law}.C": 30.0})
+    assert impact.export("yade", source=part).parameters["cn"] == 60.0
+
+
 def test_what_is_delivered_at_dt_is_that_of_timestep() -> None:
     at = {"e": 0.5, "v1": 1.0}
     export = impact.export("lammps", at=at, dt=2e-5, code_version="22Jul2025")

@@ -6,13 +6,13 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from ..config.draft import Overrides
+from ..config.draft import Overrides, Setting
 from ..config.load import Config
 from ..config.tables import SWEEP_QUANTITIES
 from ..contact.frictions import find_friction
 from ..contact.impacts import INPUTS, Impacts
 from ..contact.model import ForceModel
-from ..contact.models import find
+from ..contact.models import find, original_key
 from ..engine.build_impacts import build_impacts
 from ..engine.plan import Plan
 from ..engine.plugins import Plugins
@@ -143,6 +143,7 @@ def prepare_export(
     else:
         key, newest = (first_law(code, tuple(code.laws), release) for release in (version, code.newest))
         missing = "" if key == newest else newest
+    point_source = _with_parameters(point_source, key)
     chosen, left_out = _choose_friction(code, point_source, key, friction)
     point = point_with_e(
         point_source, find(key), at, lambda config: wall_inputs(config, code, version), friction=chosen
@@ -168,6 +169,20 @@ def prepare_export(
         defaults=_defaults(point_source, at, point.config) if point_source.is_starter else (),
         left_out=left_out,
     )
+
+
+def _with_parameters(source: PointSource, key: str) -> PointSource:
+    """Give a law the parameters that the source has for the same law under another name of the catalogue."""
+    draft = source.config_draft
+    tables = draft.table("model")
+    others = [name for name in tables if original_key(name) == original_key(key)]
+    # a calibration renames the laws that were fitted
+    if source.calibration is not None or key in others or not others:
+        return source
+    name = next((name for name in source.models if name in others), others[0])
+    draft = draft.with_settings([Setting(("model", key), tables[name], f"model.{name}")])
+    labels = {label.replace(f"{name}.", f"{key}."): value for label, value in source.labels.items()}
+    return replace(source, config_draft=draft, labels=labels)
 
 
 def _choose_friction(
