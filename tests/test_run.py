@@ -237,6 +237,14 @@ def test_selecting_a_parameter_changes_only_the_loop_of_its_model() -> None:
 # ---- e and alpha
 
 
+def test_the_inputs_of_the_first_law_are_not_those_of_the_others() -> None:
+    sweep = {"e": 0.5, "v1": 1.0, "m1": 1.0, "m2": 1.0, "n": 1.0, "K": 1e6}
+    models = ["anagnostopoulos-1988", "kelvin-voigt", "walton-braun-variable"]
+    tables = {"kelvin-voigt": {"C": [1.0, 2.0]}, "walton-braun-variable": {"S": 1.0}}
+    result = impact.run({"models": models, "sweep": sweep, "model": tables})
+    assert (result.point.keys(), result.first) == (sweep.keys() | {"v2"}, ())
+
+
 def test_alpha_replaces_e_and_e_replaces_alpha(cli: Run) -> None:
     process = cli("run", "--at", "alpha=0.3", "--at", "v1=2", "--json")
     assert process.returncode == 0, process.stderr

@@ -764,7 +764,12 @@ def _unknown_input(draft: Draft, name: str) -> UsageError:
 def _without_axes(
     config: Config, at: Mapping[str, float | str], over: Mapping[str, object]
 ) -> tuple[Config, tuple[str, ...]]:
-    """Reduce axes that are not in `over` to one value, and name the inputs that took the first one of theirs."""
+    """Reduce axes that are not in `over` to one value, and name the inputs that took the first one of theirs.
+
+    Parameters of other laws than the first are left out.
+    """
+    models, frictions = config.models[:1], config.frictions[:1]
+    keys = models[0].key, frictions[0].key if frictions else ""
     scalars = dict(config.scalars)
     first: list[str] = []
     kept = [axis for axis in config.axes if not over.keys().isdisjoint(axis.columns)]
@@ -773,9 +778,10 @@ def _without_axes(
         scalars |= {name: values[position] for name, values in axis.columns.items()}
         if axis.size > 1 and at.keys().isdisjoint(_selectable_columns(axis)):
             first += axis.columns
-    return replace(
-        config, axes=tuple(kept), scalars=scalars, models=config.models[:1], frictions=config.frictions[:1]
-    ), tuple(first)
+    others = {name for name in scalars.keys() - at.keys() if not InputName.parse(name).applies_to(*keys)}
+    scalars = {name: value for name, value in scalars.items() if name not in others}
+    config = replace(config, axes=tuple(kept), scalars=scalars, models=models, frictions=frictions)
+    return config, tuple(name for name in first if name not in others)
 
 
 def _selectable_columns(axis: Axis) -> dict[str, Sequence[float | str]]:
