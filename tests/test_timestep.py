@@ -6,6 +6,7 @@ import json
 import math
 import shlex
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from impact.contact.fixed_step import collide_at_fixed_step
 from impact.contact.models import find
 from impact.errors import UsageError
 from impact.formatting import number
+from impact.inverse.timestep import FixedStepLaw
 
 from .conftest import Run, assert_refused, assert_same_output, examples_of
 
@@ -216,6 +218,20 @@ def test_the_page_prints_what_the_commands_print(cli: Run) -> None:
 )
 def test_bad_input_is_one_line(cli: Run, words: tuple[str, ...], message: str) -> None:
     assert_refused(cli("timestep", "--model", LINEAR, *words), message)
+
+
+def test_no_steps_are_tried_where_surfaces_part_later_than_a_collision_is_followed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    outputs = FixedStepLaw.outputs
+
+    def few_steps(law: FixedStepLaw, dt: NDArray[np.float64], *names: str, **options: Any) -> list[NDArray[Any]]:
+        assert (law.contact_time / dt).max() < 1000
+        return outputs(law, dt, *names, **options)
+
+    monkeypatch.setattr(FixedStepLaw, "outputs", few_steps)
+    result = impact.timestep("kelvin-voigt-no-tension", at={"e": 0.001}, scheme="pybullet", tol=0.01, phases=4)
+    assert (result.needed, result.rows[0].status, result.rows[-1].status) == (None, "ok", "not_separated")
 
 
 def test_a_step_that_cannot_be_changed_needs_a_time_constant(cli: Run) -> None:

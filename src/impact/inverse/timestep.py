@@ -32,6 +32,7 @@ from ..contact import simulate
 from ..contact.fixed_step import (
     DRAKE_SAP,
     LAWS_OF_SCHEME,
+    MAX_CONTACTS,
     MAX_STEPS_PER_CONTACT,
     MUJOCO_CONE,
     SCHEMES,
@@ -532,6 +533,9 @@ def needed_steps(
         raise UsageError(f"{argument('tol')} is relative to e, expected e > 0")
     if abs(e_continuous - target) >= tol * target:
         # no step does what the continuous law does not
+        return None
+    if law.continuous["separation_time"] > MAX_CONTACTS * law.contact_time:
+        # an overdamped contact, whose surfaces part later than a collision at a step is followed
         return None
 
     @cache
