@@ -700,6 +700,11 @@ def test_verify_exits_with_0_for_the_predicted_restitutions_and_with_1_for_other
     assert [row.split()[-1] for row in (first, second, third, fourth)] == ["0", "0", "1e-08", "0"]
 
 
+def test_without_slip_the_header_has_no_beta() -> None:
+    export = impact.export("newton", friction="coulomb-1785", at={"e": 0.6, "mu": 0.2, "angle": 0.0})
+    assert "friction: coulomb-1785, no beta without slip" in export.header
+
+
 def test_with_friction_the_rows_have_the_tangential_restitution_as_well() -> None:
     normal = Verification("LAMMPS", (1e-6,) * 2, (0.25, 0.75), (0.5, 0.6), (0.5, 0.6), 1e-9)
     oblique = replace(normal, beta_measured=(0.1, 0.2), beta_predicted=(0.1, 0.3))

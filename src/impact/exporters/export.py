@@ -355,10 +355,12 @@ def _header(
         delivered = row.failure(law.phases) if row.failed else f"mean e {decimals(row.e_mean)}, {spread}"
         header.append(f"{steps}: {delivered} ({law.scheme})")
         if law.oblique is not None and not row.failed:
-            beta = f"{decimals(row.beta_least)} to {decimals(row.beta_largest)}"
-            header.append(
-                f"friction: {law.oblique.pair.friction.key}, mean beta {decimals(row.beta_mean)}, {beta}"
+            beta = (
+                f"mean beta {decimals(row.beta_mean)}, {decimals(row.beta_least)} to {decimals(row.beta_largest)}"
             )
+            # without slip there is no beta
+            delivered = beta if row.beta_mean == row.beta_mean else "no beta without slip"
+            header.append(f"friction: {law.oblique.pair.friction.key}, {delivered}")
         if row.e_to_ask == row.e_to_ask:
             header.append(
                 f"a mean of {number(problem.requested_e)} at this dt: enter e = {decimals(row.e_to_ask)}"
