@@ -398,3 +398,18 @@ def test_an_elastic_law_is_compared_at_an_e_without_a_note() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert impact.run(model="hertz", at={"e": 0.4}).values["e_out"] == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("act", ["run", "timestep", "export"])
+def test_an_indentation_that_is_large_beside_a_ball_is_noted(act: str) -> None:
+    at = {"R1": 0.001, "R2": 0.002, "m1": 0.1, "m2": 0.1, "v1": 2.0, "K": 1e6, "e": 0.8}
+    acts = {
+        "run": lambda **inputs: impact.run(model="lammps-tsuji", **inputs),
+        "timestep": lambda **inputs: impact.timestep("lammps-tsuji", **inputs),
+        "export": lambda **inputs: impact.export("lammps", "lammps-tsuji", **inputs),
+    }
+    with pytest.warns(impact.ImpactWarning, match="peak indentation of .* mm is [0-9]{3}% of the smaller radius"):
+        acts[act](at=at)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        acts[act](at={"R1": 0.1, "R2": 0.1, "v1": 0.1, "e": 0.8})

@@ -152,7 +152,7 @@ def prepare_export(
         Plan(point.config).pair_notes("frictions")
     scheme = (find_friction(chosen).scheme if chosen else "") or code.scheme
     fixed = fixed_step_law(point.config, PHASES, scheme, of_friction=chosen is not None)
-    warn_of_point(point_source, point, fixed.continuous["e_out"])
+    warn_of_point(point_source, point, fixed.impact, fixed.continuous)
     if fixed.oblique is not None:
         _check_limit(code, fixed.oblique)
     calibration = point_source.calibration

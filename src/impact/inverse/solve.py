@@ -30,6 +30,7 @@ from ..config.load import Config
 from ..contact.fixed_step import EXACT
 from ..contact.friction import FrictionLaw, Pair
 from ..contact.frictions import find_friction
+from ..contact.impacts import Impacts
 from ..contact.interpolant import NODE_MAX_STEPS, Interpolant
 from ..contact.model import ForceModel, Parameter
 from ..contact.models import find
@@ -43,6 +44,7 @@ from ..engine.plan import Plan
 from ..engine.plugins import read_plugins
 from ..errors import UsageError, did_you_mean, warn
 from ..formatting import argument, number, prefixed, quantity, safe_text
+from ..results.plausibility import depth_notes
 from ..results.ranking import target_value
 from ..results.single_impact import (
     PointSource,
@@ -305,10 +307,12 @@ def point_with_e(
     return PointWithE(config, defaulted_axes, solved, replaced)
 
 
-def warn_of_point(source: PointSource, point: PointWithE, e_out: float) -> None:
-    """Warn of an e of the source that the law ignores; one that the caller gives is solved for."""
+def warn_of_point(source: PointSource, point: PointWithE, impact: Impacts, outputs: Mapping[str, float]) -> None:
+    """Warn of a large indentation, and of an e of the source that the law ignores, unless it is solved for."""
     if point.solved is None and source.has_own_e and "e" not in point.defaulted_axes:
-        warn_of_ignored_e(point.config, e_out)
+        warn_of_ignored_e(point.config, outputs["e_out"])
+    for note in depth_notes(outputs["peak_indentation"], impact.R1.item(), impact.R2.item()):
+        warn(note)
 
 
 def solve_damping(config: Config, e: float) -> Config:

@@ -365,7 +365,7 @@ def timestep(
     if point.config.frictions:
         Plan(point.config).pair_notes("frictions")
     law = fixed_step_law(point.config, phases, scheme, of_friction=True)
-    warn_of_point(point_source, point, law.continuous["e_out"])
+    warn_of_point(point_source, point, law.impact, law.continuous)
     steps = time_steps(law.contact_time, counts or (() if given else STEPS_PER_CONTACT), given)
     needed, found = None, None
     if tol is not None:
@@ -769,5 +769,6 @@ def time_steps(contact_time: float, steps_per_contact: Sequence[float], dt: Sequ
     steps = [*(contact_time / steps for steps in steps_per_contact), *dt]
     largest = contact_time / min(steps)
     if largest > MAX_STEPS_PER_CONTACT:
-        raise UsageError(f"got {number(largest)} steps per contact, expected at most {MAX_STEPS_PER_CONTACT:,}")
+        got = f"{argument('dt')}: got {number(largest)} steps per contact"
+        raise UsageError(f"{got}, expected at most {MAX_STEPS_PER_CONTACT:,}")
     return steps

@@ -14,7 +14,7 @@ from ..engine.build_impacts import property_at, smaller_radius_at, values_at
 from ..engine.inputs import Inputs
 from ..engine.trajectories import axes_of_arrays, probe_index
 from ..errors import ModelError, ResultError
-from ..formatting import number, quantity, safe_text
+from ..formatting import number, prefixed, quantity, safe_text
 from .factored import read_inputs
 from .schema import parts_of_laws
 from .slabs import MAX_SUMMARY_POINTS, is_computed, over_varying_dims, slabs
@@ -82,6 +82,20 @@ def result_notes(summary: Summary) -> Iterator[str]:
             f"peak indentation above {limit} at {many}, at most {summary.deepest:.0%}; Hertz theory assumes small "
             "indentation"
         )
+
+
+def depth_notes(indentation: float, R1: float, R2: float) -> Iterator[str]:
+    """Yield a sentence if a peak indentation is large beside the smaller radius [m]; a radius may be unknown, NaN.
+
+    >>> list(depth_notes(2e-3, 0.01, float("inf")))
+    ['peak indentation of 2 mm is 20% of the smaller radius; Hertz theory assumes small indentation']
+    >>> list(depth_notes(2e-3, float("nan"), float("nan")))
+    []
+    """
+    share = indentation / float(np.fmin(R1, R2))
+    if share > MAX_SMALL_INDENTATION:
+        depth = f"peak indentation of {prefixed(indentation, 'm', 3)} is {share:.0%} of the smaller radius"
+        yield f"{depth}; Hertz theory assumes small indentation"
 
 
 def with_depths(summary: Summary, dataset: xr.Dataset) -> Summary:

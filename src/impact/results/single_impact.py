@@ -56,7 +56,7 @@ from ..errors import ConfigError, UsageError, did_you_mean, warn
 from ..formatting import argument, number, prefixed, safe_text
 from .calibration import fitted_config, position_of_law
 from .kinds import kind_of, require_result, require_sweep
-from .plausibility import input_notes
+from .plausibility import depth_notes, input_notes
 from .provenance import changed_plugins, stored_config, stored_draft, unknown_plugins
 from .schema import DEFAULT_RTOL_FACTOR, SCHEMA_VERSION, attributes_of, is_case, plain_unit, scale_of
 from .seal import is_result
@@ -331,6 +331,8 @@ def run(
     impact = run_single_impact(Plan(config, plugin_set.of(config.models)), first, samples)
     if "e" not in first and (opened.has_own_e or "e" in (at or {})):
         warn_of_ignored_e(config, impact.values["e_out"])
+    for note in depth_notes(impact.values["peak_indentation"], impact.derived["R1"], impact.derived["R2"]):
+        warn(note)
     return impact
 
 
