@@ -212,9 +212,9 @@ def solve(
         find_friction(friction) if friction is not None else next(iter(point_source.draft(model).frictions), None)
     )
     unknown = unknown_of(law, name, friction_law)
-    for given in at or {}:
-        if {config_name(law, unknown), unknown.name} & {given, str(input_name(given, law, friction_law))}:
-            warn(f"{argument('at', key=given)}: {name} is solved for, and this value changes nothing")
+    for key in at or {}:
+        if {config_name(law, unknown), unknown.name} & {key, str(input_name(key, law, friction_law))}:
+            warn(f"{argument('at', key=key)}: {name} is solved for, and this value changes nothing")
     inputs = {**placeholder(law, unknown), **(at or {})}
     config, _ = single_point(point_source, model, inputs, over, friction=friction)
     if "e" in (at or {}) and ignores_e(config):
