@@ -27,7 +27,7 @@ import impact
 from impact.errors import UsageError
 from impact.plots.curves import CurveData, Panel
 from impact.plots.draw import draw, get_plot_data
-from impact.plots.kinds import KINDS, WIDTHS, Choice, Look, find_kind
+from impact.plots.kinds import KINDS, WIDTHS, Choice, Look, check_choice, find_kind
 from impact.plots.style import save_figure
 from impact.results.single_impact import Impact
 
@@ -424,6 +424,8 @@ def test_a_variable_or_an_axis_that_no_picture_shows_is_refused(coarse: xr.Datas
         impact.plot(coarse, kind="loop", y="e")
     with pytest.raises(UsageError, match="x: does not apply to history, expected a kind among final-velocities, "):
         impact.plot(coarse, kind="history", x="e")
+    with pytest.raises(UsageError, match=r"x: does not apply to calibration$"):
+        check_choice(Choice(x="v1"), [find_kind("calibration")])
     impact.save(coarse, file := tmp_path / "coarse.h5")
     with pytest.raises(UsageError, match="variable: does not apply to error and loop"):
         impact.plot_to_files(file, kinds=["error", "loop"], variable="peak_force")

@@ -168,9 +168,11 @@ def check_choice(choice: Choice, kinds: Sequence[Kind]) -> None:
     }
     for name, shows_it in shows.items():
         if getattr(choice, name) is not None and not any(map(shows_it, kinds)):
-            drawn, others = " and ".join(kind.name for kind in kinds), filter(shows_it, map(find_kind, KINDS))
-            expected = ", ".join(kind.name for kind in others)
-            raise UsageError(f"{argument(name)}: does not apply to {drawn}, expected a kind among {expected}")
+            drawn = " and ".join(kind.name for kind in kinds)
+            others = ", ".join(kind.name for kind in map(find_kind, KINDS) if shows_it(kind))
+            # a study has no other picture
+            expected = "" if any(kind.source in STUDIES for kind in kinds) else f", expected a kind among {others}"
+            raise UsageError(f"{argument(name)}: does not apply to {drawn}{expected}")
 
 
 def find_kind(name: str) -> Kind:
