@@ -431,6 +431,24 @@ def test_a_variable_or_an_axis_that_no_picture_shows_is_refused(coarse: xr.Datas
         impact.plot_to_files(file, kinds=["error", "loop"], variable="peak_force")
 
 
+def test_a_logarithmic_axis_that_no_picture_has_is_refused(coarse: xr.Dataset, tmp_path: Path) -> None:
+    with pytest.raises(
+        UsageError, match=r'^log="x": the axis x would stay linear: it has values <= 0, or this kind'
+    ):
+        impact.plot(coarse, kind="loop", log="x")
+    with pytest.raises(UsageError, match=r'^log="y": the axis y'):
+        impact.plot(coarse, kind="history", log="y")
+    impact.save(coarse, file := tmp_path / "coarse.h5")
+    drawn = impact.plot_to_files(file, kinds=["error", "loop"], log="y")
+    assert list(drawn.pictures) == ["error", "loop"]
+
+
+def test_no_law_is_not_every_law(coarse: xr.Dataset) -> None:
+    for act in (impact.plot, impact.recommend):
+        with pytest.raises(UsageError, match=r"^models: got an empty list, expected one name or more$"):
+            act(coarse, models=[])
+
+
 def test_the_slice_is_chosen_and_named(wide: xr.Dataset) -> None:
     assert "v1 = 1 m/s, m1 = m2 = 1 kg" in conditions_of(get_curve_data(wide))
     other = get_curve_data(wide, sel={"v1": 2.0, "material2": "hard", "m2": np.inf}, models=["hertz"])
@@ -707,6 +725,11 @@ def test_a_plot_is_drawn_into_axes_of_the_user(coarse: xr.Dataset) -> None:
     assert isinstance(axes[1], Axes)
     with pytest.raises(UsageError, match="ax: got 1 axes, expected 3"):
         impact.plot(coarse, kind="history", sel={"e": 0.5}, ax=axes[0])
+    for look in ({"width": "single"}, {"height": 3.0}, {"style": "ggplot"}):
+        with pytest.raises(
+            UsageError, match=f"^{next(iter(look))}: does not apply to ax, whose figure has its own$"
+        ):
+            impact.plot(coarse, kind="error", ax=axes, **look)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(

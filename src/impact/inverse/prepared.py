@@ -244,7 +244,7 @@ def prepare(
     law = Plan(config, plugin_set.of(config.models)).laws[-1]
     known = [*CENTRAL_OUTPUTS] if isinstance(law, ForceModel) else [*OUTPUTS]
     known = [name for name in known if OUTPUTS[name].dtype == "f8" and OUTPUTS[name].per_model]
-    names = known if outputs is None else as_keys(outputs)
+    names = known if outputs is None else as_keys(outputs, "outputs")
     for name in names:
         if name not in known:
             raise UsageError(f'outputs: no output "{name}" of this law; {did_you_mean(name, known)}')

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -19,6 +19,7 @@ from matplotlib.ticker import FuncFormatter
 from ..contact.model import ForceModel
 from ..engine.plugins import read_plugins
 from ..errors import UsageError
+from ..formatting import argument
 from ..results.single_impact import Impact, histories
 from ..results.xarray_backend import result_of
 from .curves import CurveData
@@ -115,9 +116,14 @@ def plot(
     dataset = result_of(dataset)
     choice = Choice(x, y, variable, sel, models, log, equations, frictions)
     look = Look(width, height, style, ax is None if title is None else title, labels, legend, decimal)
+    for name in ("width", "height", "style"):
+        if ax is not None and getattr(look, name) is not None:
+            raise UsageError(f"{argument(name)}: does not apply to ax, whose figure has its own")
     kind = kind or default_kind(dataset).name
     check_choice(choice, [find_kind(kind)])
-    return draw(get_plot_data(dataset, kind, choice, plugins), look, points, ax)
+    plot_data = get_plot_data(dataset, kind, choice, plugins)
+    check_log(log, [plot_data])
+    return draw(plot_data, look, points, ax)
 
 
 def get_plot_data(
@@ -136,6 +142,15 @@ def get_plot_data(
         plot_data = found.data(motions, choice)
         return replace(plot_data, not_drawn=(*left_out, *plot_data.not_drawn))
     return found.data(dataset, choice)
+
+
+def check_log(log: str, pictures: Collection[PlotData]) -> None:
+    """Refuse a logarithmic axis that none of some pictures has."""
+    panels = [panel for picture in pictures for panel in (picture, *getattr(picture, "panels", ()))]
+    for letter in log:
+        if panels and not any(getattr(panel, f"{letter}_log", False) for panel in panels):
+            why = "it has values <= 0, or this kind of picture has no logarithmic one"
+            raise UsageError(f"{argument('log', letter)}: the axis {letter} would stay linear: {why}")
 
 
 def label_keys(plot_data: PlotData, look: Look) -> set[str]:

@@ -16,7 +16,7 @@ from ..errors import UsageError
 from ..formatting import argument
 from ..results.xarray_backend import load
 from .data import PlotData, check_data_form, encode_table, read_points
-from .draw import draw, get_plot_data, label_keys
+from .draw import check_log, draw, get_plot_data, label_keys
 from .kinds import Choice, Look, check_choice, check_kind, default_kind, find_kind
 from .labels import check_labels
 from .style import check_picture, save_figure
@@ -122,6 +122,7 @@ def plot_to_files(
     if output.suffix.lower() == ".gif" and set(kinds) != {"animation"}:
         raise UsageError(f"{output}: a .gif is an animation, expected {argument('kind', 'animation')}")
     plot_data, left_out = _read_kinds(kinds, dataset, choice, plugins)
+    check_log(log, plot_data.values())
     if plot_data:
         check_labels(look.labels or {}, set().union(*(label_keys(shown, look) for shown in plot_data.values())))
     pictures: dict[str, Path] = {}

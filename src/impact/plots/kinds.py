@@ -76,7 +76,7 @@ class Choice:
 
         for name in ("models", "frictions"):
             if getattr(self, name) is not None:
-                object.__setattr__(self, name, as_keys(getattr(self, name)))
+                object.__setattr__(self, name, as_keys(getattr(self, name), name))
         if self.log not in ("", *LOG_AXES):
             raise UsageError(f"{argument('log')}: got {self.log}, expected {', '.join(LOG_AXES)}")
 

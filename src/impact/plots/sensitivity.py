@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from ..contact.variables import OUTPUTS
 from ..errors import UsageError
-from ..formatting import argument, heading
+from ..formatting import heading
 from ..results.kinds import kind_of
 from ..results.selection import select, select_laws
 from ..results.sensitivity import distribution_texts
@@ -143,8 +143,6 @@ def sensitivity_bars(dataset: xr.Dataset, choice: Choice) -> BarData:
     """Read the first-order and total indices of each uncertain input, with their intervals."""
     if kind_of(dataset) != "sensitivity study":
         raise UsageError("this result is no sensitivity study: impact sensitivity -o writes those")
-    if choice.log:
-        raise UsageError(f"{argument('log')}: does not apply to the picture of a sensitivity study")
     data = select(select_laws(dataset, choice.models, choice.frictions), choice.sel or {}).load()
     laws = {"model", "friction"} & {*data["mean"].dims}
     data = data.isel({dim: 0 for dim in data.dims if dim not in (*laws, "input", "quantile")})

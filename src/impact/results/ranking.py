@@ -323,7 +323,7 @@ def recommend(
     require_sweep(dataset, "recommend")
     criterion = BY_ERROR if target is None else _criterion_of(target)
     tol = read_number(tol, criterion.tolerance, argument("tol"))
-    if as_keys(frictions) and not OUTPUTS[criterion.names[0]].of_friction:
+    if as_keys(frictions, "frictions") and not OUTPUTS[criterion.names[0]].of_friction:
         origin, of = argument("frictions"), argument("target")
         raise UsageError(f"{origin}: expected a {of} that depends on friction, such as beta=0.4")
     return rank_models(rankable_parts(dataset, sel or {}, models, criterion, frictions), tol, criterion)

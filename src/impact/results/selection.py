@@ -36,16 +36,19 @@ IndexArray = NDArray[np.intp]
 LawDim = Literal["model", "friction"]
 
 
-def as_keys(names: object) -> list[str]:
-    """List one key or name or several, in a sequence of any library; none for None."""
+def as_keys(names: object, option: str) -> list[str]:
+    """List one key or name or several, in a sequence of any library; none for None, never for an empty one."""
     plain, _ = to_plain_data(names)
-    return [plain] if isinstance(plain, str) else list(plain or ())
+    keys = [plain] if isinstance(plain, str) else list(plain or ())
+    if names is not None and not keys:
+        raise UsageError(f"{argument(option)}: got an empty list, expected one name or more")
+    return keys
 
 
 def chosen_laws(laws: object, dataset: xr.Dataset, dim: LawDim = "model") -> list[str]:
     """List the models or friction laws of a result that are named, each once; all if none is."""
     noun = "friction law" if dim == "friction" else dim
-    wanted = as_keys(laws)
+    wanted = as_keys(laws, f"{dim}s")
     keys = [str(key) for key in dataset[dim].values.ravel()] if dim in dataset.coords else []
     for key in wanted:
         if not keys:
@@ -76,7 +79,7 @@ def select_laws(dataset: xr.Dataset, models: object = None, frictions: object = 
     """Select the models and friction laws that are named; all if none is."""
     wanted: dict[LawDim, object] = {"model": models, "friction": frictions}
     for dim, laws in wanted.items():
-        positions = law_positions(laws, dataset, dim) if as_keys(laws) else []
+        positions = law_positions(laws, dataset, dim) if as_keys(laws, f"{dim}s") else []
         # the law of a part of a result may be no dimension
         if positions and dim in dataset.dims:
             dataset = dataset.isel({dim: positions})

@@ -131,7 +131,7 @@ def sensitivities(
     [187.75797, 0.00998]
     """
     names = [name for name, variable in OUTPUTS.items() if not variable.flags]
-    of = as_keys(of)
+    of = as_keys(of, "of")
     for name in of:
         if name not in names:
             raise UsageError(f'{argument("of")}: no output "{name}"; {did_you_mean(name, names)}')
