@@ -7,7 +7,6 @@ import io
 import pickle
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from datetime import timedelta
 from pathlib import Path
@@ -172,25 +171,27 @@ def estimate(
     law = plan.laws[chosen.model]
     # the first run loads or compiles the core
     for _ in range(2):
-        with _timed() as integrating:
-            collisions, _ = integrate_columns(law, plan.columns_of(chosen), plan.solver)
-    with _timed() as driving:
-        sent = len(pickle.dumps((plan.columns_of(chosen), context_of(plan)), pickle.HIGHEST_PROTOCOL))
-        back = pickle.dumps(collisions, pickle.HIGHEST_PROTOCOL)
-        pickle.loads(back)
-        write_range(io.BytesIO(), "", collisions)
+        begun = time.perf_counter()
+        collisions, _ = integrate_columns(law, plan.columns_of(chosen), plan.solver)
+    integrated = time.perf_counter()
+    sent = len(pickle.dumps((plan.columns_of(chosen), context_of(plan)), pickle.HIGHEST_PROTOCOL))
+    back = pickle.dumps(collisions, pickle.HIGHEST_PROTOCOL)
+    pickle.loads(back)
+    write_range(io.BytesIO(), "", collisions)
+    driven = time.perf_counter()
     # the time of a slab does not depend on the values of its trajectories: repeat those of the range
     positions = np.arange(RANGE_TRAJECTORIES) % chosen.size
     blank = {number: trajectory_map.record.blank(chosen.size) for number, trajectory_map in enumerate(plan.maps)}
     blank[chosen.model] = collisions
     table = table_of(plan, lambda number, start, stop: blank[number].take(positions[: stop - start]))
-    with _timed() as assembling:
-        values = next(expanded_slabs(table, stored_variables(plan))).values
-        for array in values.values():
-            hashlib.sha256(array.tobytes())
-    slab = values["status"].size
-    each, seconds_per_trajectory_of_driver = integrating() / chosen.size, DASK_OVERHEAD * driving() / chosen.size
-    writing_seconds = assembling() / slab * plan.stored_points if plan.layout == "full" else 0.0
+    prepared = time.perf_counter()
+    values = next(expanded_slabs(table, stored_variables(plan))).values
+    for array in values.values():
+        hashlib.sha256(array.tobytes())
+    seconds_per_point = (time.perf_counter() - prepared) / values["status"].size
+    each = (integrated - begun) / chosen.size
+    seconds_per_trajectory_of_driver = DASK_OVERHEAD * (driven - integrated) / chosen.size
+    writing_seconds = seconds_per_point * plan.stored_points if plan.layout == "full" else 0.0
     busy = min(max(round(each / seconds_per_trajectory_of_driver), 1), len(plan.ranges))
     work_folder_bytes = sum(
         trajectory_map.count * trajectory_map.record.row_bytes() for trajectory_map in plan.maps
@@ -210,15 +211,6 @@ def estimate(
             for count in counts
         },
     )
-
-
-@contextmanager
-def _timed() -> Iterator[Callable[[], float]]:
-    """Measure the seconds that a with block takes."""
-    begun = time.perf_counter()
-    ended = begun
-    yield lambda: ended - begun
-    ended = time.perf_counter()
 
 
 def _model_counts(plan: Plan, trajectory_map: TrajectoryMap) -> ModelCounts:
