@@ -67,15 +67,19 @@ def bless(
     check_comparable(result, str(new))
     if not allow_failed:
         _check_no_failures(result, new)
-    old_baseline = _load_baseline(baseline)
-    verdict = None
-    if old_baseline is not None:
+    verdict, attributes = None, result.attrs
+    if baseline.exists():
+        try:
+            old_baseline = load(baseline)
+        except ResultError as error:
+            raise ResultError(f"{error}; it is not modified, remove it to create a new baseline") from None
+        attributes = old_baseline.attrs
         comparison = compare(result, old_baseline, tol=tol)
         repeats = command_start(str(new), result)
         verdict = replace(comparison, new=str(new), baseline=str(baseline), repeats=repeats)
         if show is not None:
             show(verdict)
-    tolerances = effective_tolerances(tol, result.attrs if old_baseline is None else old_baseline.attrs)
+    tolerances = effective_tolerances(tol, attributes)
     save_with_attributes(new, baseline, {"reason": reason, "tolerances": json.dumps(tolerances)})
     return verdict
 
@@ -94,13 +98,3 @@ def _check_no_failures(result: xr.Dataset, path: Path) -> None:
             at = describe_point(inputs_at(result[name], (*laws, *indices)))
             first = f", the first at {at} ({status.name.lower()})"
         raise UsageError(f"{path}: {count}{first}; expected none, or {argument('allow_failed', True)}")
-
-
-def _load_baseline(baseline: Path) -> xr.Dataset | None:
-    """Load the current baseline, if there is one; a file that is not a result is not replaced."""
-    if not baseline.exists():
-        return None
-    try:
-        return load(baseline)
-    except ResultError as error:
-        raise ResultError(f"{error}; it is not modified, remove it to create a new baseline") from None
