@@ -278,10 +278,14 @@ def _check_sizes(
     """Check that the file itself holds all data; return the dimensions of each dataset."""
     size = file.id.get_filesize()
     chunks = compressed = plain = text = 0
+    missing = []
     for name, dataset in datasets.items():
         declared = _declared_bytes(name, dataset.id)
         if dataset.chunks:
-            chunks += _count_chunks(dataset)
+            count = math.prod(-(-n // c) for n, c in zip(dataset.shape, dataset.chunks, strict=True))
+            chunks += count
+            # missing chunks would be read as zeros, at no cost in the file
+            missing += [name] if stored_chunks[name] != count else []
         if dataset.compression:
             compressed += declared
         else:
@@ -291,21 +295,11 @@ def _check_sizes(
         raise _unreadable("declares more data than a file of this size can contain")
     if chunks > MAX_CHUNKS_OF_FILE:
         raise _unreadable(f"more than {MAX_CHUNKS_OF_FILE:,} chunks")
-    # missing chunks would be read as zeros, at no cost in the file
-    missing = [
-        name
-        for name, dataset in datasets.items()
-        if dataset.chunks and stored_chunks[name] != _count_chunks(dataset)
-    ]
     if missing:
         raise _unreadable("declares data that the file does not contain", missing[0])
     if text > MAX_LABEL_BYTES:
         raise _unreadable(f"more than {MAX_LABEL_BYTES:,} bytes of labels")
     return _dims_by_dataset(datasets)
-
-
-def _count_chunks(dataset: h5py.Dataset) -> int:
-    return math.prod(-(-n // c) for n, c in zip(dataset.shape, dataset.chunks, strict=True))
 
 
 def _is_number_type(kind: h5t.TypeID) -> bool:
