@@ -16,7 +16,7 @@ from ..contact.status import FIRST_FAILURE, FrictionStatus, Status
 from .attributes import SummaryRecord
 from .schema import parts_of_laws, places_of_laws
 from .slabs import MAX_SUMMARY_POINTS, distinct_points, is_computed, slabs
-from .trajectory_table import ExpandedSlab, TrajectoryTable, computed_array, expand
+from .trajectory_table import ExpandedSlab, TrajectoryTable, computed_array, expand, table_of_result
 
 # variables of which the largest absolute value is reported
 ERROR_VARIABLES = ("e_error", "v1_error", "v2_error", "closed_form_error", "energy_residual")
@@ -157,7 +157,8 @@ def summarize(dataset: xr.Dataset, max_failed_at: int = MAX_FAILED_AT) -> Summar
     failed points in C order are recorded, at the first position along each axis on which the status is constant.
     """
     names = [name for name in ("status", *ERROR_VARIABLES) if name in dataset]
-    record = _common_record(dataset, names)
+    table = table_of_result(dataset[names])
+    record = None if table is None else table.summary
     # it lists all failures, or as many as required
     if record is not None and (len(record.failed_at) < MAX_FAILED_AT or max_failed_at <= MAX_FAILED_AT):
         return _stored_summary(record, dataset, names, max_failed_at)
@@ -200,7 +201,8 @@ class Extremes(NamedTuple):
 
 def extremes_of(dataset: xr.Dataset, name: str) -> Extremes | None:
     """Find the extremes of a variable; None for a computed one that varies over too many points."""
-    record = _stored_record(dataset.variables[name])
+    array = computed_array(dataset.variables[name])
+    record = None if array is None else array.table.summary
     if record is not None and name in record.extremes:
         stored = record.extremes[name]
         return stored and Extremes(*stored)
@@ -272,18 +274,6 @@ def summary_record(
         extremes=dict(extremes),
         friction_status=counts_by_name(summary.friction_counts),
     )
-
-
-def _stored_record(variable: xr.Variable) -> SummaryRecord | None:
-    """Find the summary in the file of a variable."""
-    array = computed_array(variable)
-    return None if array is None else array.table.summary
-
-
-def _common_record(dataset: xr.Dataset, names: Sequence[str]) -> SummaryRecord | None:
-    """Find the summary in the file of some variables, if it has one and none of them is a selection."""
-    records = [_stored_record(dataset.variables[name]) for name in names]
-    return records[0] if records and all(record is records[0] for record in records) else None
 
 
 def _stored_summary(
