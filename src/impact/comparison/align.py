@@ -120,6 +120,19 @@ def align_sweeps(new: xr.Dataset, baseline: xr.Dataset, *, subset: bool) -> Alig
     )
 
 
+def align_studies(
+    new: xr.Dataset, baseline: xr.Dataset, scales: Mapping[str, Array], faults: Sequence[Difference]
+) -> Alignment:
+    """Align two studies whose points are in the same order; the variables that have a scale are compared."""
+    labels = {dim: baseline.variables[dim] for dim in baseline.dims if dim in baseline.coords}
+    coords = xr.Dataset(coords=xr.Coordinates(labels, indexes={}))
+    sizes = {str(dim): size for dim, size in baseline.sizes.items()}
+    positions = {dim: np.arange(size) for dim, size in sizes.items()}
+    results = [AlignedResult(dataset, coords, positions) for dataset in (new, baseline)]
+    dims = {name: tuple(map(str, baseline[name].dims)) for name in scales}
+    return Alignment(results[0], results[1], sizes, dims, tuple(faults), scales)
+
+
 def _drop_foreign_axes(result: xr.Dataset, other: xr.Dataset) -> xr.Dataset:
     """Drop the parameters of laws that the other result lacks; other laws do not depend on them."""
     own = {str(key) for dim in LAW_DIMS if dim in other.coords for key in np.ravel(other[dim].values)}

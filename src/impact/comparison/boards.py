@@ -7,7 +7,7 @@ import xarray as xr
 
 from ..formatting import safe_text
 from ..results.schema import BOARD
-from .align import AlignedResult, Alignment
+from .align import Alignment, align_studies
 from .verdict import Difference
 
 MAX_NAMED = 3
@@ -34,18 +34,9 @@ def align_boards(new: xr.Dataset, baseline: xr.Dataset, *, subset: bool) -> Alig
             faults.append(Difference("nothing in common", dim, f"the two have no {dim} in common"))
     names = list(BOARD) if all(common.values()) and suites[0] == suites[1] else []
     new, baseline = (dataset.sel(common) for dataset in (new, baseline))
-    # the labels are known by `dataset`
-    coords = xr.Dataset(coords=xr.Coordinates({dim: baseline.variables[dim] for dim in common}, indexes={}))
-    positions = {dim: np.arange(len(labels)) for dim, labels in common.items()}
-    return Alignment(
-        AlignedResult(new, coords, positions),
-        AlignedResult(baseline, coords, positions),
-        {dim: len(labels) for dim, labels in common.items()},
-        {name: BOARD[name].dims for name in names},
-        tuple(faults),
-        # all numbers are dimensionless; what is not supported in one of them differs by its status
-        {name: np.maximum(1.0, np.abs(np.nan_to_num(baseline[name].values.astype(float)))) for name in names},
-    )
+    # all numbers are dimensionless; what is not supported in one of them differs by its status
+    scales = {name: np.maximum(1.0, np.abs(np.nan_to_num(baseline[name].values.astype(float)))) for name in names}
+    return align_studies(new, baseline, scales, faults)
 
 
 def version_notes(new: xr.Dataset, baseline: xr.Dataset) -> list[str]:

@@ -13,7 +13,7 @@ from ..formatting import safe_text
 from ..results.attributes import read_attribute
 from ..results.calibration import fit_status
 from ..results.schema import CALIBRATION
-from .align import AlignedResult, Alignment
+from .align import Alignment, align_studies
 from .verdict import Difference
 
 # coordinates along the measured values, which have to be equal
@@ -34,17 +34,8 @@ def align_calibrations(new: xr.Dataset, baseline: xr.Dataset, *, subset: bool) -
         faults.append(Difference("nothing in common", "", "the two have no law in common"))
     new, baseline = new.sel(model=common), baseline.sel(model=common)
     names = [name for name in CALIBRATION if name in new and name in baseline] if common and is_same_data else []
-    labels = {dim: baseline.variables[dim] for dim in baseline.dims if dim in baseline.coords}
-    coords = xr.Dataset(coords=xr.Coordinates(labels, indexes={}))
-    positions = {str(dim): np.arange(size) for dim, size in baseline.sizes.items()}
-    return Alignment(
-        AlignedResult(new, coords, positions),
-        AlignedResult(baseline, coords, positions),
-        {str(dim): size for dim, size in baseline.sizes.items()},
-        {name: CALIBRATION[name].dims for name in names},
-        tuple(faults),
-        {name: np.broadcast_to(_scale(name, baseline), baseline[name].shape) for name in names},
-    )
+    scales = {name: np.broadcast_to(_scale(name, baseline), baseline[name].shape) for name in names}
+    return align_studies(new, baseline, scales, faults)
 
 
 def common_laws(new: xr.Dataset, baseline: xr.Dataset) -> list[str]:
