@@ -51,13 +51,6 @@ class NoVerdict:
         return {"equal": None, "headline": self.headline, **names, "faults": [], "variables": [], "notes": []}
 
 
-def _failures(outcome: Verdict | NoVerdict) -> list[tuple[str, str]]:
-    """List what differs, each with the command that runs its worst point again."""
-    differing = (variable for variable in outcome.ranked if not variable.is_equal)
-    faults = [(fault.text, "") for fault in by_kind(outcome.faults)]
-    return [*faults, *((variable.text, outcome.replay(variable)) for variable in differing)]
-
-
 def as_junit(outcome: Verdict | NoVerdict) -> str:
     """Write JUnit XML: a suite with a test for each kind of difference and variable, named by what it claims."""
     tests = {
@@ -118,7 +111,8 @@ def as_markdown(outcome: Verdict | NoVerdict) -> str:
 
 def as_github(outcome: Verdict | NoVerdict) -> str:
     """Write a workflow command of GitHub Actions: an annotation on the baseline, with the worst differences."""
-    failures = _failures(outcome)
+    failures = [(fault.text, "") for fault in by_kind(outcome.faults)]
+    failures += [(variable.text, outcome.replay(variable)) for variable in outcome.ranked if not variable.is_equal]
     lines = [outcome.headline]
     for text, command in failures[:MAX_ANNOTATED]:
         lines += [text, command] if command and command not in lines else [text]
