@@ -355,26 +355,21 @@ def max_indexed_bytes() -> int:
 def lazy_dataset(template: xr.Dataset, table: TrajectoryTable, variables: Sequence[Variable]) -> xr.Dataset:
     """Build a result, from its coordinates and attributes, whose variables are computed when they are read."""
     axes = [axis.name for axis in table.inputs.axes]
-    computed = {}
+    along: dict[str, dict[str, set[int]]] = {v.name: {law.key: set() for law in table.laws} for v in variables}
     for of_friction in (False, True):
-        chosen = [variable for variable in variables if variable.of_friction == of_friction]
-        along: dict[str, dict[str, set[int]]] = {
-            variable.name: {law.key: set() for law in table.laws} for variable in chosen
-        }
-        for number in table.numbers(of_friction) if chosen else ():
-            for name, varying in varies_along(table, number, list(along)).items():
+        names = [variable.name for variable in variables if variable.of_friction == of_friction]
+        for number in table.numbers(of_friction) if names else ():
+            for name, varying in varies_along(table, number, names).items():
                 along[name][table.keys(number)[0]].update(varying)
-        for variable in chosen:
-            dims = [*(dim for dim in variable.dims if dim != AXES), *axes]
-            own = [dim for dim in variable.dims if dim == "friction"]
-            by_model = {
-                key: (*own, *(axes[axis] for axis in sorted(varying)))
-                for key, varying in along[variable.name].items()
-            }
-            array = indexing.LazilyIndexedArray(ExpandedArray(table, variable))
-            encoding = {VARIES_ALONG: by_model, ORIGINAL_DIMS: tuple(dims)}
-            computed[variable.name] = xr.Variable(dims, array, attributes_of(variable), encoding)
-    computed = {variable.name: computed[variable.name] for variable in variables}
+    computed = {}
+    for variable in variables:
+        dims = [*(dim for dim in variable.dims if dim != AXES), *axes]
+        own = [dim for dim in variable.dims if dim == "friction"]
+        varying_axes = {key: [axes[axis] for axis in sorted(by)] for key, by in along[variable.name].items()}
+        by_model = {key: (*own, *of_model) for key, of_model in varying_axes.items()}
+        array = indexing.LazilyIndexedArray(ExpandedArray(table, variable))
+        encoding = {VARIES_ALONG: by_model, ORIGINAL_DIMS: tuple(dims)}
+        computed[variable.name] = xr.Variable(dims, array, attributes_of(variable), encoding)
     dataset = template.drop_vars(list(template.data_vars)).assign(computed)
     for dim in map(str, dataset.dims):
         dataset = dataset if dim in dataset.xindexes else dataset.set_xindex(dim)
