@@ -27,7 +27,7 @@ from ..formatting import argument, percentage, prefixed, safe_text
 from .kinds import require_sweep
 from .replay_command import describe_point
 from .schema import columns_along, plain_unit
-from .selection import LawDim, as_keys, law_positions, require_outputs, select
+from .selection import as_keys, require_outputs, select, select_laws
 from .slabs import Slab, distinct_points, is_computed, over_varying_dims, slabs, varying_dims
 from .xarray_backend import result_of
 
@@ -356,13 +356,14 @@ def rankable_parts(
 ) -> list[xr.Dataset]:
     """Select the part of each law to rank; refuse a result that lacks a target or has too many points."""
     _check_rankable(dataset, criterion)
-    selected, places = select(dataset[list(criterion.names)], sel), [{"model": 0}]
-    wanted: dict[LawDim, object] = {"model": models, "friction": frictions}
-    for dim, keys in wanted.items():
-        if dim in selected.dims:
-            chosen = law_positions(keys, dataset, dim)
-            places = [place | {dim: position} for place in places for position in chosen]
-    parts = [_select_law(selected, place) for place in places]
+    selected = select_laws(select(dataset[list(criterion.names)], sel), models, frictions)
+    dims = [dim for dim in ("model", "friction") if dim in selected.dims]
+    parts = []
+    for place in np.ndindex(*(selected.sizes[dim] for dim in dims)):
+        part = selected.isel(dict(zip(dims, place, strict=True)))
+        # without the axes of other laws' parameters
+        foreign = [dim for dim in part.dims if is_foreign(columns_along(part, dim), *_keys(part))]
+        parts.append(part.isel(dict.fromkeys(foreign, 0)))
     evaluated = [
         _reduce_dims(part, criterion)[0] for part in parts if is_computed(part.variables[criterion.names[0]])
     ]
@@ -422,13 +423,6 @@ def _uses_e(dataset: xr.Dataset) -> bool:
     """Check whether any point has a target e."""
     e, _ = distinct_points(dataset, "e")
     return any(not np.isnan(e.isel(slab).values).all() for slab in slabs(e.sizes))
-
-
-def _select_law(dataset: xr.Dataset, place: Mapping[str, int]) -> xr.Dataset:
-    """Select a model of a result, or a pair, without the axes of other laws' parameters."""
-    keys = [str(dataset[dim].values[position]) for dim, position in place.items()]
-    foreign = [dim for dim in dataset.dims if is_foreign(columns_along(dataset, dim), *keys)]
-    return dataset.isel({**place, **dict.fromkeys(foreign, 0)})
 
 
 def _keys(law_data: xr.Dataset) -> tuple[str, str]:
