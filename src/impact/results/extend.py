@@ -205,14 +205,11 @@ def _extended_plan(
     for axis in config.axes:
         name = axis.name
         old_values = np.atleast_1d(old.inputs.values(name))
-        if old_values.item(0) is None:
-            # it had no value, such as an unknown property of a material
-            old_values = np.array([])
-        in_both = (
-            match_labels([np.asarray(axis.columns[name])], [old_values])[0] if old_values.size else old_values
-        )
-        has_all_old_values = len(in_both) == old_values.size
-        if len(axis.columns) == 1 and not axis.numbered and not has_all_old_values:
+        # an unknown property of a material has no value
+        if len(axis.columns) > 1 or axis.numbered or old_values.item(0) is None:
+            continue
+        in_both, _ = match_labels([np.asarray(axis.columns[name])], [old_values])
+        if len(in_both) < old_values.size:
             new_values = (value for value in axis.columns[name] if value not in old_values.tolist())
             values = [*old_values.tolist(), *new_values]
             added.append(override_text(InputName.parse(name).path, values))
@@ -247,14 +244,11 @@ def _check_changes(old: Plan, new: Plan, name: str) -> None:
     ]
     changed += [key for key in old.inputs.names() if key not in new.inputs.names()]
     changed += [key for key in swept if key not in old.inputs.names() and "." not in key]
-    moved = [
-        key
-        for key in old.inputs.scalars
-        if key in new.inputs.scalars and old.inputs.scalars[key] != new.inputs.scalars[key]
-    ]
-    if changed or moved:
+    scalars, new_scalars = old.inputs.scalars, new.inputs.scalars
+    changed += [key for key in scalars if key in new_scalars and scalars[key] != new_scalars[key]]
+    if changed:
         raise UsageError(
-            f"{name}: {argument('overrides')} changes {', '.join([*changed, *moved])}, expected more values of an "
+            f"{name}: {argument('overrides')} changes {', '.join(changed)}, expected more values of an "
             f"axis, such as {argument('overrides', ['sweep.m2=[1.0, 2.0]'])}, or more models"
         )
     if old.laws == new.laws and old.config.axes == new.config.axes:
@@ -414,17 +408,16 @@ class _OldPositions:
             inside = np.ix_(*(np.flatnonzero(positions >= 0) for positions in old_positions))
             if any(positions.size == 0 for positions in inside):
                 return
+            # in the order of the axes of this slab
             chosen: Mapping[Any, Any] = {
                 names[axis.axis]: positions[positions >= 0]
                 for axis, positions in zip(self.axes, old_positions, strict=True)
                 if axis.axis is not None
             }
-            # the order of the axes of the old result among those of this slab
-            order = [names[axis.axis] for axis in self.axes if axis.axis is not None]
             for name, array in slab.values.items():
                 if "model" not in before[name].dims:
                     continue
-                old_values = before[name].sel(of_law).isel(chosen).transpose(*order).values
+                old_values = before[name].sel(of_law).isel(chosen).transpose(*chosen).values
                 shape = tuple(positions.size for positions in inside)
                 if not array.flags.writeable:
                     # a view of computed values that was not copied
