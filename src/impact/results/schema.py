@@ -20,7 +20,6 @@ from .._version import __version__
 from ..array_types import Array
 from ..config.grid import SAMPLE
 from ..config.input_names import InputName, is_foreign, is_input
-from ..config.load import Config
 from ..config.tables import MATERIAL_KEYS
 from ..contact.fixed_step import EXACT
 from ..contact.materials import effective_mass
@@ -460,21 +459,10 @@ def _radius(inputs: Inputs, ball: str, index: Index) -> Array:
     return radius_at(inputs, ball, index, mass_at(inputs, ball, index))
 
 
-def design_record(config: Config) -> dict[str, object]:
-    """Record the method, number and seed of the samples of a config, and the distributions by config name."""
-    assert config.design is not None
-    return config.design.model_dump() | {
-        "distributions": {
-            name: {distribution.kind: list(distribution.parameters)}
-            for name, distribution in config.distributions.items()
-        }
-    }
-
-
 def provenance_attributes(plan: Plan) -> dict[str, object]:
     """List the attributes from which a result can be repeated."""
     config = plan.config
-    return {
+    attributes: dict[str, object] = {
         "title": config.title,
         "schema_version": SCHEMA_VERSION,
         "config": config.text,
@@ -489,5 +477,8 @@ def provenance_attributes(plan: Plan) -> dict[str, object]:
         "packages": json.dumps({name: version(name) for name in RECORDED_PACKAGES}),
         "plugins": json.dumps(plan.plugins.record),
         "materials": json.dumps(plan.material_record),
-        **({} if config.design is None else {"design": json.dumps(design_record(config))}),
     }
+    if config.design is not None:
+        distributions = {name: {drawn.kind: drawn.parameters} for name, drawn in config.distributions.items()}
+        attributes["design"] = json.dumps(config.design.model_dump() | {"distributions": distributions})
+    return attributes
