@@ -43,7 +43,6 @@ from ..contact.materials import Material
 from ..contact.model import ForceModel, with_base_quantities
 from ..contact.models import find
 from ..contact.output_formulas import collide
-from ..contact.rigid import ObliqueImpacts
 from ..contact.simulate import RecordedMotion
 from ..contact.status import FIRST_FAILURE, FrictionStatus, Status
 from ..contact.units import with_numbers
@@ -404,7 +403,8 @@ def run_single_impact(plan: Plan, first: tuple[str, ...], times: int | None = No
         point["e"] = impacts.e[0].item()
     derived = _derived_quantities(law, impacts, values, history)
     if oblique:
-        derived |= _oblique_quantities(oblique[1])
+        tangential = {name: getattr(oblique[1], name).item() for name in ("u1", "slip", "m_t")}
+        derived |= {"v1": impacts.v1.item(), **tangential}
     return Impact(
         model=law,
         point=point,
@@ -423,12 +423,6 @@ def run_single_impact(plan: Plan, first: tuple[str, ...], times: int | None = No
         friction=config.frictions[0] if config.frictions else None,
         rtol=solver.rtol,
     )
-
-
-def _oblique_quantities(oblique: ObliqueImpacts) -> dict[str, float]:
-    """Compute OBLIQUE_QUANTITIES."""
-    values = {"v1": oblique.impacts.v1, "u1": oblique.u1, "slip": oblique.slip, "m_t": oblique.m_t}
-    return {name: value.item() for name, value in values.items()}
 
 
 def _derived_quantities(
