@@ -58,6 +58,7 @@ def tap(visit: Callable[..., Any]) -> None:
     Paths are relative to the working directory. For a write `visit` also gets the offset and the bytes, and
     `do(part)` writes a part of them.
     """
+    from impact.atomic import Sink
 
     def relative_path(path: Any) -> str:
         absolute = os.readlink(f"/proc/self/fd/{path}") if isinstance(path, int) else os.path.abspath(path)
@@ -81,19 +82,19 @@ def tap(visit: Callable[..., Any]) -> None:
 
     class RecordedFileIO(io.FileIO):
         def __init__(self, path: Any, mode: str) -> None:
-            visit(lambda: io_file.__init__(self, path, mode), "create", relative_path(path))
+            visit(lambda: io.FileIO.__init__(self, path, mode), "create", relative_path(path))
 
         def write(self, content: Any, /) -> int:
             content_bytes = bytes(content)
-            do = lambda part=content_bytes: io_file.write(self, part)  # noqa: E731
+            do = lambda part=content_bytes: io.FileIO.write(self, part)  # noqa: E731
             return int(visit(do, "write", relative_path(self.fileno()), self.tell(), content_bytes))
 
         def truncate(self, size: int | None = None, /) -> int:
             size = self.tell() if size is None else size
-            return int(visit(lambda: io_file.truncate(self, size), "truncate", relative_path(self.fileno()), size))
+            do = lambda: io.FileIO.truncate(self, size)  # noqa: E731
+            return int(visit(do, "truncate", relative_path(self.fileno()), size))
 
-    io_file = io.FileIO
-    io.FileIO = RecordedFileIO  # type: ignore[misc]
+    Sink.__bases__ = (RecordedFileIO,)
 
 
 def send_signals(log_fd: int, operation: int | list[str], *numbers: int) -> None:

@@ -38,41 +38,23 @@ UNSYNCABLE_ERRNOS = {
 MIN_STALE_S = 60.0
 
 
-class Sink(io.RawIOBase):
-    """A file that records the first I/O error instead of raising it; `check` and `sync` raise it.
+class Sink(io.FileIO):
+    """A new file that records the first I/O error instead of raising it; `check` and `sync` raise it.
 
     HDF5 on a full disk may report success, or crash the process at its end. So writes always report success here,
     and after the first error nothing more is written.
     """
 
-    def __init__(self, path: Path, mode: str) -> None:
-        self._file = io.FileIO(path, mode)
+    def __init__(self, path: Path) -> None:
+        super().__init__(path, "x+")
         self.error: BaseException | None = None
-
-    def readable(self) -> bool:
-        return True
-
-    def writable(self) -> bool:
-        return True
-
-    def seekable(self) -> bool:
-        return True
-
-    def seek(self, offset: int, whence: int = os.SEEK_SET, /) -> int:
-        return self._file.seek(offset, whence)
-
-    def tell(self) -> int:
-        return self._file.tell()
-
-    def readinto(self, buffer: Any, /) -> int:
-        return self._file.readinto(buffer) or 0
 
     def write(self, content: Any, /) -> int:
         remaining = memoryview(content).cast("B")
         # a system call may write only a part
         while self.error is None and remaining:
             try:
-                remaining = remaining[self._file.write(remaining) :]
+                remaining = remaining[super().write(remaining) :]
             except BaseException as error:
                 self.error = error
         return memoryview(content).nbytes
@@ -80,7 +62,7 @@ class Sink(io.RawIOBase):
     def truncate(self, size: int | None = None, /) -> int:
         try:
             if self.error is None:
-                self._file.truncate(size)
+                super().truncate(size)
         except BaseException as error:
             self.error = error
         return size or 0
@@ -96,7 +78,7 @@ class Sink(io.RawIOBase):
             return
         if not stat.S_ISREG(replaced.st_mode):
             return
-        descriptor = self._file.fileno()
+        descriptor = self.fileno()
         # a file system without owners or permissions must not prevent the output, nor Windows
         for uid, gid in ((-1, replaced.st_gid), (replaced.st_uid, -1)):
             with contextlib.suppress(OSError, AttributeError):
@@ -107,7 +89,7 @@ class Sink(io.RawIOBase):
     def lock(self) -> None:
         """Mark the file as in use until `finish` or the end of the process, where files can be locked."""
         with contextlib.suppress(OSError, AttributeError):
-            fcntl.flock(self._file.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
+            fcntl.flock(self.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
 
     def sync(self) -> None:
         """Flush everything to the disk.
@@ -117,22 +99,18 @@ class Sink(io.RawIOBase):
         OSError : this write or an earlier one failed
         """
         self.check()
-        os.fsync(self._file.fileno())
+        os.fsync(self.fileno())
 
     def finish(self) -> None:
         """Close the file, as Windows needs to rename it; a recent time of change protects it until then."""
         with contextlib.suppress(OSError, TypeError):
-            os.utime(self._file.fileno())
+            os.utime(self.fileno())
         self.close()
 
     def check(self) -> None:
         """Raise the first error, if any."""
         if self.error is not None:
             raise self.error
-
-    def close(self) -> None:
-        self._file.close()
-        super().close()
 
 
 @contextlib.contextmanager
@@ -159,7 +137,7 @@ def atomic_write(path: Path, *, overwrite: bool, part: Path | None = None) -> It
         else:
             # a file left under this name may be a link, or a hard link to a complete result
             part.unlink(missing_ok=True)
-        sink = Sink(part, "x+")
+        sink = Sink(part)
         try:
             if overwrite:
                 sink.inherit(path)
