@@ -1,11 +1,12 @@
 """Shell completion of the values of options: model keys, config keys, inputs, axes and outputs.
 
-A completion must not fail: where nothing is known, such as the axes of a file that does not exist, it is empty.
+Each function lists all words, of which typer shows those that begin with what was typed. A completion must not
+fail: where nothing is known, such as the axes of a file that does not exist, it is empty.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from contextlib import suppress
 from importlib import import_module
 from typing import Any
@@ -15,23 +16,18 @@ import typer
 import impact
 
 
-def complete_model(incomplete: str) -> list[str]:
+def complete_model() -> list[str]:
     """The keys of models, of those in installed packages too."""
-    return _beginning_with(incomplete, _models())
+    return list(_models())
 
 
-def complete_friction(incomplete: str) -> list[str]:
-    return _beginning_with(incomplete, impact.frictions())
+def complete_friction() -> list[str]:
+    return list(impact.frictions())
 
 
-def complete_key_of(module: str, table: str, suffix: str = "") -> Callable[[str], list[str]]:
+def complete_key_of(module: str, table: str, suffix: str = "") -> Callable[[], list[str]]:
     """Make the completion of the keys of a table with a suffix; its module is imported when one is completed."""
-
-    def complete(incomplete: str) -> list[str]:
-        keys = getattr(import_module(f"impact.{module}"), table)
-        return [f"{key}{suffix}" for key in _beginning_with(incomplete, keys)]
-
-    return complete
+    return lambda: [f"{key}{suffix}" for key in getattr(import_module(f"impact.{module}"), table)]
 
 
 complete_family = complete_key_of("contact.models", "FAMILIES")
@@ -43,46 +39,41 @@ complete_output = complete_key_of("contact.variables", "OUTPUTS")
 complete_target = complete_key_of("contact.variables", "OUTPUTS", "=")
 
 
-def complete_input(context: typer.Context, incomplete: str) -> list[str]:
+def complete_input(context: typer.Context) -> list[str]:
     """`NAME=` of the inputs, and of the parameters of the model of --model."""
     from ..config.input_names import SWEEP_INPUTS
 
-    return _beginning_with(incomplete, [f"{name}=" for name in (*SWEEP_INPUTS, *_parameters(context))])
+    return [f"{name}=" for name in (*SWEEP_INPUTS, *_parameters(context))]
 
 
-def complete_unknown(context: typer.Context, incomplete: str) -> list[str]:
+def complete_unknown(context: typer.Context) -> list[str]:
     """What `impact solve` solves for: the parameters of the model and of the friction law, K, e and mu."""
-    return _beginning_with(incomplete, [*_parameters(context), "K", "e", "mu"])
+    return [*_parameters(context), "K", "e", "mu"]
 
 
-def complete_axis(context: typer.Context, incomplete: str) -> list[str]:
+def complete_axis(context: typer.Context) -> list[str]:
     """The axes of the result that the command line names."""
     from ..errors import ImpactError
 
     # an option without its value yet leaves the arguments unparsed
     for path in filter(None, (context.params.get("result"), *context.args)):
         with suppress(OSError, ImpactError):
-            axes = [str(name) for name in impact.load(path).dims if name not in ("model", "friction")]
-            return _beginning_with(incomplete, axes)
+            return [str(name) for name in impact.load(path).dims if name not in ("model", "friction")]
     return []
 
 
-def complete_selection(context: typer.Context, incomplete: str) -> list[str]:
+def complete_selection(context: typer.Context) -> list[str]:
     """`NAME=` of the axes of the result that the command line names."""
-    return [f"{name}=" for name in complete_axis(context, incomplete)]
+    return [f"{name}=" for name in complete_axis(context)]
 
 
-def complete_setting(incomplete: str) -> list[str]:
+def complete_setting() -> list[str]:
     """`TABLE.KEY=` of the keys of a config."""
     from ..config.lines import KEYS_BY_TABLE
 
     keys = ["title", "models", "frictions"]
     keys += [f"{table}.{key}" for table, names in KEYS_BY_TABLE.items() for key in names]
-    return _beginning_with(incomplete, [*(f"{key}=" for key in keys), "materials.", "model.", "friction."])
-
-
-def _beginning_with(incomplete: str, words: Iterable[str]) -> list[str]:
-    return [word for word in words if word.startswith(incomplete)]
+    return [*(f"{key}=" for key in keys), "materials.", "model.", "friction."]
 
 
 def _models() -> dict[str, Any]:
