@@ -11,17 +11,11 @@ from .tables import MATERIAL_QUANTITIES
 
 
 @cache
-def records() -> Mapping[str, Mapping[str, float | str]]:
-    """Read the materials of `materials.toml`, with their sources, by name."""
-    return tomllib.loads((files("impact") / "config" / "materials.toml").read_text(encoding="utf-8"))
-
-
-@cache
 def library() -> Mapping[str, Mapping[str, float | str]]:
     """List the materials as tables of a config, without sources."""
     return {
         name: {key: value for key, value in record.items() if key in MATERIAL_QUANTITIES}
-        for name, record in records().items()
+        for name, record in materials().items()
     }
 
 
@@ -35,4 +29,4 @@ def materials() -> dict[str, dict[str, float | str]]:
     >>> materials()["glass"]["E"]
     72000000000.0
     """
-    return {name: dict(record) for name, record in records().items()}
+    return tomllib.loads((files("impact") / "config" / "materials.toml").read_text(encoding="utf-8"))
