@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import json
 import re
+import tomllib
 from collections.abc import Iterable, Mapping
 
 from pydantic import ValidationError
@@ -155,15 +155,10 @@ class _KeyScanner:
 
 def _unquoted(token: str) -> str:
     """Remove the quotes and escapes of a part of a key."""
-    if token.startswith("'"):
-        return token[1:-1]
-    if not token.startswith('"'):
+    if not token.startswith(("'", '"')):
         return token
-    try:
-        # the escapes of TOML are those of JSON and \UXXXXXXXX
-        return str(json.loads(token))
-    except ValueError:
-        return token[1:-1]
+    (part,) = tomllib.loads(f"{token} = 0")
+    return part
 
 
 def validation_problems(error: ValidationError, models: Mapping[str, ForceModel]) -> Iterable[ConfigProblem]:
