@@ -35,15 +35,6 @@ def parse_setting(word: str, example: str = "m2=1.0") -> NamedValue:
         return NamedValue(name, value)
 
 
-def parse_target(word: str) -> NamedValue:
-    """Parse NAME=VALUE, where a text is a number with a unit, which the command reads.
-
-    >>> parse_target("e_out=0.6"), parse_target("rebound_angle=30 deg")
-    (NamedValue(name='e_out', value=0.6), NamedValue(name='rebound_angle', value='30 deg'))
-    """
-    return parse_setting(word, "e_out=0.6")
-
-
 def parse_range(word: str) -> NamedValue:
     """Parse NAME=FIRST:LAST:COUNT, evenly spaced values, or NAME=VALUES with a TOML list or range.
 
@@ -161,8 +152,8 @@ def tolerance(metavar: str, help: str) -> Any:
 
 
 def target(help: str) -> Any:
-    """Declare the option for the wanted output."""
-    return value("NAME=VALUE", help, completion.complete_target, parse_target)
+    """Declare the option for the wanted output; its value may be a number with a unit, which the command reads."""
+    return value("NAME=VALUE", help, completion.complete_target, lambda word: parse_setting(word, "e_out=0.6"))
 
 
 def model(help: str) -> Any:
