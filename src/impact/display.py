@@ -179,10 +179,10 @@ def resolve_decimal(decimal: str) -> str:
         locale.setlocale(locale.LC_NUMERIC, before)
 
 
-def check_table(path: Path, name: str) -> None:
-    """Check the suffix of a table that an argument names."""
-    if path.suffix.lower() not in TABLE_SUFFIXES:
-        *most, last = TABLE_SUFFIXES
+def check_suffix(path: Path, name: str, suffixes: Sequence[str] = TABLE_SUFFIXES) -> None:
+    """Check the suffix of a file, by default a table, that an argument names."""
+    if path.suffix.lower() not in suffixes:
+        *most, last = suffixes
         raise UsageError(f"{argument(name, path)}: expected a name that ends in {', '.join(most)} or {last}")
 
 
@@ -228,7 +228,7 @@ def check_table_output(path: Path | None, form: TableForm, *, overwrite: bool) -
     """Check, before any work, the file of the option for a table, and its form."""
     form.check_used(path, "output")
     if path is not None:
-        check_table(path, "output")
+        check_suffix(path, "output")
         check_output(path, overwrite=overwrite)
 
 

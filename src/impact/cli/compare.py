@@ -11,7 +11,7 @@ import typer
 
 import impact
 
-from ..atomic import check_output
+from ..atomic import check_outputs
 from ..display import dump, show
 from ..errors import ImpactError, UsageError
 from . import exits, options
@@ -127,8 +127,7 @@ def _check_plot(plot: Path | None, *sources: Path) -> None:
         from ..plots.style import check_picture
 
         check_picture(plot)
-        for source in sources:
-            check_output(plot, overwrite=True, source=source)
+        check_outputs([plot], sources, overwrite=True)
 
 
 def _report_verdict(verdict: Verdict, format: Format, plot: Path | None) -> None:

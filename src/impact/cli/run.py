@@ -9,8 +9,8 @@ import typer
 
 import impact
 
-from ..atomic import check_output, write_file
-from ..display import show
+from ..atomic import check_outputs, write_file
+from ..display import check_suffix, show
 from ..errors import UsageError
 from . import exits, options
 
@@ -41,12 +41,8 @@ def run(
     if times is not None and history is None:
         raise UsageError(f"--times {times}: expected --history FILE as well")
     if history is not None:
-        for path in (source, *(plugins or ())):
-            check_output(history, overwrite=overwrite, source=path)
-        if history.suffix.lower() not in HISTORY_SUFFIXES:
-            *most, last = HISTORY_SUFFIXES
-            expected = f"expected a name that ends in {', '.join(most)} or {last}"
-            raise UsageError(f"--history {history}: {expected}")
+        check_outputs([history], (source, *(plugins or ())), overwrite=overwrite)
+        check_suffix(history, "history", HISTORY_SUFFIXES)
     result = impact.run(
         source,
         model=model,

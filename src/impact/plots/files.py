@@ -11,7 +11,7 @@ import xarray as xr
 
 from ..atomic import check_outputs, write_file
 from ..contact.model import ForceModel
-from ..display import TableForm, check_table
+from ..display import TableForm, check_suffix
 from ..errors import UsageError
 from ..formatting import argument
 from ..results.xarray_backend import load
@@ -110,7 +110,7 @@ def plot_to_files(
     # the decimal separator is that of the picture too
     replace(table_form, decimal="point").check_used(table, "data")
     if table is not None:
-        check_table(table, "data")
+        check_suffix(table, "data")
         check_data_form(data_form)
     # the default kind depends on the result, which is read after the paths are checked
     targets = [_with_kind(path, kind, kinds) for path in (output, table) if path for kind in kinds or [""]]
