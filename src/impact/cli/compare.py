@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import sys
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -22,16 +21,8 @@ if TYPE_CHECKING:
     from ..comparison.verdict import Verdict
 
 
-class Format(StrEnum):
-    """The formats of a verdict on stdout."""
-
-    table = "table"
-    json = "json"
-    junit = "junit"
-    markdown = "markdown"
-    github = "github"
-
-
+# the formats of a verdict on stdout
+Format = Literal["table", "json", "junit", "markdown", "github"]
 NewArgument = Annotated[Path, typer.Argument(help="The new result.")]
 BaselineArgument = Annotated[Path, typer.Argument(help="The result to compare with.")]
 SubsetOption = Annotated[
@@ -46,7 +37,7 @@ def compare(
     baseline: BaselineArgument,
     tol: options.Tolerance = None,
     subset: SubsetOption = False,
-    format: FormatOption = Format.table,
+    format: FormatOption = "table",
     plot: PlotOption = None,
 ) -> None:
     """Compare a result with a baseline: exit 0 if equal, 1 if not (the first line says why), 2 on an error."""
@@ -96,7 +87,7 @@ def rerun(
     tol: options.Tolerance = None,
     subset: SubsetOption = False,
     max_points: options.MaxPoints = 10**9,
-    format: FormatOption = Format.table,
+    format: FormatOption = "table",
     plot: PlotOption = None,
     quiet: options.Quiet = False,
 ) -> None:
@@ -133,7 +124,7 @@ def _check_plot(plot: Path | None, *sources: Path) -> None:
 def _report_verdict(verdict: Verdict, format: Format, plot: Path | None) -> None:
     """Print a verdict, draw it, and exit with its code."""
     with exits.ignore_broken_pipe():
-        if format is Format.table:
+        if format == "table":
             show(verdict)
         else:
             _print_outcome(verdict, format)
@@ -154,11 +145,11 @@ def _print_outcome(outcome: Verdict | NoVerdict, format: Format) -> None:
     from ..comparison import formats
 
     match format:
-        case Format.json:
+        case "json":
             print(dump(outcome.as_dict()))
-        case Format.junit:
+        case "junit":
             print(formats.as_junit(outcome))
-        case Format.markdown:
+        case "markdown":
             print(formats.as_markdown(outcome), end="")
-        case Format.github:
+        case "github":
             print(formats.as_github(outcome))
