@@ -83,10 +83,13 @@ def build_grid(
     Unless every point is stored (`in_full`), the number of trajectories is limited later.
     """
     cases = [str(InputName.of_path(path)) for path in draft.cases]
-    axis_sizes = {name: _axis_size(value) for name, value in values.items()}
+    sizes = {name: value.size for name, value in values.items() if isinstance(value, Range)}
+    sizes |= {name: len(value) for name, value in values.items() if isinstance(value, tuple)}
     scalars = {name: value for name, value in values.items() if isinstance(value, float | str)}
-    together = dict.fromkeys(cases, "a column of cases") | dict.fromkeys(samples, "an uncertain input")
-    member_of, problems = _zip_groups(groups, axis_sizes, together, draft.input_names)
+    refused = dict.fromkeys(scalars, "which is a scalar, expected an axis: a list or a range")
+    refused |= dict.fromkeys(cases, "a column of cases; those vary together already")
+    refused |= dict.fromkeys(samples, "an uncertain input; those vary together already")
+    member_of, problems = _zip_groups(groups, sizes, refused, draft.input_names)
     # parameters of laws, and properties of materials, that are not selected have no values here
     member_of = {name: [other for other in group if other in values] for name, group in member_of.items()}
     for numbered in (cases, samples):
@@ -96,7 +99,7 @@ def build_grid(
     # a group takes the position of its first member
     leaders = [name for name in axis_names if member_of.get(name, (name,))[0] == name]
     laws = len(draft.models) * max(1, len(draft.frictions))
-    points = math.prod(axis_sizes[name] or 1 for name in leaders) * laws
+    points = math.prod(sizes.get(name, 1) for name in leaders) * laws
     most_axes = MAX_AXES - bool(draft.frictions)
     if len(leaders) > most_axes:
         problems.append((("sweep",), f"got {len(leaders)} axes, expected at most {most_axes}"))
@@ -127,16 +130,6 @@ def build_grid(
     groups = [member_of.get(name, (name,)) for name in leaders]
     is_complete = not problems and all(name in columns for group in groups for name in group)
     return Grid(scalars, _build_axes(groups, columns, cases, samples) if is_complete else (), tuple(problems))
-
-
-def _axis_size(value: Numbers | Names) -> int | None:
-    """Count the values of an axis; None for a scalar."""
-    match value:
-        case tuple():
-            return len(value)
-        case Range():
-            return value.size
-    return None
 
 
 def _build_axes(
@@ -183,11 +176,11 @@ def chunk_problems(
 
 def _zip_groups(
     groups: Sequence[Sequence[str]],
-    sizes: Mapping[str, int | None],
-    together: Mapping[str, str],
+    sizes: Mapping[str, int],
+    refused: Mapping[str, str],
     config_names: Sequence[str],
 ) -> tuple[dict[str, Sequence[str]], list[ConfigProblem]]:
-    """Find the group of each zipped name; `sizes` has None for scalars, `together` what other names vary with."""
+    """Find the group of each zipped name; `sizes` has the axes, and `refused` what is wrong with other names."""
     member_of: dict[str, Sequence[str]] = {}
     problems: list[ConfigProblem] = []
     for group_index, group in enumerate(groups[:MAX_PROBLEMS]):
@@ -195,20 +188,16 @@ def _zip_groups(
         names = [str(InputName.parse(name)) for name in group[:MAX_PROBLEMS]]
         for member_index, name in enumerate(names):
             path = ("sweep", "zip", group_index, member_index)
-            size = sizes.get(name)
             if name not in config_names:
-                axes = [key for key in config_names if sizes.get(key) is not None]
+                axes = [key for key in config_names if key in sizes]
                 suggestion = did_you_mean(name, axes or list(config_names))
                 problems.append((path, f"got {as_text(name)}, expected an axis; {suggestion}"))
             elif name in member_of:
                 problems.append((path, f"got {as_text(name)} twice, expected each name once"))
-            elif name in together:
-                problems.append((path, f"got {as_text(name)}, {together[name]}; those vary together already"))
-            elif name in sizes and size is None:
-                message = f"got {as_text(name)}, which is a scalar, expected an axis: a list or a range"
-                problems.append((path, message))
-            elif size is not None:
-                lengths[name] = size
+            elif name in refused:
+                problems.append((path, f"got {as_text(name)}, {refused[name]}"))
+            elif name in sizes:
+                lengths[name] = sizes[name]
             member_of.setdefault(name, names)
         if len(set(lengths.values())) > 1:
             of_each = ", ".join(f"{name} of {size}" for name, size in lengths.items())
