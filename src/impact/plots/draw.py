@@ -166,7 +166,9 @@ def draw(
 ) -> Figure:
     """Draw a picture, in a new figure or into the user's axes."""
     check_labels(look.labels or {}, label_keys(plot_data, look))
-    all_axes = [] if ax is None else _check_axes(ax, plot_data.panel_count)
+    all_axes: list[Axes] = [] if ax is None else list(np.ravel(np.asarray(ax, object)))
+    if ax is not None and len(all_axes) != plot_data.panel_count:
+        raise UsageError(f"ax: got {len(all_axes)} axes, expected {plot_data.panel_count}, one for each panel")
     if all_axes and look.legend is None:
         look = replace(look, legend=_legend_for(all_axes[0], plot_data, look))
     labels = _labels(plot_data, look)
@@ -258,11 +260,3 @@ def _draw_panels(
         for axis in (axes.xaxis, axes.yaxis):
             axis.set_major_formatter(FuncFormatter(partial(tick_with_comma, axis.get_major_formatter())))
     return [(artist, with_comma(name)) for artist, name in entries]
-
-
-def _check_axes(ax: Axes | Sequence[Axes], count: int) -> list[Axes]:
-    """Check that the user's axes are one for each panel."""
-    all_axes = list(np.ravel(np.asarray(ax, object)))
-    if len(all_axes) != count:
-        raise UsageError(f"ax: got {len(all_axes)} axes, expected {count}, one for each panel")
-    return all_axes
