@@ -16,8 +16,8 @@ from ..config.quantities import Quantity
 from ..config.tables import LABORATORY, STANDARD_GRAVITY, SWEEP_QUANTITIES
 from ..contact.variables import HISTORY, OUTPUTS
 from ..display import TableForm, encode_frame
-from ..errors import ConfigError, UsageError, warn
-from ..formatting import argument, heading, safe_text
+from ..errors import ConfigError, warn
+from ..formatting import heading, safe_text
 from ..results.schema import plain_unit
 
 if TYPE_CHECKING:
@@ -27,8 +27,6 @@ if TYPE_CHECKING:
 
 # handles and names of a legend
 LegendEntries: TypeAlias = "list[tuple[Artist, str]]"
-# forms of a table
-TABLE_FORMS = ("wide", "long")
 MEASURED = "Measured"
 
 
@@ -69,12 +67,6 @@ class PlotData(Protocol):
 
     def draw(self, all_axes: Sequence[Axes], labels: Mapping[str, str], points: Points | None) -> LegendEntries:
         """Draw the panels, with labels that replace those of names; returns handles and names of the legend."""
-
-
-def check_data_form(form: str) -> None:
-    """Check the form of a table."""
-    if form not in TABLE_FORMS:
-        raise UsageError(f"{argument('data_form')}: got {form}, expected {' or '.join(TABLE_FORMS)}")
 
 
 def encode_table(

@@ -15,7 +15,7 @@ from ..display import TableForm, check_suffix
 from ..errors import UsageError
 from ..formatting import argument
 from ..results.xarray_backend import load
-from .data import PlotData, check_data_form, encode_table, read_points
+from .data import PlotData, encode_table, read_points
 from .draw import check_log, draw, get_plot_data, label_keys
 from .kinds import Choice, Look, check_choice, check_kind, default_kind, find_kind
 from .labels import check_labels
@@ -111,7 +111,8 @@ def plot_to_files(
     replace(table_form, decimal="point").check_used(table, "data")
     if table is not None:
         check_suffix(table, "data")
-        check_data_form(data_form)
+        if data_form not in ("wide", "long"):
+            raise UsageError(f"{argument('data_form')}: got {data_form}, expected wide or long")
     # the default kind depends on the result, which is read after the paths are checked
     targets = [_with_kind(path, kind, kinds) for path in (output, table) if path for kind in kinds or [""]]
     check_outputs(targets, [result, points], overwrite=overwrite)
