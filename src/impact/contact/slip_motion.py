@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from ..array_types import Array, Mask
 from ..ode.problem import Margins, Params, Problem
 from . import motion
-from .formula_calls import Formula, call_by_name
+from .formula_calls import Formula, argument_names, call_by_name
 from .piecewise import Breakpoint
 from .velocity_coordinates import signed_power
 
@@ -264,10 +264,10 @@ class SlipPhase:
     form : of the tangential problems
     law : of the normal motion
     normal : the normal problem of the phase
-    first : number of the first of the `Columns` among the params
+    first : number of the first of the `Columns` among the params; the arguments of `TangentialForm.coefficient`
+        follow them, with y over Gamma
     memory : r in this phase
     track : of all trajectories
-    arguments : names of the params after the columns, besides y over Gamma: those of `TangentialForm.coefficient`
     breakpoints : of the normal force, whose sides are the last params
     """
 
@@ -277,7 +277,6 @@ class SlipPhase:
     first: int
     memory: float
     track: Track
-    arguments: tuple[str, ...] = ()
     breakpoints: Sequence[Breakpoint] = ()
 
     @property
@@ -294,10 +293,6 @@ class SlipPhase:
     def end(self) -> float:
         """The s that belongs to END_X."""
         return float(END_X ** (1.0 / self.law.model.coordinate_power))
-
-    @property
-    def has_spring(self) -> bool:
-        return self.form.kind == "spring"
 
     def columns(self, params: Params) -> Columns:
         return Columns(*params[self.first : self.first + len(Columns._fields)])
@@ -331,7 +326,7 @@ class SlipPhase:
         phi = slip_spring = columns.limit * force
         if form.coefficient is not None:
             phi = phi * self._coefficient(slip, params)
-        if self.has_spring:
+        if self.form.kind == "spring":
             spring_force = self._times(columns.spring * y[SPRING_ROW], s, self.memory * self.stiffness_power)
             phi = phi + spring_force
             np.multiply(columns.spring, slip, out[SPRING_ROW])
@@ -371,7 +366,7 @@ class SlipPhase:
         """Compute the coefficient of friction over mu, with the sign of the slip."""
         assert self.form.coefficient is not None
         first = self.first + len(Columns._fields)
-        arguments = dict(zip(("y", *self.arguments), params[first:], strict=False))
+        arguments = dict(zip(argument_names(self.form.coefficient), params[first:], strict=False))
         arguments["y"] = arguments["y"] * np.abs(slip)
         return np.asarray(np.sign(slip) * call_by_name(self.form.coefficient, arguments))
 
@@ -436,7 +431,7 @@ class SlipPhase:
     ) -> Array:
         """Compute the rate of the trial force if the contact sticks, at a force phi and one of the spring."""
         form, s, slip, rate = self.form, y[0], y[SLIP_ROW], NO_FORCE
-        if self.has_spring:
+        if self.form.kind == "spring":
             rate = self._times(columns.root * columns.root * local.weight * slip, s, self.stiffness_power)
             if self.memory and self.stiffness_power:
                 rate = rate + self.memory * self.stiffness_power * k[0] / _away_from_zero(s) * spring_force

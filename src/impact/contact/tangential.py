@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -148,14 +147,20 @@ def _simulate_distinct(
     model = _smooth_model(pair.model, form)
     law_values = with_coefficients(model, with_units(values, n), count)
     status = simulate.check_coefficients(model, law_values, values, count)
-    given = _tangential_columns(form, values, count)
-    status[(status == STATUS_OK) & given.is_invalid] = Status.OUT_OF_RANGE
-    names = _coefficient_arguments(form)
-    coefficient = (
-        (values[SLIP_SCALE] * given.slip, *(values[PREFIX + name] for name in names)) if form.coefficient else ()
+    slip = np.ones(count) if form.kind == "coulomb" else np.abs(values[SLIP])
+    stiffness, damping, is_positive = (
+        values.get(name, np.zeros(count)) for name in (TANGENTIAL_STIFFNESS, TANGENTIAL_DAMPING, LIMIT_POSITIVE)
     )
-    columns = (*given, *coefficient)
-    chosen = (status == STATUS_OK) & ~given.is_trivial
+    # without friction the slip is infinite in units of it
+    has_friction = (slip != 0.0) & np.isfinite(slip)
+    is_invalid = has_friction & ~(np.isfinite(stiffness) & np.isfinite(damping))
+    status[(status == STATUS_OK) & is_invalid] = Status.OUT_OF_RANGE
+    coefficient = (
+        values[SLIP_SCALE] * slip if name == "y" else values[PREFIX + name]
+        for name in argument_names(form.coefficient)
+    )
+    columns = (slip, stiffness, damping, is_positive, *coefficient)
+    chosen = (status == STATUS_OK) & has_friction
     exact = exact_restitution(model, law_values, count)
     parts = []
     for problems in simulate.distinct_problems(model, n, law_values, chosen, collapse, columns):
@@ -170,36 +175,6 @@ def _simulate_distinct(
     return result
 
 
-class TangentialColumns(NamedTuple):
-    """The values of tangential problems, shape (n,): abs(G0), k' and c', and whether the limit is positive."""
-
-    slip: Array
-    stiffness: Array
-    damping: Array
-    is_positive: Array
-
-    @property
-    def is_trivial(self) -> Mask:
-        """Whether there is no slip, or no friction."""
-        return np.asarray((self.slip == 0.0) | ~np.isfinite(self.slip))
-
-    @property
-    def is_invalid(self) -> Mask:
-        """Whether a value that the slip needs is not finite."""
-        return ~self.is_trivial & ~(np.isfinite(self.stiffness) & np.isfinite(self.damping))
-
-
-def _tangential_columns(form: TangentialForm, values: simulate.ValueArrays, count: int) -> TangentialColumns:
-    """Find the values of tangential problems among those of impacts; zero where the form has none."""
-    zero = np.zeros(count)
-    return TangentialColumns(
-        np.ones(count) if form.kind == "coulomb" else np.abs(values[SLIP]),
-        values[TANGENTIAL_STIFFNESS] if form.kind == "spring" else zero,
-        values.get(TANGENTIAL_DAMPING, zero) if form.kind in ("spring", "dashpot", "cone") else zero,
-        values.get(LIMIT_POSITIVE, zero),
-    )
-
-
 def _slip_at_fixed_steps(
     pair: Pair,
     n: float,
@@ -212,8 +187,9 @@ def _slip_at_fixed_steps(
     collapse: bool,
 ) -> TangentialResult:
     """Integrate slips at a fixed step; those without slip or friction as contacts without slip."""
-    form, given = pair.form(n), _tangential_columns(pair.form(n), values, count)
+    form = pair.form(n)
     slip = FixedStepSlip.of(form, values, count)
+    is_invalid = (slip.slip != 0.0) & ~(np.isfinite(slip.stiffness) & np.isfinite(slip.damping))
     collisions = simulate.collide_at_fixed_steps(
         pair.model,
         n,
@@ -225,7 +201,7 @@ def _slip_at_fixed_steps(
         max_steps=max_steps,
         slip=slip,
     )
-    status = np.where(given.is_invalid & (collisions.status == STATUS_OK), Status.OUT_OF_RANGE, collisions.status)
+    status = np.where(is_invalid & (collisions.status == STATUS_OK), Status.OUT_OF_RANGE, collisions.status)
     has_answer = status == STATUS_OK
     result = replace(
         TangentialResult.blank(count),
@@ -241,7 +217,7 @@ def _slip_at_fixed_steps(
         slip=np.where(has_answer, slip.slip, np.nan),
         regime=np.where(has_answer, regime, 0).astype(np.int8),
         slip_changes=np.where(has_answer, slip.changes, 0).astype(np.int32),
-        stiffness=given.stiffness / n if form.kind == "spring" else np.full(count, np.nan),
+        stiffness=slip.stiffness / n if form.kind == "spring" else np.full(count, np.nan),
     )
 
 
@@ -252,11 +228,6 @@ def _smooth_model(model: ForceModel, form: TangentialForm) -> ForceModel:
         if all(float(power).is_integer() for power in powers):
             return replace(model, coordinate_power=coordinate_power)
     return model
-
-
-def _coefficient_arguments(form: TangentialForm) -> tuple[str, ...]:
-    """Name the arguments of the coefficient of friction besides y."""
-    return tuple(name for name in argument_names(form.coefficient) if name != "y")
 
 
 def _integrate(
@@ -270,7 +241,7 @@ def _integrate(
     """Integrate distinct problems through both phases."""
     law = problems.law
     slip, stiffness, damping, is_positive, *coefficient = (np.array(column, float) for column in problems.columns)
-    n, names = slip.size, _coefficient_arguments(form)
+    n = slip.size
     track, form = Track.of(n), replace(form, has_dashpot=bool(damping.any()))
     unset, compliance = np.zeros(n), np.where(stiffness > 0.0, 1.0 / stiffness, 0.0)
     base = Columns(
@@ -289,7 +260,7 @@ def _integrate(
         residual = None if recovery is None else recovery.residual
         params, breakpoints = motion.breakpoints(law, params, rows, residual)
         memory = form.memory[recovery is not None]
-        phase = SlipPhase(form, law, problem, len(params), memory, track, names, breakpoints)
+        phase = SlipPhase(form, law, problem, len(params), memory, track, breakpoints)
 
         def run(problem: Problem, start: Array, params: Params) -> Solution:
             y, params = phase.begin(start, params)
