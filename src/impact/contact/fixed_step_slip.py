@@ -117,12 +117,12 @@ class FixedStepSlip:
             return
         drag = self.damping * power(x, form.damping_power) * self.slip
         spring = self._spring(x, step) if form.kind == "spring" else np.zeros_like(drag)
-        trial = spring if form.kind == "spring" and form.cap == "spring" else spring + drag
+        trial = spring if form.cap == "spring" else spring + drag
         slips = np.abs(trial) > limit
         at_limit = np.copysign(limit, trial)
         phi = np.where(slips, at_limit, spring + drag)
         if form.kind == "spring":
-            self._remember(x, np.where(slips, self._spring_left(spring, drag, limit, at_limit), spring), slips)
+            self._remember(np.where(slips, self._spring_left(spring, drag, limit, at_limit), spring), slips)
         self.slip = self.slip - step * phi
         self.changes = self.changes + ((self.sticks | self.slips) & (slips != self.slipped)).astype(np.int32)
         self.sticks, self.slips, self.slipped = self.sticks | ~slips, self.slips | slips, slips
@@ -156,13 +156,12 @@ class FixedStepSlip:
         # a dashpot that turns the force leaves the spring as it is
         return np.where(spring * at_limit > 0.0, np.clip(spring, -limit, limit), spring)
 
-    def _remember(self, x: Array, spring: Array, slips: Mask) -> None:
+    def _remember(self, spring: Array, slips: Mask) -> None:
         """Keep the force of the spring, or the displacement that belongs to it."""
         if self.remembers_force:
             self.memory = spring
             return
-        stiffness = self.stiffness * power(x, self.form.stiffness_power)
+        stiffness = self.stiffness * self.last_power
         memory = np.where(stiffness > 0.0, spring / stiffness, 0.0)
         # where it slips, LAMMPS of 22 July 2025 divides the force by k, not by k a
-        scale = np.where(slips & (self.radius > 0.0), self.radius * power(x, self.form.stiffness_power), 1.0)
-        self.memory = memory * scale
+        self.memory = memory * np.where(slips & (self.radius > 0.0), self.radius * self.last_power, 1.0)

@@ -128,26 +128,17 @@ class Pair:
         """Its name in messages, such as "hertz with coulomb-1785"."""
         return f"{self.model.key} with {self.friction.key}"
 
-    @property
-    def keys(self) -> tuple[str, str]:
-        """The keys of the contact force model and of the friction law."""
-        return self.model.key, self.friction.key
-
     def form(self, n: float) -> TangentialForm:
         """Find the form of its tangential problems at an exponent n."""
         law = self.friction
         stiffness_power = _stiffness_power(law, n)
         dashpot = declared_dashpot(self.model, n)
         normal_power = 0.0 if dashpot is None else dashpot.power
-        damping_power = {
-            "": 0.0,
-            "xt": normal_power,
-            "liggghts": 0.5 * stiffness_power if n == HERTZ else normal_power,
-            "betas": 0.5 * stiffness_power,
-            "kratos": normal_power,
-            "c_t": 0.0,
-            "cone": 0.0,
-        }[law.damping]
+        damping_power = 0.0
+        if law.damping == "betas" or (law.damping == "liggghts" and n == HERTZ):
+            damping_power = 0.5 * stiffness_power
+        elif law.damping in ("xt", "liggghts", "kratos"):
+            damping_power = normal_power
         return TangentialForm(law.kind, stiffness_power, damping_power, law.memory, law.cap, law.coefficient)
 
 

@@ -41,8 +41,8 @@ NORMAL_ROWS = [0, 1, TIME_ROW, TIME_ROW, -1]
 JOINT_FLOOR = (*motion.ERROR_FLOOR, 1.0, 1.0)
 # the force of a dashpot that is not there
 NO_FORCE = np.zeros(1)
-# numbers of the margins: of the mode, and of the sign of the normal force
-MODE_MARGIN, SIGN_MARGIN = 0, 1
+# number of the margin of the sign of the normal force, after that of the mode
+SIGN_MARGIN = 1
 # a margin counts as positive down to this part of the largest normal force, which is of the order of 1
 MARGIN_TOLERANCE = 1e-12
 # a force within this part of the limit is at the limit where the formulas change
@@ -248,7 +248,6 @@ class Local(NamedTuple):
     N: Array
     dN: Array
     dF: Array
-    weight: Array
     spring_force: Array
     drag: Array
     capped_drag: Array
@@ -401,7 +400,7 @@ class SlipPhase:
         if form.has_dashpot and form.is_total:
             spring_force = spring_force - np.where(columns.mode == 0.0, 0.0, capped_drag)
         trial = drag if form.kind == "dashpot" else spring_force + capped_drag
-        return Local(N, columns.share * d_force, d_force, k[TIME_ROW], spring_force, drag, capped_drag, trial)
+        return Local(N, columns.share * d_force, d_force, spring_force, drag, capped_drag, trial)
 
     def _rate_of_force(self, y: Array, k: Array, params: Params) -> Array:
         """Compute the rate of the normal force by a difference quotient."""
@@ -426,17 +425,15 @@ class SlipPhase:
             crosses |= side * breakpoint(y[:2], params) < 0.0
         return crosses
 
-    def trial_rate(
-        self, y: Array, k: Array, columns: Columns, local: Local, spring_force: Array, phi: Array
-    ) -> Array:
+    def trial_rate(self, y: Array, k: Array, columns: Columns, spring_force: Array, phi: Array) -> Array:
         """Compute the rate of the trial force if the contact sticks, at a force phi and one of the spring."""
-        form, s, slip, rate = self.form, y[0], y[SLIP_ROW], NO_FORCE
+        form, s, slip, weight, rate = self.form, y[0], y[SLIP_ROW], k[TIME_ROW], NO_FORCE
         if self.form.kind == "spring":
-            rate = self._times(columns.root * columns.root * local.weight * slip, s, self.stiffness_power)
+            rate = self._times(columns.root * columns.root * weight * slip, s, self.stiffness_power)
             if self.memory and self.stiffness_power:
                 rate = rate + self.memory * self.stiffness_power * k[0] / _away_from_zero(s) * spring_force
         if form.has_dashpot and (form.is_total or form.kind == "dashpot"):
-            rate = rate - self._times(columns.damping * (local.weight * phi), s, self.drag_power)
+            rate = rate - self._times(columns.damping * (weight * phi), s, self.drag_power)
             if self.drag_power:
                 growing = self._times(columns.damping * (self.drag_power * k[0]), s, self.drag_power - 1.0)
                 rate = rate + growing * slip
@@ -474,8 +471,8 @@ class SlipPhase:
         """Compute the margin of the modes -1, 0 and 1, which is negative by no more than errors, and its rate."""
         phi = NO_FORCE
         if self.form.has_dashpot:
-            phi = -k[SLIP_ROW] / np.where(local.weight == 0.0, 1.0, local.weight)
-        rate = self.trial_rate(y, k, columns, local, local.spring_force, phi)
+            phi = -k[SLIP_ROW] / np.where(k[TIME_ROW] == 0.0, 1.0, k[TIME_ROW])
+        rate = self.trial_rate(y, k, columns, local.spring_force, phi)
         sticks, size = columns.mode == 0.0, np.abs(local.trial)
         # where the force is zero, as after a change of its sign, it grows in the direction of its rate
         is_zero = size <= MARGIN_TOLERANCE / columns.G0
@@ -532,7 +529,7 @@ class SlipPhase:
         # the rate of N changes its sign with the sign of the force
         dN = other.share * local.dF
         phi = np.where(turned, 0.0, np.where(old == 0.0, local.trial, np.sign(old) * local.N))
-        rate = self.trial_rate(y, k, other, local, spring_force, phi)
+        rate = self.trial_rate(y, k, other, spring_force, phi)
         direction = np.sign(np.where(turned, rate, local.trial))
         new = self._mode_at_limit(direction * rate - dN, direction, y, other, turned)
         new = np.where(~turned & (np.abs(old) == 1.0), 0.0, new)
@@ -664,7 +661,7 @@ class SlipPhase:
         at_limit = np.abs(trial) >= local.N * (1.0 - CAP_TOLERANCE) - MARGIN_TOLERANCE / columns.G0
         direction = np.where(trial < 0.0, -1.0, 1.0)
         spring_force = np.where(at_limit, direction * local.N - local.capped_drag, force_before)
-        rate = self.trial_rate(y, k, columns, local, spring_force, direction * local.N)
+        rate = self.trial_rate(y, k, columns, spring_force, direction * local.N)
         if self.form.kind == "dashpot":
             new = np.where(at_limit, direction, 0.0)
         else:
@@ -730,7 +727,7 @@ class SlipPhase:
         ahead, behind = (self.rates(near[:N_COMPONENTS] + step, params)[-1] for step in (small, -small))
         dN: Array = columns.share * (ahead - behind) / (2.0 * RATE_STEP * RATE_S)
         local = self.local(near, k, params)
-        return self.trial_rate(near, k, columns, local, local.N - local.capped_drag, local.N) - dN
+        return self.trial_rate(near, k, columns, local.N - local.capped_drag, local.N) - dN
 
     def finish(self, y: Array, params: Params) -> None:
         """Note the state of friction at the end of a part, from its rows; complete the rows."""
