@@ -174,7 +174,6 @@ JOHNSON_1985 = ForceModel(
         ),
         1.0,
     ),
-    coordinate_power=2,
     exponent=1.5,
     family="elastic-plastic",
 )

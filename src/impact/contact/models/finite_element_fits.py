@@ -105,7 +105,6 @@ KOGUT_ETSION_2005 = ForceModel(
         )
     ),
     residual=lambda peak, dc: peak * kogut_etsion_residual(np.maximum(peak / dc, 1)),
-    coordinate_power=2,
     exponent=1.5,
     family="elastic-plastic",
 )

@@ -119,20 +119,15 @@ def simbody_dissipation(c1: Array, c2: Array, E1: Array, E2: Array, nu1: Array, 
     return (c1 * k2 + c2 * k1) / (k1 + k2)
 
 
-SIMBODY_REFERENCE = (
-    "Sherman MA, Seth A, Delp SL (2011) Simbody: multibody dynamics for biomedical research. Procedia IUTAM 2, 241"
-)
-SIMBODY_DOI = "10.1016/j.piutam.2011.04.023"
-SIMBODY_EVIDENCE = Evidence("seen", SIMBODY, doi="simbody/simbody, CONTRIBUTING.md @f312d0dd (2026)")
-
 SIMBODY_HUNT_CROSSLEY = hysteresis(
     "simbody-hunt-crossley",
     title="Simbody and OpenSim HuntCrossleyForce (2010 to 2026)",
     year=2010,
     equation="F = K δ^(3/2) (1 + χ δ̇/v₀),  χ = (3/2) c v₀",
-    reference=SIMBODY_REFERENCE,
-    doi=SIMBODY_DOI,
-    evidence=SIMBODY_EVIDENCE,
+    reference="Sherman MA, Seth A, Delp SL (2011) Simbody: multibody dynamics for biomedical research. Procedia "
+    "IUTAM 2, 241",
+    doi="10.1016/j.piutam.2011.04.023",
+    evidence=Evidence("seen", SIMBODY, doi="simbody/simbody, CONTRIBUTING.md @f312d0dd (2026)"),
     parameters=(
         Parameter(
             "c",
@@ -148,38 +143,24 @@ SIMBODY_HUNT_CROSSLEY = hysteresis(
     family="codes",
 )
 
-SIMBODY_HUNT_CROSSLEY_MIXED = hysteresis(
-    "simbody-hunt-crossley-mixed",
+SIMBODY_HUNT_CROSSLEY_MIXED = replace(
+    SIMBODY_HUNT_CROSSLEY,
+    key="simbody-hunt-crossley-mixed",
     title="Simbody and OpenSim HuntCrossleyForce, two materials (2010 to 2026)",
-    year=2010,
     equation="F = K δ^(3/2) (1 + χ δ̇/v₀),  χ = (3/2) c v₀,  c = (c₁ k₂ + c₂ k₁)/(k₁ + k₂),  "
     "k = (E/(1 − ν²))^(2/3)",
-    reference=SIMBODY_REFERENCE,
-    doi=SIMBODY_DOI,
-    evidence=SIMBODY_EVIDENCE,
     parameters=(
         Parameter("c1", "s/m", "dissipation of the material of ball 1", least=0.0, is_damping=True),
         Parameter("c2", "s/m", "dissipation of the material of ball 2", least=0.0),
     ),
-    exponent=1.5,
-    chi=lambda c1, c2, E1, E2, nu1, nu2, v0: 1.5 * simbody_dissipation(c1, c2, E1, E2, nu1, nu2) * v0,
-    stiffness=simbody_stiffness,
-    family="codes",
+    coefficients={
+        "chi": lambda c1, c2, E1, E2, nu1, nu2, v0: 1.5 * simbody_dissipation(c1, c2, E1, E2, nu1, nu2) * v0
+    },
 )
 
-DRAKE_REFERENCE = (
-    "Drake, contact_model_doxygen.h, and the defaults of SceneGraphConfig since v1.36.0 (December 2024)"
-)
 POINT_STIFFNESS = (
     Parameter("k1", "N/m", "point stiffness k₁ of ball 1, where no K is given", default=1e6, least=1e-9),
     Parameter("k2", "N/m", "point stiffness k₂ of ball 2", default=1e6, least=1e-9),
-)
-DRAKE_EVIDENCE = Evidence(
-    "seen",
-    "RobotLocomotion/drake, multibody/plant/contact_model_doxygen.h and geometry/scene_graph_config.h @be259df724 "
-    "(2026)",
-    note="of the discrete approximations TAMSI, SIMILAR and LAGGED in the limit of small steps; SAP has another "
-    "law",
 )
 
 DRAKE_POINT_CONTACT = hysteresis(
@@ -187,8 +168,14 @@ DRAKE_POINT_CONTACT = hysteresis(
     title="Drake, point contact (defaults since v1.36.0, December 2024)",
     year=2019,
     equation="F = K δ (1 + χ δ̇/v₀),  χ = d v₀",
-    reference=DRAKE_REFERENCE,
-    evidence=DRAKE_EVIDENCE,
+    reference="Drake, contact_model_doxygen.h, and the defaults of SceneGraphConfig since v1.36.0 (December 2024)",
+    evidence=Evidence(
+        "seen",
+        "RobotLocomotion/drake, multibody/plant/contact_model_doxygen.h and geometry/scene_graph_config.h "
+        "@be259df724 (2026)",
+        note="of the discrete approximations TAMSI, SIMILAR and LAGGED in the limit of small steps; SAP has "
+        "another law",
+    ),
     parameters=(
         Parameter("d", "s/m", "Hunt-Crossley dissipation of the pair", default=50.0, least=0.0, is_damping=True),
         *POINT_STIFFNESS,
@@ -199,22 +186,17 @@ DRAKE_POINT_CONTACT = hysteresis(
     family="codes",
 )
 
-DRAKE_POINT_CONTACT_MIXED = hysteresis(
-    "drake-point-contact-mixed",
+DRAKE_POINT_CONTACT_MIXED = replace(
+    DRAKE_POINT_CONTACT,
+    key="drake-point-contact-mixed",
     title="Drake, point contact of two materials (defaults since v1.36.0, December 2024)",
-    year=2019,
     equation="F = K δ (1 + χ δ̇/v₀),  χ = d v₀,  d = (k₂ d₁ + k₁ d₂)/(k₁ + k₂)",
-    reference=DRAKE_REFERENCE,
-    evidence=DRAKE_EVIDENCE,
     parameters=(
         Parameter("d1", "s/m", "Hunt-Crossley dissipation d₁ of ball 1", default=50.0, least=0.0, is_damping=True),
         Parameter("d2", "s/m", "Hunt-Crossley dissipation d₂ of ball 2", default=50.0, least=0.0),
         *POINT_STIFFNESS,
     ),
-    exponent=1.0,
-    chi=lambda d1, d2, k1, k2, v0: (k2 * d1 + k1 * d2) / (k1 + k2) * v0,
-    stiffness=springs_in_series,
-    family="codes",
+    coefficients={"chi": lambda d1, d2, k1, k2, v0: (k2 * d1 + k1 * d2) / (k1 + k2) * v0},
 )
 
 MODELICA_ELASTOGAP = ForceModel(
@@ -258,12 +240,7 @@ MAPLESIM_LIMITED = replace(
     exponent=1.0,
 )
 
-MODIA3D_REFERENCE = (
-    "Neumayr A, Otter M (2019) Collision handling with elastic response calculation and zero-crossing functions. "
-    "EOOLT '19, 57"
-)
 MODIA3D = "ModiaSim/Modia3D.jl, src/Composition/responseCalculation/elasticCollisionResponse.jl"
-MODIA3D_DOI = "10.1145/3365984.3365986"
 SMALL_SPEED = Parameter("vs", "m/s", "speed v_s up to which e is reduced", default=0.01, least=1e-9)
 
 MODIA3D_PRESENT = hysteresis(
@@ -271,8 +248,9 @@ MODIA3D_PRESENT = hysteresis(
     title="Modia3D (v0.6.0 to v0.12.3, since February 2022)",
     year=2022,
     equation="F = K δ^(3/2) (1 + χ δ̇/v₀),  χ = min(d v₀, 8(1 − ε)/(5ε)),  ε = e where v₀ > v_s, else 0",
-    reference=MODIA3D_REFERENCE,
-    doi=MODIA3D_DOI,
+    reference="Neumayr A, Otter M (2019) Collision handling with elastic response calculation and zero-crossing "
+    "functions. EOOLT '19, 57",
+    doi="10.1145/3365984.3365986",
     evidence=Evidence(
         "seen",
         f"{MODIA3D} @a418027 (v0.12.3, 2026)",
@@ -284,26 +262,25 @@ MODIA3D_PRESENT = hysteresis(
     family="codes",
 )
 
-MODIA3D_EXPONENTIAL = hysteresis(
-    "modia3d-exponential",
+MODIA3D_EXPONENTIAL = replace(
+    MODIA3D_PRESENT,
+    key="modia3d-exponential",
     title="Modia3D (v0.4.0 to v0.5.2, 2019 to 2021)",
     year=2019,
     equation="F = K δ^(3/2) (1 + χ δ̇/v₀),  χ = min(d v₀, 8(1 − ε)/(5ε) v₀/r),  ε = e + (0.01 − e) "
     "0.01^(v₀/v_s),  r = v₀ from v_s on, below it v_s/3 + (v₀²/v_s)(1 − v₀/(3 v_s))",
-    reference=MODIA3D_REFERENCE,
-    doi=MODIA3D_DOI,
     evidence=Evidence(
         "seen",
         f"{MODIA3D} at v0.4.0 (2019) and v0.5.2 (2021)",
         doi=MODIA3D_DOCUMENTATION,
     ),
     parameters=(SMALL_SPEED, Parameter("d", "s/m", "largest damping", default=1000.0, least=0.0)),
-    exponent=1.5,
-    chi=lambda e, v0, vs, d: np.minimum(
-        d * v0,
-        flores_chi(e + (0.01 - e) * np.exp(np.log(0.01) * v0 / vs)) * v0 / modia3d_regularized_speed(v0, vs),
-    ),
-    family="codes",
+    coefficients={
+        "chi": lambda e, v0, vs, d: np.minimum(
+            d * v0,
+            flores_chi(e + (0.01 - e) * np.exp(np.log(0.01) * v0 / vs)) * v0 / modia3d_regularized_speed(v0, vs),
+        )
+    },
 )
 
 
@@ -330,26 +307,20 @@ CHRONO_SMC_FLORES = hysteresis(
     family="codes",
 )
 
-MUJOCO_REFERENCE = (
-    "Todorov E (2014) Convex and analytically-invertible dynamics with contacts and constraints: Theory and "
-    "implementation in MuJoCo. ICRA, 6054; documentation of MuJoCo, Modeling, Solver parameters"
-)
-MUJOCO_DOI = "10.1109/ICRA.2014.6907751"
-MUJOCO_EVIDENCE = Evidence(
-    "seen",
-    "google-deepmind/mujoco, doc/modeling.rst and src/engine/engine_core_constraint.c @a7255075b (2026)",
-    doi="google-deepmind/mujoco, python/LQR.ipynb @a7255075b",
-    note="for a constant impedance, which the default solimp is not, and in the limit of small time steps",
-)
-
 MUJOCO_SOLREF = ForceModel(
     key="mujoco-solref",
     title="MuJoCo solref, standard format (since 2.1)",
     year=2014,
     equation="F = m(δ/(τ ζ)² + 2 δ̇/τ), to F = 0",
-    reference=MUJOCO_REFERENCE,
-    doi=MUJOCO_DOI,
-    evidence=MUJOCO_EVIDENCE,
+    reference="Todorov E (2014) Convex and analytically-invertible dynamics with contacts and constraints: Theory "
+    "and implementation in MuJoCo. ICRA, 6054; documentation of MuJoCo, Modeling, Solver parameters",
+    doi="10.1109/ICRA.2014.6907751",
+    evidence=Evidence(
+        "seen",
+        "google-deepmind/mujoco, doc/modeling.rst and src/engine/engine_core_constraint.c @a7255075b (2026)",
+        doi="google-deepmind/mujoco, python/LQR.ipynb @a7255075b",
+        note="for a constant impedance, which the default solimp is not, and in the limit of small time steps",
+    ),
     parameters=(
         Parameter("timeconst", "s", "time constant τ", default=0.02, least=1e-9),
         Parameter("dampratio", "1", "damping ratio ζ", default=1.0, least=1e-3, is_damping=True),
@@ -365,14 +336,12 @@ MUJOCO_SOLREF = ForceModel(
     family="codes",
 )
 
-MUJOCO_SOLREF_DIRECT = ForceModel(
+MUJOCO_SOLREF_DIRECT = replace(
+    MUJOCO_SOLREF,
     key="mujoco-solref-direct",
     title="MuJoCo solref, direct format (since 2.0)",
     year=2018,
     equation="F = m(k δ + b δ̇), to F = 0",
-    reference=MUJOCO_REFERENCE,
-    doi=MUJOCO_DOI,
-    evidence=MUJOCO_EVIDENCE,
     parameters=(
         Parameter("k", "1/s^2", "stiffness per effective mass, the negative first number of solref", least=1e-9),
         Parameter(
@@ -382,9 +351,6 @@ MUJOCO_SOLREF_DIRECT = ForceModel(
     stiffness=lambda m, k: m * k,
     force=lambda x, v, m, k, b: m * (k * x + b * v),
     oracle=lambda k, b: force_restitution(b / (2.0 * np.sqrt(k))),
-    release="force",
-    exponent=1.0,
-    family="codes",
 )
 
 SIMSCAPE_CONTACT = ForceModel(
