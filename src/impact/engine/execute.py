@@ -13,7 +13,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from dataclasses import dataclass
 from functools import lru_cache, partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,20 +69,20 @@ def integrate_columns(law: PlanLaw, columns: Columns, solver: Solver) -> Integra
     """Integrate trajectories of a law; see `impact.engine.plan.Plan.columns_of`."""
     errors: dict[str, str] = {}
     values = {name: column for name, column in columns.items() if name not in ("n", "status")}
-    problems, settings = (
-        (columns["n"], values, columns["status"]),
-        dict[str, Any](
-            rtol=solver.rtol,
-            max_steps=solver.max_steps,
-            collapse=solver.collapse,
-            core=solver.core,
-            integrator=solver.integrator,
-            errors=errors,
-        ),
+    simulate_law: Callable[..., Record]
+    simulate_law = partial(simulate_friction, law) if isinstance(law, Pair) else partial(simulate, law)
+    collisions = simulate_law(
+        columns["n"],
+        values,
+        columns["status"],
+        rtol=solver.rtol,
+        max_steps=solver.max_steps,
+        collapse=solver.collapse,
+        core=solver.core,
+        integrator=solver.integrator,
+        errors=errors,
     )
-    if isinstance(law, Pair):
-        return simulate_friction(law, *problems, **settings), errors
-    return simulate(law, *problems, **settings), errors
+    return collisions, errors
 
 
 def integrate_remotely(keys: Sequence[str], columns: Columns, context: WorkerContext) -> Integrated:

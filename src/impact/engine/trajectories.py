@@ -167,7 +167,8 @@ def coupled_pair(inputs: Inputs, model: ForceModel) -> Pair | None:
 def columns_at(inputs: Inputs, law: PlanLaw, axes: Sequence[int], index: Index) -> Columns:
     """Build the problems of a law at cells, arrays that broadcast; only inputs along `axes` are checked."""
     model = model_of(law)
-    checks = frozenset(check for check, varying in axes_of_checks(inputs, model).items() if varying <= {*axes})
+    probed = checked_arrays(build_impacts(inputs, model, _probe_index(inputs, model)))
+    checks = frozenset(check for check in CHECKS if axes_of_arrays(probed[check]) <= {*axes})
     impacts, values, own_status = _values_at(inputs, law, index)
     with np.errstate(all="ignore"):
         status = check_inputs(model, impacts, checks)
@@ -202,12 +203,6 @@ def probe_index(inputs: Inputs, swept_names: Iterable[str] = ()) -> Index:
 def axes_of_arrays(arrays: Iterable[NDArray[Any]]) -> frozenset[int]:
     """Find the axes along which any of the arrays varies; the arrays have as many axes as the grid."""
     return frozenset(axis for array in arrays for axis, size in enumerate(array.shape) if size > 1)
-
-
-def axes_of_checks(inputs: Inputs, model: ForceModel) -> Mapping[str, frozenset[int]]:
-    """Find the axes on which each check of `check_inputs` depends."""
-    arrays = checked_arrays(build_impacts(inputs, model, _probe_index(inputs, model)))
-    return {check: axes_of_arrays(arrays[check]) for check in CHECKS}
 
 
 def checked_arrays(impacts: Impacts) -> Mapping[str, list[NDArray[Any]]]:
