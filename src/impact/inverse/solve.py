@@ -350,7 +350,7 @@ def solve_input(config: Config, unknown: Parameter, target: Mapping[str, object]
 
 @dataclass(frozen=True)
 class SolveProblem:
-    """The target variable as a function of the unknown and of the condition, a position on the axis."""
+    """The target variable as a function of the unknown, under each condition, a position on the axis if any."""
 
     config: Config
     unknown: Parameter
@@ -374,18 +374,22 @@ class SolveProblem:
         """Whether differences of the target count as they are, as those of a restitution do."""
         return OUTPUTS[self.variable].scale == "1"
 
-    def columns(self, values: Array, conditions: NDArray[np.intp]) -> dict[str, NDArray[Any]]:
-        """Pair each value with the inputs of the condition of the same position."""
-        columns: dict[str, NDArray[Any]] = {self.name: values}
+    @property
+    def n_conditions(self) -> int:
+        return math.prod(axis.size for axis in self.config.axes)
+
+    def columns(self, values: Array) -> dict[str, NDArray[Any]]:
+        """Pair each value with the inputs of every condition."""
+        columns: dict[str, NDArray[Any]] = {self.name: np.repeat(values, self.n_conditions)}
         for axis in self.config.axes:
-            columns |= {name: np.asarray(column)[conditions] for name, column in axis.columns.items()}
+            columns |= {name: np.tile(column, values.size) for name, column in axis.columns.items()}
         return columns
 
-    def evaluate(
-        self, values: Array, conditions: NDArray[np.intp] | None = None, *, is_scan: bool = False
-    ) -> dict[str, NDArray[Any]]:
-        """Compute the target variable, its status and e_out at some values; NaN where the integration fails."""
-        conditions = np.zeros(values.size, np.intp) if conditions is None else conditions
+    def evaluate(self, values: Array, *, is_scan: bool = False) -> dict[str, NDArray[Any]]:
+        """Compute the target variable, its status and e_out at k values; NaN where the integration fails.
+
+        The arrays are of shape (k,), or over an axis of shape (k, conditions).
+        """
         config, solver = self.config, self.config.solver
         # the number of steps of a fixed-step scheme is given by its step
         if is_scan and solver.integrator == EXACT:
@@ -393,12 +397,13 @@ class SolveProblem:
             config = replace(config, solver=solver)
         law = Pair(self.model, config.frictions[0]) if config.frictions else self.model
         names = dict.fromkeys((self.variable, OUTPUTS[self.variable].status, "e_out"))
-        outputs = outputs_at(config, law, self.columns(values, conditions), list(names))
-        return {name: np.broadcast_to(array, values.shape).copy() for name, array in outputs.items()}
+        outputs = outputs_at(config, law, self.columns(values), list(names))
+        size, shape = values.size * self.n_conditions, (values.size, *(axis.size for axis in self.config.axes))
+        return {name: np.broadcast_to(array, size).reshape(shape).copy() for name, array in outputs.items()}
 
-    def raise_failure(self, values: Array, conditions: NDArray[np.intp] | None = None) -> NoReturn:
-        """Raise a UsageError with the most frequent status of the integrations that fail."""
-        outputs = self.evaluate(values, conditions, is_scan=True)
+    def raise_failure(self) -> NoReturn:
+        """Raise a UsageError with the most frequent status of the integrations of the scan that fail."""
+        outputs = self.evaluate(self.scan_values(), is_scan=True)
         variable = OUTPUTS[self.variable]
         statuses = outputs[variable.status][np.isnan(outputs[self.variable])]
         status = (FrictionStatus if variable.of_friction else Status)(int(np.bincount(statuses).argmax()))
@@ -428,15 +433,12 @@ class SolveProblem:
         """Whether polynomials are tried; friction has kinks, and schemes where the number of steps changes."""
         return not self.config.frictions and self.config.solver.integrator == EXACT
 
-    def interpolant(
-        self, conditions: NDArray[np.intp] | None = None, target: float | None = None, *, with_range: bool = False
-    ) -> Interpolant:
+    def interpolant(self, target: float | None = None, *, with_range: bool = False) -> Interpolant:
         """Interpolate the target variable between the powers of ten of the scan, under each condition.
 
         With a target, of one condition, no interval is divided whose values are far from it, such as those at
         damping at which balls stick; with the range also those are that may have an end of it.
         """
-        conditions = np.zeros(1, np.intp) if conditions is None else conditions
         scan = self.scan_values(per_decade=1, between_bounds=2)
         solver = self.config.solver
         solver = replace(solver, max_steps=min(solver.max_steps, NODE_MAX_STEPS))
@@ -445,8 +447,7 @@ class SolveProblem:
 
         def function(x: Array) -> Array:
             nonlocal smallest, largest
-            outputs = limited.evaluate(np.repeat(x, conditions.size), np.tile(conditions, x.size))
-            values = np.asarray(outputs[self.variable], float).reshape(x.size, conditions.size)
+            values = np.asarray(limited.evaluate(x)[self.variable], float).reshape(x.size, -1)
             smallest = float(np.fmin.reduce(values, None, initial=smallest))
             largest = float(np.fmax.reduce(values, None, initial=largest))
             return values
@@ -459,7 +460,7 @@ class SolveProblem:
             # where integrations fail the range is that of the scan
             return lower <= target <= upper or (with_range and is_extreme and bool(np.isfinite(values).all()))
 
-        floors = np.full(conditions.size, float(self.is_of_order_one))
+        floors = np.full(self.n_conditions, float(self.is_of_order_one))
         return Interpolant(function, scan, floors, MAX_DIVISIONS, is_needed)
 
     def reach(self, values: Array) -> tuple[float, float]:
@@ -482,7 +483,7 @@ class SolveProblem:
         """Find the size of the unknown: 1 in the contact's own units, or its typical value if it is no damping."""
         if self.unknown.typical and not self.unknown.is_damping:
             return abs(self.unknown.typical)
-        inputs = trial_inputs(self.config, self.columns(np.ones(1), np.zeros(1, np.intp)))
+        inputs = trial_inputs(self.config, self.columns(np.ones(1)))
         impacts = build_impacts(inputs, self.model, inputs.index())
         if self.unknown.name == "K":
             # without a stiffness in the config that of the materials, else of the radii, is the scale
@@ -518,7 +519,7 @@ def _roots_and_values(
     scan, interpolant = problem.scan_values(), None
     known_scan, known_values = np.zeros((2, 0))
     if problem.is_smooth:
-        interpolant = problem.interpolant(None, target, with_range=with_range)
+        interpolant = problem.interpolant(target, with_range=with_range)
         interpolant.resolve()
         known_scan, known_values = interpolant.samples()
         scan = scan[np.isnan(interpolant(scan)[:, 0])]
@@ -526,7 +527,7 @@ def _roots_and_values(
     # a value at which the integration fails, often for want of steps, hides no root between its neighbours
     scan, values = scan[~np.isnan(values)], values[~np.isnan(values)]
     if not scan.size + known_scan.size:
-        problem.raise_failure(problem.scan_values())
+        problem.raise_failure()
     scale = 1.0 if problem.is_of_order_one else abs(target) or float(np.abs(np.append(values, known_values)).max())
     tolerance = TARGET_TOLERANCE * problem.config.solver.rtol * scale
     is_exact = np.abs(values - target) <= SCAN_TOLERANCE * scale
@@ -568,16 +569,12 @@ def _roots_and_values(
     return roots, values
 
 
-def _known(
-    problem: SolveProblem, interpolant: Interpolant | None, x: Array, conditions: NDArray[np.intp] | None = None
-) -> Array:
+def _known(problem: SolveProblem, interpolant: Interpolant | None, x: Array) -> Array:
     """Compute the target variable by polynomials, and integrate where none is accurate; shape (k, conditions)."""
-    conditions = np.zeros(1, np.intp) if conditions is None else conditions
-    known = np.full((x.size, conditions.size), np.nan) if interpolant is None else interpolant(x)
+    known = np.full((x.size, problem.n_conditions), np.nan) if interpolant is None else interpolant(x)
     unknown = np.flatnonzero(np.isnan(known).any(axis=1))
     if unknown.size:
-        integrated = problem.evaluate(np.repeat(x[unknown], conditions.size), np.tile(conditions, unknown.size))
-        known[unknown] = integrated[problem.variable].reshape(unknown.size, conditions.size)
+        known[unknown] = problem.evaluate(x[unknown])[problem.variable].reshape(unknown.size, -1)
     return known
 
 
@@ -643,33 +640,25 @@ def _runs(reached: Mask, scan: Array, bounds: set[float]) -> tuple[list[float], 
 def _best_over_axis(problem: SolveProblem, target: float) -> SolveResult:
     """Find the value for which the largest distance from the target over the axis of the config is least."""
     (axis,) = problem.config.axes
-    conditions = np.arange(axis.size)
+    interpolant = problem.interpolant() if problem.is_smooth else None
 
-    interpolant = problem.interpolant(conditions) if problem.is_smooth else None
-
-    def largest_distance(values: Array, *, is_scan: bool = False) -> Array:
+    def largest_distance(of_values: Array) -> Array:
         """Find the largest distance over all conditions; infinite where an integration fails."""
-        if is_scan:
-            trials = np.repeat(values, axis.size)
-            outputs = problem.evaluate(trials, np.tile(conditions, values.size), is_scan=True)
-            of_values = outputs[problem.variable].reshape(values.size, axis.size)
-        else:
-            of_values = _known(problem, interpolant, values, conditions)
         distances = np.abs(of_values - target)
         return np.where(np.isnan(distances).any(axis=1), np.inf, distances.max(axis=1))
 
     scan = problem.scan_values()
-    distances = largest_distance(scan, is_scan=True)
+    distances = largest_distance(problem.evaluate(scan, is_scan=True)[problem.variable])
     is_finite = np.isfinite(distances)
     if not is_finite.any():
-        problem.raise_failure(np.repeat(scan, axis.size), np.tile(conditions, scan.size))
+        problem.raise_failure()
     scan, distances = scan[is_finite], distances[is_finite]
     candidates = []
     # the least distance is at an end of the scan, or in one of its basins
     for position in {int(distances.argmin()), *_minima(distances, distances).tolist()}:
         neighbours = float(scan[max(position - 1, 0)]), float(scan[min(position + 1, scan.size - 1)])
         refined = minimize_scalar(
-            lambda x: float(largest_distance(np.array([x]))[0]),
+            lambda x: float(largest_distance(_known(problem, interpolant, np.array([x])))[0]),
             bounds=neighbours,
             method="bounded",
             options={"xatol": 1e-12 * max(map(abs, neighbours))},
@@ -677,11 +666,11 @@ def _best_over_axis(problem: SolveProblem, target: float) -> SolveResult:
         candidates.append((float(distances[position]), float(scan[position])))
         candidates.append((float(refined.fun), float(refined.x)))
     value = min(candidates)[1]
-    outputs = problem.evaluate(np.full(axis.size, value), conditions)
+    outputs = {name: array[0] for name, array in problem.evaluate(np.array([value])).items()}
     over = tuple(
         {name: column[condition] for name, column in axis.columns.items()}
         | {name: float(outputs[name][condition]) for name in dict.fromkeys((problem.variable, "e_out"))}
-        for condition in conditions.tolist()
+        for condition in range(axis.size)
     )
     status: SolveStatus = "at_bound" if value in (problem.unknown.least, problem.unknown.most) else "ok"
     root = Root(value, float(outputs["e_out"].mean()))
