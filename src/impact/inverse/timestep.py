@@ -111,15 +111,10 @@ class TimestepRow:
     beta_least: float = math.nan
     beta_largest: float = math.nan
 
-    @property
-    def is_too_long(self) -> bool:
-        """Whether a contact ends within a step."""
-        return self.steps_per_contact < 1.0
-
     def warnings(self, phases: int) -> Iterator[str]:
         """Say that the step is longer than the contact, and that some of so many phases fail."""
         step = f"dt = {quantity(self.dt, 's')}"
-        if self.is_too_long:
+        if self.steps_per_contact < 1.0:
             yield f"{step}: longer than the contact of {quantity(self.steps_per_contact * self.dt, 's')}"
         if self.failed:
             yield f"{step}: {self.failure(phases)}"
@@ -135,11 +130,6 @@ class TimestepRow:
         mean = self.status if self.failed else decimals(self.e_mean)
         others = map(decimals, (self.e_least, self.e_largest, self.e_to_ask))
         return (number(self.steps_per_contact), number(self.dt), mean, *others)
-
-    @property
-    def friction_cells(self) -> tuple[str, ...]:
-        """Format the tangential restitution."""
-        return tuple(map(decimals, (self.beta_mean, self.beta_least, self.beta_largest)))
 
     def as_dict(self, has_friction: bool) -> dict[str, Any]:
         """Convert to plain data, without a tangential restitution if there is no friction."""
@@ -277,7 +267,7 @@ class TimestepResult(Displayed):
         if self.friction:
             headings += ["beta mean", "least", "largest"]
             for row, texts in zip(self.rows, cells, strict=True):
-                texts += row.friction_cells
+                texts += map(decimals, (row.beta_mean, row.beta_least, row.beta_largest))
         yield Table(cells, headings, text=())
         if self.rayleigh_time == self.rayleigh_time:
             yield f"T_R = {quantity(self.rayleigh_time, 's', 4)}: the smaller Rayleigh time of the two balls"
