@@ -206,11 +206,7 @@ def _in_domain(law: Law, impacts: Impacts, damping_ratio: Array) -> NDArray[np.i
 
 
 def _separation_time(
-    law: Law,
-    impacts: Impacts,
-    result: CollisionResult,
-    contact_time: Array,
-    in_si: Callable[[Array, Array], Array],
+    law: Law, impacts: Impacts, result: CollisionResult, contact_time: Array, in_si: InSI
 ) -> Array:
     """Time until the surfaces separate: after the contact they move at e_out v0. NaN if they never separate."""
     if law.is_permanent:
@@ -260,7 +256,7 @@ def _without_slip(oblique: ObliqueImpacts, friction_status: NDArray[np.int8]) ->
     return _mask_if_any((oblique.slip == 0.0) & (friction_status < FIRST_FAILURE))
 
 
-def _regime(
+def _contact_regime(
     oblique: ObliqueImpacts,
     tangential: TangentialResult,
     kind: str,
@@ -278,11 +274,11 @@ def _regime(
 
 
 def _slip_changes(
-    oblique: ObliqueImpacts, tangential: TangentialResult, kind: str, regime: NDArray[np.int8]
+    oblique: ObliqueImpacts, tangential: TangentialResult, kind: str, contact_regime: NDArray[np.int8]
 ) -> NDArray[np.int32]:
     if kind == "coulomb":
-        return np.where(regime == 3, np.int32(1), np.int32(0))
-    return np.where(regime == 0, np.int32(0), tangential.slip_changes)
+        return np.where(contact_regime == 3, np.int32(1), np.int32(0))
+    return np.where(contact_regime == 0, np.int32(0), tangential.slip_changes)
 
 
 def _friction_residual(
@@ -365,7 +361,6 @@ FORMULAS: dict[str, Callable[..., Any]] = {
         oblique, tangential.slip, tangential.sliding_impulse, kind, friction_status, missed
     ),
     "impulse": _impulse,
-    "regime": _regime,
     # impacts with a slip, friction and a complete tangential motion
     "has_works": lambda slip_share, oblique, missed: (
         np.isfinite(slip_share) & (oblique.mu > 0.0) & (True if missed is None else ~missed)
@@ -383,7 +378,7 @@ FORMULAS: dict[str, Callable[..., Any]] = {
     "rebound_angle": lambda u1_post, u2_post, e_out, impacts: np.arctan2(u1_post - u2_post, e_out * impacts.v0),
     "impulse_ratio": lambda impulse, e_out, impacts: impulse / ((1.0 + e_out) * impacts.m * impacts.v0),
     "friction_loss": lambda oblique, slip_post: 0.5 * oblique.m_t * (oblique.slip**2 - slip_post**2),
-    "contact_regime": lambda regime: regime,
+    "contact_regime": _contact_regime,
     "friction_residual": _friction_residual,
     "beta_error": _beta_error,
     "slip_work": _work("slip_work"),
