@@ -116,53 +116,42 @@ def simulate_parts(
 ) -> T:
     """Simulate the impacts with status OK, those with the same n together; one that fails affects no other."""
     parts: list[tuple[Positions, T]] = []
-    errors = {} if errors is None else errors
+    reported = {} if errors is None else errors
+
+    def isolate_failures(part_of_n: Callable[..., T], values: ValueArrays, count: int) -> T:
+        """Simulate impacts with the same n; those for which the law raises an error have the status MODEL_ERROR.
+
+        After an error both halves are tried again, so that only the impacts that cause it fail. A single impact is
+        tried together with a copy: a result of the wrong shape, or an `if`, raises no error for an array of
+        length 1.
+        """
+        try:
+            if count == 1:
+                twice = _values_at(values, np.array([0, 0]))
+                return part_of_n(twice, 2, collapse=False).take(np.array([0]))
+            return part_of_n(values, count, collapse=collapse)
+        except ModelError as error:
+            result = record.blank(count)
+            if count == 1:
+                vars(result)["status"][:] = Status.MODEL_ERROR
+                reported.setdefault(*describe_error(key, error))
+                return result
+            for half in np.array_split(np.arange(count), 2):
+                result.put(half, isolate_failures(part_of_n, _values_at(values, half), half.size))
+            return result
+
     with np.errstate(all="ignore"):
         for exponent in distinct_values(n):
             chosen = (status == STATUS_OK) & (n == exponent)
             count, rows = int(np.count_nonzero(chosen)), positions(chosen)
             if count:
                 part_of_n = partial(simulate_part, float(exponent))
-                part = _isolate_failures(record, key, _values_at(values, rows), count, part_of_n, collapse, errors)
-                parts.append((rows, part))
+                parts.append((rows, isolate_failures(part_of_n, _values_at(values, rows), count)))
     return record.joined(n.size, status, parts)
 
 
 def _values_at(values: ValueArrays, rows: Positions) -> ValueArrays:
     return {name: array[rows] for name, array in values.items()}
-
-
-def _isolate_failures(
-    record: type[T],
-    key: str,
-    values: ValueArrays,
-    count: int,
-    simulate_part: Callable[..., T],
-    collapse: bool,
-    errors: dict[str, str],
-) -> T:
-    """Simulate impacts with the same n; those for which the law raises an error have the status MODEL_ERROR.
-
-    After an error both halves are tried again, so that only the impacts that cause it fail. A single impact is
-    tried together with a copy: a result of the wrong shape, or an `if`, raises no error for an array of length 1.
-    """
-    try:
-        if count == 1:
-            twice = _values_at(values, np.array([0, 0]))
-            return simulate_part(twice, 2, collapse=False).take(np.array([0]))
-        return simulate_part(values, count, collapse=collapse)
-    except ModelError as error:
-        result = record.blank(count)
-        if count == 1:
-            vars(result)["status"][:] = Status.MODEL_ERROR
-            errors.setdefault(*describe_error(key, error))
-            return result
-        for half in np.array_split(np.arange(count), 2):
-            part = _isolate_failures(
-                record, key, _values_at(values, half), half.size, simulate_part, collapse, errors
-            )
-            result.put(half, part)
-        return result
 
 
 def _simulate_distinct(
