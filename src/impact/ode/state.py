@@ -72,7 +72,7 @@ class State:
 
     `h` is the length of the next step, `h_last` that of the previous one. `best` is the largest watched value at
     the end of a step from which it fell or at which the trajectory ended; `peak`, for all trajectories, is where.
-    Of a problem with a switch, `margins` are those at the start of the step, and `h_free` is the length of the
+    `margins` are those of a switch at the start of the step, no rows without one; `h_free` is the length of the
     next step before a margin shortened it.
     """
 
@@ -88,8 +88,8 @@ class State:
     best: Array
     peak: PeakCandidate
     workspace: Workspace
-    margins: Margins | None = None
-    h_free: Array | None = None
+    margins: Margins
+    h_free: Array
 
     @classmethod
     def begin(cls, problem: Problem, start: Array, params: Params, workspace: Workspace, h: float) -> State:
@@ -99,13 +99,14 @@ class State:
         y[: len(start)], y[len(start) :] = start, 0.0
         start = start[: problem.n_components]
         np.copyto(k, problem.rates(start, params, k))
-        switch = problem.switch
-        if switch is not None:
+        margins: Margins = np.zeros((0, n)), np.zeros((0, n))
+        if problem.switch is not None:
             # the modes are written to the columns
             params = tuple(column.copy() for column in params)
+            margins = problem.switch.margins(y, k, params)
         return cls(
-            margins=None if switch is None else switch.margins(y, k, params),
-            h_free=None if switch is None else np.zeros(n),
+            margins=margins,
+            h_free=np.zeros(n),
             index=np.arange(n),
             params=params,
             y=y,
@@ -150,8 +151,8 @@ class State:
             best=self.best[running],
             peak=self.peak,
             workspace=workspace,
-            margins=None if self.margins is None else (self.margins[0][:, running], self.margins[1][:, running]),
-            h_free=None if self.h_free is None else self.h_free[running],
+            margins=(self.margins[0][:, running], self.margins[1][:, running]),
+            h_free=self.h_free[running],
         )
 
 

@@ -33,7 +33,6 @@ def locate_switches(problem: Problem, switch: Switch, state: State, trial: Trial
     A step across the zero of a margin, or across a low minimum, is rejected and tried again with the length to it.
     Returns the offsets of the changes from the ends of the steps, as fractions of them.
     """
-    assert state.margins is not None
     # the end of a trajectory is not the end of the step
     ended = (state.termination == Termination.EVENT_REACHED).nonzero()[0]
     if ended.size:
@@ -69,8 +68,6 @@ def _locate(
     all_rates: Array,
 ) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
     """Shorten steps to zeros of margins; returns where a zero is reached, of which margin, and its offset."""
-    assert state.margins is not None
-    assert state.h_free is not None
     margins, before = all_margins[:, positions], state.margins[0][:, positions]
     h, h_next = state.h[positions], trial.h_next[positions]
     changes = np.abs(margins - before) > LARGE_CHANGE * np.maximum(np.abs(margins), np.abs(before))
@@ -145,7 +142,6 @@ def _shorten(
     state: State, trial: TrialStep, positions: NDArray[np.intp], offset: Array, crossed: Mask, is_shorter: Mask
 ) -> None:
     """Give steps the length to a zero; the present one is tried again where it crossed the zero."""
-    assert state.h_free is not None
     h_next = trial.h_next[positions]
     state.h_free[positions] = np.where(
         is_shorter, np.fmax(state.h_free[positions], h_next), state.h_free[positions]
@@ -166,8 +162,6 @@ def _change_modes(
     offset: Array,
 ) -> None:
     """Change the modes of trajectories next to the ends of their steps; they go on with the step of before."""
-    assert state.h_free is not None
-    assert state.margins is not None
     params = tuple(column[positions] for column in state.params)
     y, k = step_of_order_two(problem, trial.y[:, positions], trial.k[:, positions], offset, params)
     y, params = switch.change(which, y, k, params)
