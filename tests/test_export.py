@@ -179,6 +179,13 @@ def test_liggghts_takes_the_properties_of_each_type_and_pair() -> None:
     assert parameters["coefficientRestitution"] == "peratomtypepair 2 0.5 0.5 0.5 0.5"
 
 
+@pytest.mark.parametrize(("ball2", "walls"), [({"m2": math.inf}, 0), ({"m2": math.inf, "R2": math.inf}, 1)])
+def test_liggghts_gets_a_wall_where_the_second_ball_is_one(ball2: dict[str, float], walls: int) -> None:
+    config = source("soft", "hard", **ball2)
+    lines = impact.export("liggghts", default_law("liggghts"), source=config, code_version="3.8.0").lines
+    assert sum(line.startswith("fix             wall all wall/") for line in lines) == walls
+
+
 def test_liggghts_hooke_remarks_on_its_characteristic_velocity_and_on_attraction() -> None:
     free, limited = (
         impact.export(

@@ -243,6 +243,8 @@ def test_chrono_multiplies_a_given_damping_by_the_effective_mass_as_its_header_s
     assert "the system multiplies Gn by m, with m = m1 m2/(m1 + m2)" in linear.header
     key = "kuwabara-kono-1987"
     hertz = impact.export("chrono", key, source=config(K=1e9), at={f"{key}.A": 1e-5})
+    # the force is K (1.5 A sqrt(delta) v) of the law
+    assert hertz.parameters["Gn"] == pytest.approx(1.5 * 1e-5 * 1e9 / (R * M), rel=1e-14)
     factors = "Kn by R* sqrt(delta), Gn by R* sqrt(delta) m"
     assert f"the system multiplies {factors}, with m = m1 m2/(m1 + m2)" in hertz.header
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ BALL = {"e": 0.8, "m1": 0.2, "m2": 0.5, "R1": 0.03, "R2": 0.04, "K": 1e6, "v1": 
 SPRING = "cundall-strack-1979"
 
 
-def oblique(**sweep: Any) -> xr.Dataset:
+def oblique(output: Mapping[str, Any] | None = None, **sweep: Any) -> xr.Dataset:
     """The impact of two balls by Coulomb's friction and a spring, some inputs replaced; None removes one."""
     inputs = {name: value for name, value in (BALL | sweep).items() if value is not None}
     return impact.sweep(
@@ -24,6 +25,7 @@ def oblique(**sweep: Any) -> xr.Dataset:
             "frictions": ["coulomb-1785", SPRING],
             "sweep": {name: value for name, value in inputs.items() if name != "models"},
             "friction": {SPRING: {"k_t": 3e3}},
+            "output": output or {},
         }
     )
 
@@ -148,6 +150,13 @@ def test_works_make_up_the_loss_and_momenta_are_kept() -> None:
     result = oblique(cases=cases)
     assert np.nanmax(np.abs(result["friction_residual"].values)) < 1e-8
     m1, m2, I1, I2 = 0.2, 0.5, 0.4 * 0.2 * 0.03**2, 0.4 * 0.5 * 0.04**2
+    before = m1 * u1**2 + I1 * omega1**2 + I2 * omega2**2
+    weights = {"u1_post": m1, "u2_post": m2, "omega1_post": I1, "omega2_post": I2}
+    after = sum(weight * np.square(result[name].values) for name, weight in weights.items())
+    names = ["slip_work", "tangential_damping_work", "memory_work", "elastic_left"]
+    works = oblique(cases=cases, output={"variables": names})[names].to_dataarray().sum("variable")
+    loss = 0.5 * (before - after)
+    assert works.transpose(*result["u1_post"].dims).values == pytest.approx(loss, abs=1e-8 * before.max())
     impulse = m1 * (u1 - result["u1_post"].values)
     largest = np.abs(impulse).max()
     assert m2 * result["u2_post"].values == pytest.approx(impulse, abs=1e-14 * max(largest, m1 * 3.0))
