@@ -535,3 +535,9 @@ def test_the_page_of_the_board_is_that_of_the_stored_board() -> None:
     assert {str(name).partition(",")[0] for name in board["engine"].values} == set(ENGINES)
     fresh = impact.conform(adapter=rigid).dataset
     assert fresh["check"].values.tolist() == board["check"].values.tolist()
+
+
+def test_a_tolerance_between_two_boards_is_a_number() -> None:
+    board = impact.load(EXAMPLES / "board.h5")
+    with pytest.raises(UsageError, match=r'^tol="abc": expected a number >= 0, such as 1e-5$'):
+        impact.compare(board, board, tol="abc")

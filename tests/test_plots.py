@@ -278,6 +278,7 @@ def test_the_impulse_diagram_ends_where_impulse_and_momentum_say(figure6: xr.Dat
             {"models": ["gharib-hurmuzlu-2012"], "sel": {"e": 0.0}},
             "no motion to draw at e = 0.0: closed-form limit",
         ),
+        ("loop", {"sel": {"e": 0.0}, "models": ["gharib-hurmuzlu-2012"]}, "; choose another point on e (sel)"),
         ("loop", {"sel": {"e": 0.5}, "models": ["herz"]}, 'no model "herz" in this result'),
         ("loop", {"sel": {"m3": 0.5}}, 'no input "m3" here'),
     ],

@@ -60,7 +60,7 @@ def calibration_tolerances(tol: float | str | Tolerances | None) -> dict[str, fl
         if name != ALL_VARIABLES:
             expected = "expected one for all, such as 1e-5"
             raise UsageError(f"{argument('tol', key=name)}: got a tolerance for one variable, {expected}")
-        if not 0.0 <= value < math.inf:
+        if not _is_number(value) or not 0.0 <= value < math.inf:
             raise UsageError(f"{argument('tol', value)}: expected a number >= 0, such as 1e-5")
     return {ALL_VARIABLES: CALIBRATION_TOLERANCE} | requested
 

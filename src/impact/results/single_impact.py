@@ -527,11 +527,11 @@ def histories(
     if refused and not (datasets and friction_keys):
         raise refused[0]
     if not datasets:
-        point = ", ".join(f"{name} = {value}" for name, value in {**first, **at}.items())
+        point = {**first, **at}
+        described = ", ".join(f"{name} = {value}" for name, value in point.items())
         reason = next(iter(ends.values()))
-        raise UsageError(
-            f"no motion to draw at {point}: {reason}; choose a point, such as {argument('sel', {'e': 0.5})}"
-        )
+        advice = f"; choose another point on {', '.join(point)} ({argument('sel')})" if point else ""
+        raise UsageError(f"no motion to draw at {described}: {reason}{advice}")
     return datasets, [f"{key} ({reason})" for key, reason in ends.items() if key not in drawn]
 
 
