@@ -148,9 +148,9 @@ def _simulate_distinct(
     law_values = with_coefficients(model, with_units(values, n), count)
     status = simulate.check_coefficients(model, law_values, values, count)
     slip = np.ones(count) if form.kind == "coulomb" else np.abs(values[SLIP])
-    stiffness, damping, is_positive = (
-        values.get(name, np.zeros(count)) for name in (TANGENTIAL_STIFFNESS, TANGENTIAL_DAMPING, LIMIT_POSITIVE)
-    )
+    zero = np.zeros(count)
+    stiffness = values[TANGENTIAL_STIFFNESS] if form.kind == "spring" else zero
+    damping, is_positive = (values.get(name, zero) for name in (TANGENTIAL_DAMPING, LIMIT_POSITIVE))
     # without friction the slip is infinite in units of it
     has_friction = (slip != 0.0) & np.isfinite(slip)
     is_invalid = has_friction & ~(np.isfinite(stiffness) & np.isfinite(damping))

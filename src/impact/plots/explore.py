@@ -134,12 +134,13 @@ def explore(
             for name, slider in sliders.items()
             if name not in drawn
         }
-        selected, frictions = list(model_list.value), list(friction_list.value)
+        # a result without friction has no list
+        selected, frictions = list(model_list.value), list(friction_list.value) if laws else None
         off_grid = {name: value for name, value in at.items() if value not in dataset[name].values}
         try:
             result = dataset
             if off_grid and config and found.source != "history":
-                result = integrate_at(dataset, config, at, plugin_set, models=selected, frictions=frictions)
+                result = integrate_at(dataset, config, at, plugin_set, models=selected, frictions=frictions or ())
             figure = plot(
                 result,
                 kind=kind_menu.value,
