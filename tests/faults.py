@@ -91,8 +91,8 @@ def tap(visit: Callable[..., Any]) -> None:
 
         def truncate(self, size: int | None = None, /) -> int:
             size = self.tell() if size is None else size
-            do = lambda: io.FileIO.truncate(self, size)  # noqa: E731
-            return int(visit(do, "truncate", relative_path(self.fileno()), size))
+            path = relative_path(self.fileno())
+            return int(visit(lambda: io.FileIO.truncate(self, size), "truncate", path, size))
 
     Sink.__bases__ = (RecordedFileIO,)
 

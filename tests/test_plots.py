@@ -12,6 +12,7 @@ import sys
 from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -726,11 +727,10 @@ def test_a_plot_is_drawn_into_axes_of_the_user(coarse: xr.Dataset) -> None:
     assert isinstance(axes[1], Axes)
     with pytest.raises(UsageError, match="ax: got 1 axes, expected 3"):
         impact.plot(coarse, kind="history", sel={"e": 0.5}, ax=axes[0])
-    for look in ({"width": "single"}, {"height": 3.0}, {"style": "ggplot"}):
-        with pytest.raises(
-            UsageError, match=f"^{next(iter(look))}: does not apply to ax, whose figure has its own$"
-        ):
-            impact.plot(coarse, kind="error", ax=axes, **look)  # type: ignore[arg-type]
+    looks: dict[str, Any] = {"width": "single", "height": 3.0, "style": "ggplot"}
+    for name, value in looks.items():
+        with pytest.raises(UsageError, match=f"^{name}: does not apply to ax, whose figure has its own$"):
+            impact.plot(coarse, kind="error", ax=axes, **{name: value})
 
 
 @pytest.mark.parametrize(

@@ -364,9 +364,11 @@ def lazy_dataset(template: xr.Dataset, table: TrajectoryTable, variables: Sequen
     computed = {}
     for variable in variables:
         dims = [*(dim for dim in variable.dims if dim != AXES), *axes]
-        own = [dim for dim in variable.dims if dim == "friction"]
-        varying_axes = {key: [axes[axis] for axis in sorted(by)] for key, by in along[variable.name].items()}
-        by_model = {key: (*own, *of_model) for key, of_model in varying_axes.items()}
+        friction = [dim for dim in variable.dims if dim == "friction"]
+        by_model = {
+            key: (*friction, *(axes[axis] for axis in sorted(varying)))
+            for key, varying in along[variable.name].items()
+        }
         array = indexing.LazilyIndexedArray(ExpandedArray(table, variable))
         encoding = {VARIES_ALONG: by_model, ORIGINAL_DIMS: tuple(dims)}
         computed[variable.name] = xr.Variable(dims, array, attributes_of(variable), encoding)
