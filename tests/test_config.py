@@ -267,6 +267,8 @@ BAD = [
       'x.toml:6: sweep.zip[1][1]: got "e" twice, expected each name once',
       'x.toml:6: sweep.zip[2][0]: got "v9", expected an axis; known: e, v1',
       'x.toml:6: sweep.zip[2][1]: got "m2", which is a scalar, expected an axis: a list or a range']),
+    ("e = 0.5", 'e = [0, 1]\nzip = [["e", "materials.steel.E"]]',
+     ['x.toml:5: sweep.zip[0][1]: got "materials.steel.E", which is a scalar, expected an axis: a list or a range']),
     # parameters of models, also of those that are not chosen
     ("rho = 7850", "rho = 7850\n[model.hetrz]",
      ['x.toml:13: model.hetrz: unknown key; did you mean "hertz"?']),

@@ -12,7 +12,7 @@ from ..contact.variables import default_variables
 from ..errors import did_you_mean
 from ..formatting import argument
 from .draft import Draft
-from .input_names import InputName
+from .input_names import InputName, input_values
 from .quantities import MAX_PROBLEMS, ConfigProblem, KeyPath, Names, Numbers, Range, as_text
 
 # default limit of the points of all models together
@@ -86,7 +86,10 @@ def build_grid(
     sizes = {name: value.size for name, value in values.items() if isinstance(value, Range)}
     sizes |= {name: len(value) for name, value in values.items() if isinstance(value, tuple)}
     scalars = {name: value for name, value in values.items() if isinstance(value, float | str)}
-    refused = dict.fromkeys(scalars, "which is a scalar, expected an axis: a list or a range")
+    # also properties of a material, and parameters of laws that are not selected: these are no inputs of the grid
+    written = {str(name): value for name, value in input_values(draft.data)}
+    fixed = [name for name, value in written.items() if not isinstance(value, list | dict)]
+    refused = dict.fromkeys(fixed, "which is a scalar, expected an axis: a list or a range")
     refused |= dict.fromkeys(cases, "a column of cases; those vary together already")
     refused |= dict.fromkeys(samples, "an uncertain input; those vary together already")
     member_of, problems = _zip_groups(groups, sizes, refused, draft.input_names)
