@@ -88,6 +88,7 @@ def test_another_type_is_named(source: object) -> None:
         (lambda: impact.run(at=[("e", 0.5)]), "at: got a list, expected Mapping[str, object] | None"),
         (lambda: impact.run(model=["hertz"]), "model: got a list, expected str | None"),
         (lambda: impact.solve("hertz", "K", 0.5), "target: got a float, expected Mapping[str, object]"),
+        (lambda: impact.solve("hertz", "K", "e_out=0.5"), "target: got a str, expected Mapping[str, object]"),
         (
             lambda: impact.plot(impact.sweep(BASE), models=[1]),  # type: ignore[list-item]
             "models: got a list with an int, expected Sequence[str] | None",

@@ -45,7 +45,7 @@ from ..engine.plugins import read_plugins
 from ..errors import UsageError, did_you_mean, warn
 from ..formatting import argument, number, prefixed, quantity, safe_text
 from ..results.plausibility import depth_notes
-from ..results.ranking import target_value
+from ..results.ranking import only_target, target_value
 from ..results.single_impact import (
     PointSource,
     ignores_e,
@@ -332,10 +332,7 @@ def solve_damping(config: Config, e: float) -> Config:
 def solve_input(config: Config, unknown: Parameter, target: Mapping[str, object]) -> SolveResult:
     """Find all values of an input that give a target; with an axis, the value nearest to it everywhere."""
     names = [name for name, variable in OUTPUTS.items() if variable.dtype == "f8" and variable.per_model]
-    if len(target) != 1:
-        example = argument("target", {"e_out": 0.6})
-        raise UsageError(f"{argument('target')}: got {len(target)} targets, expected one, such as {example}")
-    ((name, value),) = target.items()
+    name, value = only_target(target)
     if name not in names:
         raise UsageError(f'{argument("target")}: no output "{name}"; {did_you_mean(name, names)}')
     if OUTPUTS[name].of_friction and not config.frictions:

@@ -331,14 +331,20 @@ def recommend(
 
 def _criterion_of(target: Mapping[str, object]) -> Criterion:
     """Check a target."""
-    if len(target) != 1:
-        example = argument("target", {"beta": 0.4})
-        raise UsageError(f"{argument('target')}: got {len(target)} targets, expected one, such as {example}")
-    ((name, value),) = target.items()
+    name, value = only_target(target)
     if name not in TARGETS:
         expected = f"an output of the order of 1; {did_you_mean(name, TARGETS)}"
         raise UsageError(f'{argument("target")}: got "{name}", expected {expected}')
     return Criterion(name, target_value(name, value))
+
+
+def only_target(target: Mapping[str, object]) -> tuple[str, object]:
+    """Return the name and the value of a target of one output."""
+    items = list(target.items())
+    if len(items) != 1:
+        example = argument("target", {"e_out": 0.6})
+        raise UsageError(f"{argument('target')}: got {len(items)} targets, expected one, such as {example}")
+    return items[0]
 
 
 def target_value(name: str, value: object) -> float:
