@@ -10,6 +10,8 @@ ROOM ?= 2000000
 SITE ?= .venv-site
 BIN := $(VENV)/bin
 RESULTS ?= results
+# of the tests that `make test-faults` runs
+MARKS ?= faults or slow
 
 .DEFAULT_GOAL := help
 .PHONY: help figure figures regress test test-faults test-long test-fast test-peers peers conform check release-check docs site bench clean
@@ -36,8 +38,9 @@ figure-%: $(BIN)/impact
 test: $(VENV)/dev  ## run the tests
 	$(BIN)/python -m pytest -n auto --dist worksteal
 
-test-faults: $(VENV)/dev  ## run the fault-injection tests and the slow tests, and print their summaries
-	$(BIN)/python -m pytest -n auto --dist worksteal -m '(faults or slow) and not long' -rP --durations=40 tests
+# some of them wait for browsers, servers and other codes: they take one process more than there are cores
+test-faults: $(VENV)/dev $(if $(findstring peers,$(MARKS)),peers)  ## run the fault-injection tests and the slow tests, and print their summaries
+	PEERS_VENV=$(PEERS) $(BIN)/python -m pytest -n $$(($$(getconf _NPROCESSORS_ONLN) + 1)) --dist worksteal -m '($(MARKS)) and not long' -rP --durations=40 tests
 
 test-long: $(VENV)/dev  ## kill sweeps at every file operation, compare thousands of slips with the slow reference, fit friction
 	$(BIN)/python -m pytest -n auto --dist worksteal -m long tests
@@ -48,9 +51,8 @@ test-fast: $(VENV)/dev  ## test the compiled core; installs the extra "fast"
 
 peers: $(PEERS)/peers
 
-# a third of the time these tests wait for other programs to start
-test-peers: peers  ## compare entries of codes with LAMMPS, LIGGGHTS, YADE, MuJoCo, Drake, Simbody, OpenSees, Kratos, PyBullet, EXUDYN and Newton
-	PEERS_VENV=$(PEERS) $(BIN)/python -m pytest -n 3 --dist worksteal --durations=40 -m peers $(shell grep -l "mark.peers" tests/test_*.py)
+test-peers:  ## compare entries of codes with LAMMPS, LIGGGHTS, YADE, MuJoCo, Drake, Simbody, OpenSees, Kratos, PyBullet, EXUDYN and Newton
+	$(MAKE) test-faults MARKS=peers
 
 # with a release of LAMMPS from 2022 beside the newest one
 conform: peers  ## run the engines of impact conform, and write their board docs/conform/board.md

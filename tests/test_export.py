@@ -1029,7 +1029,7 @@ def test_yade_takes_the_tangential_springs_of_each_ball_and_an_angle_of_friction
     with pytest.raises(UsageError, match="k_t: YADE has none with its MindlinPhys"):
         impact.export("yade", "yade-betan", source=mindlin | {"friction": {"yade-mindlin": {"k_t": 1e8}}},
                       friction="yade-mindlin", code_version="2023.02a")  # fmt: skip
-    with pytest.raises(UsageError, match='YADE has no "yade-mindlin" with yade-en; no friction is written'):
+    with pytest.raises(UsageError, match='YADE has no "yade-mindlin" with yade-en, but with yade-betan'):
         impact.export("yade", "yade-en", source=mindlin, friction="yade-mindlin", code_version="2023.02a")
 
 
@@ -1119,11 +1119,14 @@ def test_friction_that_a_code_does_not_have_is_refused_or_left_out_with_a_warnin
     assert "\n" not in str(refusal.value)
     with pytest.raises(UsageError, match='Kratos DEM has no "coulomb-1785"; known: kratos-viscous-coulomb'):
         impact.export("kratos", at=OBLIQUE, friction="coulomb-1785", code_version="10.4.4")
+    # no friction law of YADE is combined with its default law
+    with pytest.raises(UsageError, match='YADE has no "coulomb-1785"; known: yade-mindlin, yade-viscoelastic'):
+        impact.export("yade", at=OBLIQUE, friction="coulomb-1785", code_version="2023.02a")
     known = "known: liggghts-history, liggghts-no-history"
     with pytest.raises(UsageError, match=f'has no "coulomb-1785"; {known}'):
         impact.export("liggghts", at=OBLIQUE, friction="coulomb-1785", code_version="3.8.0")
     # the law, and why it is not combined with a friction law that the code has
-    with pytest.raises(UsageError, match='no "liggghts-history" with liggghts-edinburgh; no friction is written'):
+    with pytest.raises(UsageError, match='no "liggghts-history" with liggghts-edinburgh, but with liggghts-'):
         impact.export("liggghts", "liggghts-edinburgh", friction="liggghts-history", code_version="3.8.0")
     law = "lammps-linear-nohistory"
     with pytest.raises(UsageError, match=f"friction.{law}.limit: LAMMPS, pair style granular has only abs"):

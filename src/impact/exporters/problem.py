@@ -191,10 +191,13 @@ def _choose_friction(
     """Choose the friction law that is asked for, or the first of the source that a code has; else list those."""
     known = [law for law in code.frictions if code.has_friction(model, law)]
     if friction is not None and friction not in known:
-        beside = f" with {model}" if friction in code.frictions else ""
-        reason = "" if code.frictions else ": none of it was run"
-        expected = did_you_mean(friction, known) if known else f"no friction is written for it{reason}"
-        raise UsageError(f'{argument("friction")}: {code.title} has no "{friction}"{beside}; {expected}')
+        problem = f'{argument("friction")}: {code.title} has no "{friction}"'
+        if friction in code.frictions:
+            others = ", ".join(law for law in code.laws if code.has_friction(law, friction))
+            raise UsageError(f"{problem} with {model}, but with {others}")
+        if not code.frictions:
+            raise UsageError(f"{problem}; no friction is written for it: none of it was run")
+        raise UsageError(f"{problem}; {did_you_mean(friction, known or list(code.frictions))}")
     keys = [law.key for law in source.draft(model).frictions]
     chosen = friction or next((key for key in keys if key in known), None)
     return chosen, () if chosen else tuple(keys)
