@@ -107,6 +107,13 @@ EXTENSIONS = {
 }
 
 
+def test_trajectories_that_failed_are_not_integrated_again(cli: Run, stored_sweep: StoredSweep) -> None:
+    path = stored_sweep(BASE, FACTORED, "solver.max_steps=3", "solver.rtol=1e-10")
+    assert not (impact.load(path)["status"] == 1).any()
+    done = cli("extend", path, "--set", "sweep.m2=[2.0, 3.0]")
+    assert "\n0 of 3 trajectories were integrated for it\n" in f"\n{done.stderr}"
+
+
 @pytest.mark.slow
 @BOTH_LAYOUTS
 @pytest.mark.parametrize("extension", EXTENSIONS)

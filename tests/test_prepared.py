@@ -54,6 +54,15 @@ def test_a_pair_with_friction_gives_what_a_run_gives() -> None:
     assert got["beta"][0, 2] != got["beta"][1, 2]
 
 
+def test_a_parameter_that_the_config_does_not_have_is_an_input_by_its_name_alone() -> None:
+    law = "lammps-mindlin"
+    at = {"R1": 0.01, "R2": 0.02, "u1": 0.3, "mu": 0.2}
+    problem = impact.prepare(model="hertz", friction=law, at=at, outputs=("beta",))
+    chosen = problem(k_t=1e6)["beta"]
+    assert chosen == problem(**{f"friction.{law}.k_t": 1e6})["beta"]
+    assert chosen != pytest.approx(problem()["beta"], abs=1e-3)
+
+
 @pytest.mark.parametrize(
     "half", ["50 %", np.float32(0.5), 0.5 * unit.dimensionless, pd.Series([0.5]), np.array([[0.5]]), [0.5]]
 )

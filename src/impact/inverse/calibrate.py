@@ -342,7 +342,11 @@ def _dimension_of_product(
 
 
 def _reduced(rows: Array) -> Array:
-    """Bring rows to reduced row echelon form."""
+    """Bring rows to reduced row echelon form.
+
+    >>> _reduced(np.array([[0.0, 2.0, 4.0], [0.0, 1.0, 3.0]])).tolist()
+    [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+    """
     rows = rows.copy()
     column = 0
     for row in range(len(rows)):
