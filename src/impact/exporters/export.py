@@ -286,7 +286,7 @@ def _warnings(problem: ExportProblem, collision: Collision, row: timestep.Timest
     """List what a user has to know before using the lines."""
     warnings = list(problem.code.warnings(collision))
     if problem.better_fit:
-        warnings.append(_better_fit(problem))
+        warnings.append(problem.better_fit)
     if abs(problem.e_continuous - problem.requested_e) > ASKED_TOL:
         key, requested = problem.model.key, number(problem.requested_e)
         warnings.append(
@@ -297,11 +297,6 @@ def _warnings(problem: ExportProblem, collision: Collision, row: timestep.Timest
         laws = ", ".join(problem.left_out)
         warnings.append(f"{laws}: {problem.code.title} has no such friction law, the lines have no friction")
     return [*warnings, *row.warnings(problem.law.phases)]
-
-
-def _better_fit(problem: ExportProblem) -> str:
-    """Name the law of a calibration that fits best."""
-    return f"the law that fits best, {problem.better_fit}, is none of {problem.code.title}"
 
 
 def _row(problem: ExportProblem, dt: float) -> timestep.TimestepRow:
@@ -328,7 +323,7 @@ def _header(
     ]
     if problem.missing_law:
         header.append(f"release {problem.version} lacks the default law of {code.newest}, {problem.missing_law}")
-    header += [*([_better_fit(problem)] if problem.better_fit else []), *problem.fit_notes]
+    header += [*([problem.better_fit] if problem.better_fit else []), *problem.fit_notes]
     if problem.defaults:
         header.append(f"defaults of Table 1 of the paper: {', '.join(problem.defaults)}")
     if problem.point.defaulted_axes:

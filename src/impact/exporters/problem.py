@@ -45,7 +45,7 @@ class ExportProblem:
     outputs : of the continuous law, by name, in SI
     point : the config, the axes of the source that are at their first value, and the damping that was solved for
     fit_notes : of a calibration, the rank of the law and its weight, and other laws that were fitted
-    better_fit : the law of a calibration that fits best, where it is none of the code; else ""
+    better_fit : a remark on the law of a calibration that fits best, where it is none of the code; else ""
     missing_law : the default law of the newest release, where this one lacks it and none was requested; else ""
     defaults : values of Table 1 of the paper that enter, since nothing else gives them
     left_out : friction laws of the source, where the code has none of them
@@ -240,4 +240,5 @@ def _fit_notes(code: Code, version: str, key: str, calibration: Calibration) -> 
     if others:
         notes.append(f"{argument('model', 'KEY')} exports another law that was fitted: {'; '.join(others)}")
     notes += unidentified_notes(calibration.dataset.isel(model=[chosen]))
-    return "" if is_in_code[0] else named[0], tuple(notes)
+    better_fit = "" if is_in_code[0] else f"the law that fits best, {named[0]}, is none of {code.title}"
+    return better_fit, tuple(notes)
