@@ -205,7 +205,7 @@ def export(
     program_path, version = choose_version(code, program, code_version, verify=verify)
     problem = prepare_export(code, model, version, source, at or {}, overrides, friction)
     check_outputs([output], [source, *problem.point.config.files], overwrite=overwrite)
-    if (script or verify) and not code.template:
+    if script and not code.template:
         raise UsageError(f"{argument('script')}: there is none for {code.title}: {code.tested}")
     contact_time = problem.law.contact_time
     given = [] if dt is None else [read_number(dt, SWEEP_QUANTITIES["dt"], argument("dt"))]
@@ -228,7 +228,6 @@ def export(
             needed = timestep.needed_parameter(problem.point, name, dt, ADVISED_TOL, problem.law, advised)
     needed_text = str(needed or (timestep.missing_parameter(parameter, ADVISED_TOL) if parameter else ""))
     header = _header(problem, collision, at_dt, advised, needed_text)
-    lines = [*comment_lines(header), code.script(collision, parameters)] if script else []
     result = Export(
         code=code.name,
         version=problem.version,
@@ -245,7 +244,7 @@ def export(
         parameters=parameters,
         header=tuple(header),
         lines=tuple(code.lines(collision, parameters)),
-        script="\n".join(lines) if script else None,
+        script="\n".join([*comment_lines(header), code.script(collision, parameters)]) if script else None,
         warnings=tuple(_warnings(problem, collision, at_dt)),
         verification=verify_scripts(problem, program_path, dt) if verify and program_path else None,
         comment=code.comment,
