@@ -197,9 +197,6 @@ class Code:
         # only scripts need it
         from jinja2 import Environment, StrictUndefined
 
-        if collision.has_wall and "has_wall" not in self.template:
-            expected = f"a finite mass: no wall of {self.title} was run"
-            raise UsageError(f"{argument('script')}: m2: got inf, expected {expected}")
         lines = self.lines(collision, parameters)
         material2 = "material2" if any(line.startswith("material2 = ") for line in lines) else "material1"
         values = {"material1": "material1", "material2": material2, **collision.script_values()}
