@@ -93,7 +93,7 @@ class Collision:
                 expected = "m2 = inf for a wall" if name == "m1" else "a finite value, or m2 = R2 = inf for a wall"
                 raise UsageError(f"{argument('script')}: {name}: got {number(self[name])}, expected {expected}")
         v1, v2 = (self["v0"], 0.0) if self.has_wall else (self["v1"], self["v2"])
-        radii = self["R1"] + (0.0 if self.has_wall else self["R2"])
+        rim2 = 0.0 if self.has_wall else self["R2"]
         values = {
             "x1": -self["R1"] - self.gap,
             "x2": self["R2"],
@@ -106,7 +106,7 @@ class Collision:
             "dt": self.dt,
             "steps": self.steps,
             "gap": self.gap,
-            "reach": 2.0 * (radii + self.gap + 2.0 * (abs(v1) + abs(v2)) * self.steps * self.dt),
+            "reach": 2.0 * (self["R1"] + rim2 + self.gap + 2.0 * (abs(v1) + abs(v2)) * self.steps * self.dt),
             "skin": 0.1 * min(self["R1"], self["R2"]),
             "v1": v1,
             "v2": v2,
@@ -120,7 +120,6 @@ class Collision:
                         f"{argument('script')}: {found}, expected {SOLID}: balls of scripts are solid"
                     )
             u1, u2 = (self["u1"] - self["u2"], 0.0) if self.has_wall else (self["u1"], self["u2"])
-            rim2 = 0.0 if self.has_wall else self["R2"]
             slip = u1 + self["R1"] * self["omega1"] - u2 + rim2 * self["omega2"]
             if slip == 0.0:
                 raise UsageError(f"{argument('script')}: there is no slip before the impact, and so no beta")
