@@ -210,23 +210,17 @@ def lines(collision: Collision, parameters: Parameters) -> list[str]:
     numbers = " ".join(str(parameters[name]) for name in names) if collision.friction else "0.0 0.0"
     rest = f"damping {damping} tangential {FRICTIONS.get(collision.friction, 'linear_nohistory')} {numbers}{limit}"
     of_normal = [repr(value) for name, value in parameters.items() if name not in names]
-    by_types = [f"* * {spring} {' '.join(of_normal)}"]
-    if "E" in parameters:
-        strength = parameters["e"] if "e" in parameters else parameters["eta_n0"]
-        moduli = [(parameters["E"], parameters["nu"])]
-        if "E2" in parameters:
-            moduli.append((parameters["E2"], parameters["nu2"]))
-        types = ["* *"] if len(moduli) == 1 else ["1 1", "2 2"]
-        by_types = [
-            f"{pair} hertz/material {modulus!r} {strength!r} {ratio!r}"
-            for pair, (modulus, ratio) in zip(types, moduli, strict=True)
-        ]
-    contacts = ["pair_style      granular", *(f"pair_coeff      {pair} {rest}" for pair in by_types)]
+    by_types = {"* *": of_normal}
+    if "E2" in parameters:
+        E, strength, nu, E2, nu2 = of_normal
+        by_types = {"1 1": [E, strength, nu], "2 2": [E2, strength, nu2]}
+    model = "hertz/material" if "E" in parameters else spring
+    contacts = {types: f"{model} {' '.join(words)} {rest}" for types, words in by_types.items()}
+    written = ["pair_style      granular", *(f"pair_coeff      {types} {law}" for types, law in contacts.items())]
     if collision.has_wall:
-        model = by_types[0].removeprefix("* * ")
-        contacts = [f"fix             wall all wall/gran granular {model} {rest} xplane NULL 0.0"]
+        written = [f"fix             wall all wall/gran granular {contacts['* *']} xplane NULL 0.0"]
     return [
-        *contacts,
+        *written,
         f"timestep        {collision.dt!r}",
     ]
 
