@@ -19,10 +19,8 @@ def parameters(collision: Collision) -> dict[str, float | str]:
     c = collision
     if c.model.key == "mercurydpm-linear-viscoelastic":
         return {"stiffness": c["K"], "restitution": c["e"], "mass": 2.0 * c["m"]}
-    modulus = {"effectiveElasticModulus": 0.75 * c["K"] / math.sqrt(c.effective_radius)}
-    return (
-        {**modulus, "restitution": c["e"]} if c.model.key == "tsuji-1992" else {**modulus, "dissipation": c["A"]}
-    )
+    loss = {"restitution": c["e"]} if c.model.key == "tsuji-1992" else {"dissipation": c["A"]}
+    return {"effectiveElasticModulus": 0.75 * c["K"] / math.sqrt(c.effective_radius), **loss}
 
 
 def lines(collision: Collision, parameters: Parameters) -> list[str]:
