@@ -190,11 +190,8 @@ def notes(collision: Collision) -> list[str]:
             "the force is never negative (since January 2014)",
         ]
     if collision.has_wall:
-        remarks.append(
-            "hertzian=True: by default a wall has R* = R1/2, 0.7071 of a plane's K, and 1.149 of its contact time"
-            if is_hertzian(collision.version)
-            else "a wall has R* = R1/2, 0.7071 of a plane's K, and 1.149 of its contact time"
-        )
+        by_default = "hertzian=True: by default " if is_hertzian(collision.version) else ""
+        remarks.append(f"{by_default}a wall has R* = R1/2, 0.7071 of a plane's K, and 1.149 of its contact time")
     return [
         *remarks,
         "two materials: 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2; en and betan are set for each pair by MatchMaker",
