@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 
+from ..contact.closed_forms.dashpot import gap_damping
 from ..errors import UsageError
 from .code import Code, Collision, Parameters, keyword_arguments
 from .programs import Program, printed_version
@@ -102,7 +103,7 @@ def parameters(collision: Collision) -> dict[str, float | str]:
         elastic |= {"en": c["e"]}
     else:
         # ζ of the law is √1.2 β
-        elastic |= {"betan": c["betan"] if c.model.key == "yade-betan-direct" else linear_damping(c["e"])}
+        elastic |= {"betan": c["betan"] if c.model.key == "yade-betan-direct" else float(gap_damping(c["e"]))}
     return elastic | mindlin_friction(c)
 
 
@@ -125,22 +126,13 @@ def mindlin_friction(collision: Collision) -> dict[str, float]:
     for name in ("k_t", "kt_over_kn"):
         if not math.isnan(c[name]):
             raise UsageError(f"{name}: YADE has none with its MindlinPhys, whose tangential stiffness is 8 G* a")
-    betas = linear_damping(c["e"]) if math.isnan(c["betas"]) else c["betas"]
+    betas = float(gap_damping(c["e"])) if math.isnan(c["betas"]) else c["betas"]
     return {"betas": betas, "frictionAngle": math.atan(c["mu"])}
 
 
 def is_hertzian(version: str) -> bool:
     """Return whether a wall can be hertzian; seen in 2023.02a."""
     return version >= "2023.02a"
-
-
-def linear_damping(e: float) -> float:
-    """Compute the damping ratio of a linear spring and dashpot that ends at zero indentation, see `yade-betan`."""
-    if e == 0.0:
-        # the limit
-        return 1.0
-    logarithm = math.log(e)
-    return -logarithm / math.hypot(math.pi, logarithm)
 
 
 def lines(collision: Collision, parameters: Parameters) -> list[str]:
