@@ -14,7 +14,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from ..results.board import CHECKS, excess_of
+from ..results.board import CHECKS
 from .suite import ANSWER_KEYS, RELATIONS, Question, Trial, transform
 
 Answer = Mapping[str, float]
@@ -272,11 +272,6 @@ def tolerances(kind: Kind, *, float32: bool, tol: Mapping[str, float]) -> dict[s
         default = max(default, FLOAT32_TOLERANCE) if float32 else default
         chosen[name] = 0.0 if name in EXACT else tol.get(name, tol.get("all", default))
     return chosen
-
-
-def passes(name: str, delivered: Delivered, tolerance: float) -> bool:
-    """Judge a value; NaN never passes."""
-    return excess_of(name, *delivered) <= tolerance
 
 
 def checks_of(trial: Trial, trials: Mapping[str, Trial]) -> list[str]:

@@ -13,7 +13,7 @@ from ..atomic import check_outputs
 from ..errors import UsageError, did_you_mean
 from ..formatting import argument, number
 from ..reporting.report import report
-from ..results.board import CHECKS, Board, EngineChecks, board_dataset
+from ..results.board import CHECKS, Board, EngineChecks, board_dataset, excess_of
 from ..results.schema import CHECK_STATUSES
 from ..results.xarray_backend import save
 from . import checks
@@ -205,6 +205,7 @@ def _judge(
                 asked = checks.OF_AN_ANSWER[name](silent).asked if name in checks.OF_AN_ANSWER else float("nan")
                 rows.append((asked, float("nan"), tolerance[name], CHECK_STATUSES["not_supported"]))
             else:
-                word = "pass" if checks.passes(name, delivered, tolerance[name]) else "fail"
+                # NaN never passes
+                word = "pass" if excess_of(name, *delivered) <= tolerance[name] else "fail"
                 rows.append((*delivered, tolerance[name], CHECK_STATUSES[word]))
     return EngineChecks(facts.engine, facts.version, facts.kind, *zip(*rows, strict=True))
