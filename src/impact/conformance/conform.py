@@ -83,6 +83,7 @@ def conform(
     judged = _selected(trials, [only] if isinstance(only, str) else only)
     commands: list[tuple[str, object]] = [(name, find_engine(name).command(program)) for name in names]
     commands += [(_adapter_name(word), word) for word in adapters]
+    checked = [(trial, name) for trial in judged for name in checks.checks_of(trial, trials)]
     engines: list[EngineChecks] = []
     for position, (name, command) in enumerate(commands):
         with ExitStack() as stack:
@@ -92,9 +93,8 @@ def conform(
             facts, answers, again = _ask_all(ask, trials, judged)
         # an adapter may name its engine; names are labels of the board
         facts = replace(facts, engine=_unique(facts.engine or name, [engine.engine for engine in engines]))
-        engines.append(_judge(facts, trials, judged, answers, again, requested))
-    labels = [(trial.id, name) for trial in judged for name in checks.checks_of(trial, trials)]
-    board = Board(board_dataset(suite, labels, engines))
+        engines.append(_judge(facts, trials, checked, answers, again, requested))
+    board = Board(board_dataset(suite, [(trial.id, name) for trial, name in checked], engines))
     if path is not None and path.suffix.lower() in PAGE_SUFFIXES:
         report(board.dataset, output=path, overwrite=overwrite)
     elif path is not None:
@@ -162,14 +162,14 @@ def _ask_all(
 def _judge(
     facts: Facts,
     trials: Mapping[str, Trial],
-    judged: Sequence[Trial],
+    checked: Sequence[tuple[Trial, str]],
     answers: Mapping[str, checks.Answer | None],
     again: Mapping[str, checks.Answer | None],
     tol: Mapping[str, float],
 ) -> EngineChecks:
     """Judge the answers of one engine; a check that needs an answer which is not supported is not supported."""
     tolerance = checks.tolerances(facts.kind, float32=facts.is_float32, tol=tol)
-    with_friction = [trial.question for trial in judged if "friction" in checks.checks_of(trial, trials)]
+    with_friction = [trial.question for trial, name in checked if name == "friction"]
     betas: Mapping[str, float] = {}
     if facts.law and with_friction:
         betas = betas_of_law(with_friction, facts.law, facts.model, facts.parameters)
@@ -196,16 +196,15 @@ def _judge(
         return None if coarse is None else checks.step(coarse, base, rebound)
 
     rows = []
-    for trial in judged:
-        for name in checks.checks_of(trial, trials):
-            delivered = deliver(trial, name)
-            if delivered is None:
-                # what is asked for is independent of the answer, but for friction
-                silent = checks.Rebound(trial.question, dict.fromkeys(ANSWER_KEYS, float("nan")))
-                asked = checks.OF_AN_ANSWER[name](silent).asked if name in checks.OF_AN_ANSWER else float("nan")
-                rows.append((asked, float("nan"), tolerance[name], CHECK_STATUSES["not_supported"]))
-            else:
-                # NaN never passes
-                word = "pass" if excess_of(name, *delivered) <= tolerance[name] else "fail"
-                rows.append((*delivered, tolerance[name], CHECK_STATUSES[word]))
+    for trial, name in checked:
+        delivered = deliver(trial, name)
+        if delivered is None:
+            # what is asked for is independent of the answer, but for friction
+            silent = checks.Rebound(trial.question, dict.fromkeys(ANSWER_KEYS, float("nan")))
+            asked = checks.OF_AN_ANSWER[name](silent).asked if name in checks.OF_AN_ANSWER else float("nan")
+            rows.append((asked, float("nan"), tolerance[name], CHECK_STATUSES["not_supported"]))
+        else:
+            # NaN never passes
+            word = "pass" if excess_of(name, *delivered) <= tolerance[name] else "fail"
+            rows.append((*delivered, tolerance[name], CHECK_STATUSES[word]))
     return EngineChecks(facts.engine, facts.version, facts.kind, *zip(*rows, strict=True))
