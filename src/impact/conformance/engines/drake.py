@@ -66,10 +66,8 @@ def run(c: dict[str, Any], solver: str, stiffness: float, **damping: float) -> d
     friction = CoulombFriction(c["mu"], c["mu"])
     # the springs of both bodies are in series
     if "relaxation_time" in damping:
-        material.AddProperty("material", "relaxation_time", damping["relaxation_time"])
-        AddContactMaterial(point_stiffness=2.0 * stiffness, friction=friction, properties=material)
-    else:
-        AddContactMaterial(point_stiffness=2.0 * stiffness, friction=friction, properties=material, **damping)
+        material.AddProperty("material", "relaxation_time", damping.pop("relaxation_time"))
+    AddContactMaterial(point_stiffness=2.0 * stiffness, friction=friction, properties=material, **damping)
     builder = DiagramBuilder()
     plant, _ = AddMultibodyPlantSceneGraph(builder, time_step=step)
     plant.set_contact_model(ContactModel.kPoint)
