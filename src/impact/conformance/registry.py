@@ -28,7 +28,7 @@ class Engine:
     program : what runs it, an interpreter that has its package, or a program of its own
     settings : what a careful user would choose, in a sentence
     file, function : of the adapter, where it is not the function `collide` of the file of the same name
-    is_interpreter : the program runs the adapter, as a script in Python; others are the last word of its command
+    is_interpreter : the program runs the adapter, as a script in Python; others and their version end its command
     """
 
     name: str
@@ -49,7 +49,8 @@ class Engine:
         found = self.program.find(program)
         if found is None and program is not None:
             raise _no_program(program)
-        if found is None or self.program.version_of(found) is None:
+        version = None if found is None else self.program.version_of(found)
+        if found is None or version is None:
             place = "on the path" if found is None else f"in {found}" if self.is_package else f"as {found}"
             missing = f"{self.name}: {self.title} is not installed {place}"
             raise UsageError(f"{missing}; {self.program.install}, or {argument('program')}")
@@ -60,7 +61,7 @@ class Engine:
             # it prints a greeting on stdout, where answers are expected
             words = [*self.program.command(found, str(SERVE)), f"{file}:{self.function}", "3"]
             return ["sh", "-c", 'exec "$@" 3>&1 >&2', "sh", *words]
-        return [*python_command(sys.executable, file, self.function), "1", found]
+        return [*python_command(sys.executable, file, self.function), "1", found, version]
 
 
 ENGINES: Mapping[str, Engine] = {
