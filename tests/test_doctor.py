@@ -28,9 +28,16 @@ def test_versions_are_those_of_the_packages(cli: Run) -> None:
     }
 
 
-def test_the_text_lists_the_packages_under_their_headings(cli: Run) -> None:
-    lines = [" ".join(line.split()) for line in cli("doctor").stdout.splitlines()]
-    assert f"h5py {metadata.version('h5py')}" in lines[lines.index("package version") :]
+def test_the_text_has_parts_for_the_program_its_packages_the_compiled_core_and_the_codes(cli: Run) -> None:
+    program, packages, core, codes = (
+        [" ".join(line.split()) for line in part.splitlines()] for part in cli("doctor").stdout.split("\n\n")
+    )
+    assert program[:2] == [f"impact {impact.__version__}", f"Python {sys.version.split()[0]}"]
+    assert packages[0] == "package version"
+    assert f"h5py {metadata.version('h5py')}" in packages
+    assert [line.startswith("compiled core: ") for line in core] == [True]
+    assert codes[0] == "code version program"
+    assert any(line.startswith("lammps ") for line in codes)
 
 
 @pytest.mark.slow
