@@ -323,23 +323,27 @@ def test_opensees_gets_the_effective_mass_and_the_damping_of_its_documentation()
     # 9 sqrt(5)/2 (1 - e^2)/(e (e (9 pi - 16) + 16)) at e = 0.5
     assert export.parameters["xi"] == pytest.approx(0.6816, abs=1e-3)
     assert (export.parameters["Kh"], export.parameters["Meff"]) == (1e8, pytest.approx(0.75, rel=1e-15))
-    hertzdamp = impact.export("opensees", "opensees-hertzdamp", source=source(K=1e8))
+    hertzdamp = impact.export("opensees", "opensees-hertzdamp", source=source(K=1e8, n=1.2))
     assert hertzdamp.parameters["xiNorm"] == pytest.approx(1.6, rel=1e-15)
+    # the exponent of the law comes after the gap
+    for lines, n in ((export.lines, 1.5), (hertzdamp.lines, 1.2)):
+        assert lines[0].endswith(f", gap, {n})")
 
 
-def test_the_impact_material_of_opensees_has_the_peak_force_and_the_loss_of_hertz() -> None:
-    """At the indentation d it has Hertz' force, and its loop has the energy that Hertz' spring loses to e."""
+@pytest.mark.parametrize("n", [1.5, 1.2])
+def test_the_impact_material_of_opensees_has_the_peak_force_and_the_loss_of_a_spring(n: float) -> None:
+    """At the indentation d it has the force K d^n, and its loop has the energy that the spring loses to e."""
     K, e, d = 1e8, 0.6, 1e-4
     at = {"opensees-impact-material.d": d}
-    export = impact.export("opensees", "opensees-impact-material", source=source(K=K, e=e), at=at)
+    export = impact.export("opensees", "opensees-impact-material", source=source(K=K, e=e, n=n), at=at)
     assert any("another speed gives another restitution" in line for line in export.header)
     numbers = export.parameters
     first, second, end = (float(numbers[name]) for name in ("K1", "K2", "delta_y"))
     # compression is negative there
     assert end == pytest.approx(-0.1 * d, rel=1e-15)
-    assert first * -end + second * (d + end) == pytest.approx(K * d**1.5, rel=1e-14)
+    assert first * -end + second * (d + end) == pytest.approx(K * d**n, rel=1e-14)
     loop = (first - second) * -end * (d + end)
-    assert loop == pytest.approx(0.4 * K * d**2.5 * (1.0 - e**2), rel=1e-13)
+    assert loop == pytest.approx(K * d ** (n + 1.0) / (n + 1.0) * (1.0 - e**2), rel=1e-13)
 
 
 def test_newton_says_how_well_its_single_precision_resolves_the_indentation() -> None:

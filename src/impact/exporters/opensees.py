@@ -51,14 +51,14 @@ def parameters(collision: Collision) -> dict[str, float | str]:
     c = collision
     match MATERIALS[c.model.key]:
         case "Hertzdamp":
-            return {"Kh": c["K"], "xiNorm": 8.0 * (1.0 - c["e"]) / (5.0 * c["e"]), "n": 1.5}
+            return {"Kh": c["K"], "xiNorm": 8.0 * (1.0 - c["e"]) / (5.0 * c["e"]), "n": c["n"]}
         case "JankowskiImpact":
             e = c["e"]
             xi = 9.0 * math.sqrt(5.0) / 2.0 * (1.0 - e**2) / (e * (e * (9.0 * math.pi - 16.0) + 16.0))
-            return {"Kh": c["K"], "xi": xi, "Meff": c["m"], "n": 1.5}
+            return {"Kh": c["K"], "xi": xi, "Meff": c["m"], "n": c["n"]}
         case "ImpactMaterial":
-            # of equal energy and loss as a spring of Hertz with the indentation d
-            secant, loss = c["K"] * math.sqrt(c["d"]), (1.0 - c["e"] ** 2) / 2.5
+            # of equal energy and loss as a spring K x^n with the indentation d
+            secant, loss = c["K"] * c["d"] ** (c["n"] - 1.0), (1.0 - c["e"] ** 2) / (c["n"] + 1.0)
             ratio = 1.0 / YIELD_SHARE
             return {
                 "K1": secant * (1.0 + ratio * loss),
