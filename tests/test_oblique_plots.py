@@ -103,6 +103,12 @@ def test_a_curve_of_a_pair_has_the_values_of_the_result(beads: xr.Dataset, kind:
         assert curve.x == tuple(beads["angle"].values.tolist())
 
 
+@pytest.mark.parametrize("kind", ["beta", "spin"])
+def test_negative_values_are_not_left_out_on_a_logarithmic_axis(beads: xr.Dataset, kind: str) -> None:
+    with pytest.raises(UsageError, match=r'^log="y": the axis y would stay linear: it has values <= 0'):
+        impact.plot(beads, kind=kind, log="xy")
+
+
 def test_a_pair_that_cannot_be_combined_is_named_with_the_reason(beads: xr.Dataset) -> None:
     data = curves_of(beads, "beta")
     reason = "the contact force lacks what the friction law needs"
@@ -299,6 +305,8 @@ def test_slips_are_those_of_maw_barber_and_fawcett() -> None:
     assert beyond.startswith("slips beyond psi1 = ")
     (panel,) = data.panels
     assert (panel.x_name, panel.y_name) == ("psi1", "psi2")
+    (logarithmic,) = curves_of(slips, "psi", sel={"mu": 0.1}, log="xy").panels
+    assert (logarithmic.x_log, logarithmic.y_log) == (True, False)
     check_layout(draw(data, Look(width="84mm")))
 
 

@@ -445,6 +445,20 @@ def test_a_logarithmic_axis_that_no_picture_has_is_refused(coarse: xr.Dataset, t
     assert list(drawn.pictures) == ["error", "loop"]
 
 
+def test_no_value_is_lost_on_a_logarithmic_axis(coarse: xr.Dataset) -> None:
+    # the restitution at e = 0
+    with pytest.raises(UsageError, match=r'^log="y": the axis y would stay linear: it has values <= 0'):
+        impact.plot(coarse, kind="restitution", log="y")
+    above = coarse.isel(e=slice(1, None))
+    assert impact.plot(above, kind="restitution", log="y").axes[0].get_yscale() == "log"
+    # errors have both signs, their absolute values a floor
+    assert [axes.get_yscale() for axes in impact.plot(coarse, kind="error", log="y").axes] == ["linear", "log"]
+    points = pd.DataFrame({"e": [0.5, 0.6], "e_out": [0.0, 0.5]})
+    assert impact.plot(above, kind="restitution", points=points).axes[0].get_yscale() == "linear"
+    with pytest.raises(UsageError, match=r"^points: e_out has values <= 0, which a logarithmic axis cannot show$"):
+        impact.plot(above, kind="restitution", log="y", points=points)
+
+
 def test_no_law_is_not_every_law(coarse: xr.Dataset) -> None:
     for act in (impact.plot, impact.recommend):
         with pytest.raises(UsageError, match=r"^models: got an empty list, expected one name or more$"):

@@ -73,20 +73,17 @@ def _panels(data: xr.Dataset, name: str, varied: str, choice: Choice) -> tuple[P
         has_band = all(np.isfinite(end).all() for end in band)
         curves.append(curve_of(label, key, grid, y, name, band=band if has_band else ()))
         residuals.append(curve_of(label, key, x, law["residual"] / _deviation(law), f"{name}_residual"))
-    axis = x_axis_fields(data[varied or "point"], choice)
-    axis["x_log"] = (
-        _is_logarithmic(x, grid) if varied and not choice.log else "x" in choice.log and bool((x > 0.0).all())
-    )
+    axis = x_axis_fields(data[varied or "point"])
+    axis["x_log"] = bool(varied) and not choice.log and _is_logarithmic(x, grid)
     values = Panel(
         y_label="Delivered restitution" if name == "e_out" else OUTPUTS[name].short_meaning.capitalize(),
         curves=tuple(curves),
         y_unit=OUTPUTS[name].unit,
         y_name=name,
-        y_log="y" in choice.log,
         band_name=BAND_NAME,
         **axis,
     )
-    return values, Panel(
+    residual = Panel(
         y_label="Residual in σ",
         curves=tuple(residuals),
         bands=(SHADED_RESIDUAL,),
@@ -95,6 +92,8 @@ def _panels(data: xr.Dataset, name: str, varied: str, choice: Choice) -> tuple[P
         height=RESIDUAL_HEIGHT,
         **axis,
     )
+    # residuals have both signs
+    return values.with_log_axes(choice.log), residual.with_log_axes(choice.log.strip("y"))
 
 
 def _law_label(law: xr.Dataset, choice: Choice) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import zip_longest
 from typing import Any, Literal
 
@@ -22,7 +22,6 @@ from ..config.measurements import SIGMA
 from ..errors import UsageError
 from ..formatting import NO_BREAK, heading
 from .data import MEASURED, LegendEntries, Points
-from .kinds import Choice
 from .labels import LawPart, annotate_right_edge, label_axis, pretty_conditions, symbol, words_of
 from .slices import unit_of
 from .style import FAINT, SOFT, is_geometric, law_key, model_styles, tint
@@ -93,6 +92,15 @@ class Panel:
     joined: bool = True  # whether lines join the points
     band_name: str = ""  # in the legend, of the bands around curves
     height: float = 1.0  # relative to other panels
+
+    def with_log_axes(self, log: str) -> Panel:
+        """Make the axes named in `log` logarithmic, but for one with a value <= 0, which it could not show."""
+        drawn = {
+            "x": [curve.x for curve in self.curves],
+            "y": [values for curve in self.curves for _, values in curve.rows_of_values()],
+        }
+        possible = [axis for axis in log if not any(value <= 0.0 for row in drawn[axis] for value in row)]
+        return replace(self, x_log=self.x_log or "x" in possible, y_log=self.y_log or "y" in possible)
 
 
 @dataclass(frozen=True)
@@ -234,14 +242,13 @@ def law_curve(
     return curve_of(law.label, law.model, x, y, variable, end, band, law.friction)
 
 
-def x_axis_fields(coordinate: xr.DataArray, choice: Choice) -> dict[str, Any]:
+def x_axis_fields(coordinate: xr.DataArray) -> dict[str, Any]:
     """Describe the horizontal axis of a panel along a coordinate."""
-    values = coordinate.values
     return {
         "x_name": str(coordinate.name),
         "x_label": words_of(coordinate.attrs, str(coordinate.name)),
         "x_unit": unit_of(coordinate),
-        "x_log": is_geometric(values) or ("x" in choice.log and bool(np.all(values > 0.0))),
+        "x_log": is_geometric(coordinate.values),
     }
 
 
@@ -255,6 +262,10 @@ def _draw_points(axes: Axes, panel: Panel, points: Points) -> dict[str, Artist]:
         raise UsageError(f"{points.source}: the picture shows {needs}, and the points have {has}")
     if SIGMA in points.columns and len(shown) > 1:
         raise UsageError(f"{points.source}: {SIGMA} of which, {' or '.join(shown)}? expected one of them")
+    is_log = {panel.x_name: panel.x_log, **dict.fromkeys(shown, panel.y_log)}
+    for name in (name for name, log in is_log.items() if log):
+        if any(value <= 0.0 for value in points.columns[name]):
+            raise UsageError(f"{points.source}: {name} has values <= 0, which a logarithmic axis cannot show")
     artists: dict[str, Artist] = {}
     for index, name in enumerate(shown):
         bars = axes.errorbar(

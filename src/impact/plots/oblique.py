@@ -96,8 +96,8 @@ def psi_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     panel = Panel("", "Slip after the impact", (*guides, *curves), y_name="psi2")
     plot_data = complete(dataset, line, "Slip after over slip before the impact", [panel], choice)
     (panel,) = plot_data.panels
-    panel = replace(panel, x_name="psi1", x_label="Slip before the impact", x_unit="1", x_log="x" in choice.log)
-    return replace(plot_data, panels=(panel,))
+    panel = replace(panel, x_name="psi1", x_label="Slip before the impact", x_unit="1", x_log=False)
+    return replace(plot_data, panels=(panel.with_log_axes(choice.log),))
 
 
 def friction_loop_curves(histories: Sequence[xr.Dataset], choice: Choice) -> CurveData:

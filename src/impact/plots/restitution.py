@@ -170,9 +170,9 @@ def complete(
     conditions = with_model(conditions_of(line.data, line.x), line.data, numbered=choice.equations)
     if heading and title != FIGURE_6:
         heading, conditions = title, ": ".join(filter(None, (heading, conditions)))
-    x_axis = x_axis_fields(line.coordinate, choice)
+    x_axis = x_axis_fields(line.coordinate)
     x_axis |= {"x_log": x_axis["x_log"] or x_log, "joined": is_ordered(dataset, line.x)}
-    panels = [replace(panel, y_log=panel.y_log or "y" in choice.log, **x_axis) for panel in panels]
+    panels = [replace(panel, **x_axis).with_log_axes(choice.log) for panel in panels]
     empty = {c.law: None for panel in panels for c in panel.curves if c.law and not np.isfinite(c.y).any()}
     without_value = tuple(f"{key}, which has no point here" for key in empty)
     return CurveData(heading or title, conditions, tuple(panels), (*line.not_drawn, *without_value))

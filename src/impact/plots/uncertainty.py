@@ -64,7 +64,6 @@ def uncertainty_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
             x_unit=OUTPUTS[name].unit,
             x_name=name,
             y_name="share",
-            x_log="x" in choice.log,
         )
     else:
         # the requested restitution, unless it depends on the sample
@@ -75,10 +74,9 @@ def uncertainty_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
             y_label=meaning,
             curves=(*requested, *curves),
             y_unit=OUTPUTS[name].unit,
-            y_log="y" in choice.log,
             y_name=name,
             band_name=BAND_NAME,
-            **x_axis_fields(line[x], choice),
+            **x_axis_fields(line[x]),
         )
     title = safe_text(str(dataset.attrs.get("title", "")), 140)
     conditions = ", ".join(filter(None, (", ".join(distribution_texts(dataset)), conditions_of(line, x_name))))
@@ -86,7 +84,7 @@ def uncertainty_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     return CurveData(
         f"Uncertain inputs: {meaning[0].lower()}{meaning[1:]}",
         ": ".join(filter(None, (title, conditions))),
-        (panel,),
+        (panel.with_log_axes(choice.log),),
         not_drawn,
     )
 
