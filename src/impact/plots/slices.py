@@ -43,15 +43,6 @@ class Line(NamedTuple):
         return self.data[self.x]
 
 
-class Plane(NamedTuple):
-    """A plane through a result: the sorted data, two coordinates to draw over, and values without a position."""
-
-    data: xr.Dataset
-    x: str
-    y: str
-    not_drawn: tuple[str, ...]
-
-
 def varying_inputs(dataset: xr.Dataset) -> list[str]:
     """List the inputs that vary: each axis with the inputs along it, then those that vary along several axes."""
     dims_of = {
@@ -112,8 +103,10 @@ def take_line(dataset: xr.Dataset, choice: Choice, keep: Sequence[str] = ()) -> 
     return Line(line, x, not_drawn)
 
 
-def take_plane(dataset: xr.Dataset, kind: str, choice: Choice, keep: Sequence[str] = ()) -> Plane:
-    """Cut a plane through a result for a kind of picture; see `take_line`."""
+def take_plane(
+    dataset: xr.Dataset, kind: str, choice: Choice, keep: Sequence[str]
+) -> tuple[xr.Dataset, str, str, tuple[str, ...]]:
+    """Cut a plane through a result for a kind of picture, as `take_line` does a line, with two coordinates."""
     dataset = _select(dataset, choice)
     along = [x_axis(dataset, name) for name in (choice.x, choice.y) if name is not None]
     dims = [dataset[name].dims[0] for name in along]
@@ -144,7 +137,7 @@ def take_plane(dataset: xr.Dataset, kind: str, choice: Choice, keep: Sequence[st
         plane, left_out = _sorted_along(plane, name)
         not_drawn += left_out
     first, second = along if choice.x is not None or choice.y is None else along[::-1]
-    return Plane(plane, first, second, not_drawn)
+    return plane, first, second, not_drawn
 
 
 def _select(dataset: xr.Dataset, choice: Choice) -> xr.Dataset:
