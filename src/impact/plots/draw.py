@@ -123,7 +123,7 @@ def plot(
     check_choice(choice, [find_kind(kind)])
     plot_data = get_plot_data(dataset, kind, choice, plugins)
     check_log(log, [plot_data])
-    return draw(plot_data, look, points, ax)
+    return draw(plot_data, look, None if points is None else read_points(points), ax)
 
 
 def get_plot_data(
@@ -161,7 +161,7 @@ def label_keys(plot_data: PlotData, look: Look) -> set[str]:
 def draw(
     plot_data: PlotData,
     look: Look = DEFAULT_LOOK,
-    points: str | Path | pd.DataFrame | xr.Dataset | Points | None = None,
+    points: Points | None = None,
     ax: Axes | Sequence[Axes] | None = None,
 ) -> Figure:
     """Draw a picture, in a new figure or into the user's axes."""
@@ -172,12 +172,11 @@ def draw(
     if all_axes and look.legend is None:
         look = replace(look, legend=_legend_for(all_axes[0], plot_data, look))
     labels = _labels(plot_data, look)
-    measured = points if points is None or isinstance(points, Points) else read_points(points)
-    if measured is not None and not isinstance(plot_data, CurveData):
-        raise UsageError(f"{measured.source}: measured points are drawn over curves only")
+    if points is not None and not isinstance(plot_data, CurveData):
+        raise UsageError(f"{points.source}: measured points are drawn over curves only")
     heading = labels.get("title", escape_mathtext(plot_data.title))
     if all_axes:
-        entries = _draw_panels(plot_data, all_axes, labels, measured, look)
+        entries = _draw_panels(plot_data, all_axes, labels, points, look)
         if look.title:
             all_axes[0].set_title(heading)
         if entries and look.legend != "none":
@@ -186,24 +185,24 @@ def draw(
         figure = all_axes[0].get_figure(root=True)
         assert figure is not None
         return figure
-    picture = _picture_with_room(plot_data, look, measured, heading)
+    picture = _picture_with_room(plot_data, look, points, heading)
     with styled(look.style):
         picture.check_panels()
     return picture
 
 
-def _picture_with_room(plot_data: PlotData, look: Look, measured: Points | None, heading: str) -> Picture:
+def _picture_with_room(plot_data: PlotData, look: Look, points: Points | None, heading: str) -> Picture:
     """Draw a picture in a new figure, with the longest names with which the legend has room if none are chosen."""
     if look.legend is not None or not plot_data.laws:
-        return _new_picture(plot_data, look, measured, heading)
+        return _new_picture(plot_data, look, points, heading)
     shares = {}
     for legend in DEFAULT_LEGENDS:
-        picture = _new_picture(plot_data, replace(look, legend=legend), measured, heading)
+        picture = _new_picture(plot_data, replace(look, legend=legend), points, heading)
         if picture.legend_share <= LEGEND_PART:
             return picture
         shares[legend] = picture.legend_share
     smallest = replace(look, legend=min(shares, key=shares.__getitem__))
-    return _new_picture(plot_data, smallest, measured, heading, legend_rows=True)
+    return _new_picture(plot_data, smallest, points, heading, legend_rows=True)
 
 
 def _legend_for(axes: Axes, plot_data: PlotData, look: Look) -> str:
@@ -224,7 +223,7 @@ def _labels(plot_data: PlotData, look: Look) -> dict[str, str]:
 
 
 def _new_picture(
-    plot_data: PlotData, look: Look, measured: Points | None, heading: str, *, legend_rows: bool = False
+    plot_data: PlotData, look: Look, points: Points | None, heading: str, *, legend_rows: bool = False
 ) -> Picture:
     """Draw a picture in a new figure, with the names of its legend in columns or one after the other in rows."""
     with styled(look.style):
@@ -238,7 +237,7 @@ def _new_picture(
         picture = Picture(width, *texts)
         picture.has_legend_rows = legend_rows
         all_axes, panels_height = plot_data.place_panels(picture, width)
-        entries = _draw_panels(plot_data, all_axes, names, measured, look)
+        entries = _draw_panels(plot_data, all_axes, names, points, look)
         if look.decimal == "comma":
             for text in picture.header:
                 text.set_text(with_comma(text.get_text()))
@@ -248,10 +247,10 @@ def _new_picture(
 
 
 def _draw_panels(
-    plot_data: PlotData, all_axes: Sequence[Axes], labels: Mapping[str, str], measured: Points | None, look: Look
+    plot_data: PlotData, all_axes: Sequence[Axes], labels: Mapping[str, str], points: Points | None, look: Look
 ) -> LegendEntries:
     """Draw the panels, with the decimal separator of the look; returns handles and names of the legend."""
-    entries = plot_data.draw(all_axes, labels, measured)
+    entries = plot_data.draw(all_axes, labels, points)
     if look.decimal == "point":
         return entries
     for axes in all_axes:
