@@ -20,7 +20,7 @@ from .data import Points
 from .kinds import Choice, Kind
 from .labels import friction_text, model_label
 from .slices import conditions_of, scalars_of, units_of
-from .style import WITH, is_geometric
+from .style import is_geometric, law_name
 
 # laws that are drawn unless the user names them
 MAX_LAWS = 5
@@ -102,7 +102,7 @@ def _law_label(law: xr.Dataset, choice: Choice) -> str:
     if "friction" not in law.coords:
         return label
     key = str(law["friction"].item())
-    return f"{label}{WITH}{friction_text(key, scalars_of(law, f'friction.{key}.'), units_of(law))}"
+    return law_name(label, friction_text(key, scalars_of(law, f"friction.{key}."), units_of(law)))
 
 
 def _is_logarithmic(measured: Array, grid: Array) -> bool:

@@ -24,7 +24,7 @@ from ..formatting import NO_BREAK, heading
 from .data import MEASURED, LegendEntries, Points
 from .labels import LawPart, annotate_right_edge, label_axis, pretty_conditions, symbol, words_of
 from .slices import unit_of
-from .style import FAINT, SOFT, is_geometric, law_key, model_styles, tint
+from .style import FAINT, SOFT, is_geometric, law_name, model_styles, tint
 
 # the colour of distances from zero, and its shares in those that are shaded, the widest first, and in lines
 BAND_COLOUR, BAND_SHARES, BAND_LINE_SHARE = "#0072B2", (0.08, 0.2), 0.65
@@ -53,7 +53,7 @@ class Curve:
     @property
     def law(self) -> str:
         """The key of its model or pair; empty for a reference."""
-        return law_key(self.model, self.friction) if self.model else ""
+        return law_name(self.model or "", self.friction)
 
     def rows_of_values(self) -> Iterator[tuple[str, tuple[float, ...]]]:
         """Iterate over its values and the ends of its band, with a name for each end."""

@@ -22,7 +22,7 @@ from ..contact.variables import HISTORY, OUTPUTS
 from ..errors import UsageError
 from ..formatting import NO_BREAK, argument, safe_text, scaled_unit, typographic, with_year
 from .slices import parameter_text, scalars_of, units_of
-from .style import SOFT, WITH, law_key, tint
+from .style import SOFT, WITH, law_name, tint
 
 GREEK = "alpha|beta|gamma|delta|epsilon|zeta|eta|theta|kappa|lambda|mu|nu|xi|rho|sigma|tau|phi|chi|psi|omega"
 # symbols of the paper for names that are words; v_post and abs_e_error are each a label of several variables
@@ -199,8 +199,8 @@ class LawPart(NamedTuple):
 
     @property
     def key(self) -> str:
-        """Its name in a picture, see `impact.plots.style.law_key`."""
-        return law_key(self.model, self.friction)
+        """Its name in a picture, see `impact.plots.style.law_name`."""
+        return law_name(self.model, self.friction)
 
 
 def split_by_law(data: xr.Dataset, *, numbered: bool) -> Iterator[LawPart]:
@@ -217,7 +217,7 @@ def split_by_law(data: xr.Dataset, *, numbered: bool) -> Iterator[LawPart]:
             friction_key = str(pair.variables["friction"].values.item())
             of_friction = friction_text(friction_key, scalars_of(pair, f"friction.{friction_key}."), units)
             # a single model is not named beside every friction law
-            shown = of_friction if data.sizes["model"] == 1 else f"{label} with {of_friction}"
+            shown = law_name("" if data.sizes["model"] == 1 else label, of_friction)
             yield LawPart(shown, key, friction_key, pair)
 
 

@@ -39,7 +39,7 @@ from .labels import (
 )
 from .layout import Picture
 from .slices import choose_plane, conditions_of, not_a_sweep, read, take_plane, unit_of
-from .style import is_geometric, law_key, model_styles, tint
+from .style import is_geometric, law_name, model_styles, tint
 
 FloatArray = NDArray[np.float64]
 # a value at each y and x
@@ -77,7 +77,7 @@ class Field:
     @property
     def key(self) -> str:
         """The key of its model or pair, or "reference"."""
-        return law_key(self.model, self.friction) if self.model else "reference"
+        return law_name(self.model or "reference", self.friction)
 
 
 @dataclass(frozen=True)
@@ -157,7 +157,7 @@ class MapData:
         x_unit, y_unit, unit = self.units
         table = self.long_table()
         points = table.iloc[: len(self.x_values) * len(self.y_values)]
-        owners = [law_key(panel.model or "", panel.friction) for panel in self.panels]
+        owners = [law_name(panel.model or "", panel.friction) for panel in self.panels]
         columns = table[self.variable].to_numpy().reshape(len(owners), -1)
         return pd.DataFrame(
             {

@@ -19,6 +19,7 @@ from .curves import Curve, CurveData, Mark, Panel, curve_of
 from .kinds import Choice, Kind
 from .labels import REFERENCE, friction_text, law_text, words_of
 from .slices import choose_line, described_inputs, parameter_text, unit_of
+from .style import law_name
 
 # a permanent indentation is marked above this fraction of the largest one
 MIN_MARKED_INDENTATION = 0.02
@@ -144,7 +145,7 @@ def _pair_label(history: xr.Dataset, is_single: bool) -> str:
     """Write the names of both laws; a single model is not named beside every friction law."""
     inputs = impact_inputs(history)
     friction = friction_text(str(history["friction"].item()), inputs, _units_of(inputs))
-    return friction if is_single else f"{_model_label(history, numbered=False)} with {friction}"
+    return law_name("" if is_single else _model_label(history, numbered=False), friction)
 
 
 def _model_label(history: xr.Dataset, numbered: bool) -> str:

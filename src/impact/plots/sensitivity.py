@@ -30,7 +30,7 @@ from .labels import (
     with_model,
 )
 from .slices import conditions_of
-from .style import law_key, tint
+from .style import law_name, tint
 
 # bars of an input, and their colours
 BARS = {"first": "First-order index", "total": "Total index"}
@@ -54,8 +54,8 @@ class BarPanel:
 
     @property
     def law(self) -> str:
-        """Its name in the picture, see `impact.plots.style.law_key`."""
-        return law_key(self.model, self.friction)
+        """Its name in the picture, see `impact.plots.style.law_name`."""
+        return law_name(self.model, self.friction)
 
 
 @dataclass(frozen=True)

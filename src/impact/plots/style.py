@@ -32,7 +32,7 @@ COLOURS = ("#7F4F24", "#009E73", "#56B4E9", "#CC79A7", "#D55E00", "#E69F00", "#0
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "*", "p")
 DASHES = ("-", (0, (6, 1.5)), (0, (3, 1.2)), (0, (6, 1.5, 1, 1.5)), (0, (1.2, 1.2)))
 HATCHES = ("", "////", "....", "\\\\\\\\", "xxxx", "----", "oo", "||||")
-# between the keys of a pair of a model and a friction law
+# between the names of a model and a friction law
 WITH = " with "
 STYLE_SHEET = files(__package__) / "impact.mplstyle"
 # without dates in the metadata a picture has the same bytes each time
@@ -99,13 +99,13 @@ def default_size() -> tuple[float, float | None]:
     return width, height
 
 
-def law_key(model: str, friction: str = "") -> str:
-    """Name a model, or a pair of a model and a friction law.
+def law_name(model: str, friction: str) -> str:
+    """Name a model, a friction law or a pair of both, by their keys or by their titles.
 
-    >>> law_key("hertz"), law_key("hertz", "coulomb-1785")
+    >>> law_name("hertz", ""), law_name("hertz", "coulomb-1785")
     ('hertz', 'hertz with coulomb-1785')
     """
-    return f"{model}{WITH}{friction}" if friction else model
+    return WITH.join(filter(None, (model, friction)))
 
 
 def model_styles(models: Sequence[str]) -> dict[str, dict[str, Any]]:
