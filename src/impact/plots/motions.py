@@ -11,7 +11,6 @@ import xarray as xr
 
 from ..config.input_names import InputName
 from ..contact.models import catalogue
-from ..errors import UsageError
 from ..formatting import safe_text
 from ..results.attributes import read_attribute
 from ..results.schema import exponent_text
@@ -108,8 +107,6 @@ def curves_over(
 
     Curves of friction are named by the friction law too.
     """
-    if not histories:
-        raise UsageError("no motion to draw: no model has an impact at this point")
     first = histories[0]
     is_single = len({str(history["model"].item()) for history in histories}) == 1
     panels = []
