@@ -310,6 +310,13 @@ def test_slips_are_those_of_maw_barber_and_fawcett() -> None:
     check_layout(draw(data, Look(width="84mm")))
 
 
+def test_the_equations_of_models_are_named_beside_friction_laws() -> None:
+    two = sweep(models=["hertz", TSUJI], frictions=[COULOMB], friction={})
+    for kind in ("friction-loop", "beta"):
+        labels = [curve.label for curve in of_pairs(curves_of(two, kind, equations=True))]
+        assert labels[0] == "Hertz (1882), (10) with Coulomb", kind
+
+
 @pytest.mark.slow
 def test_the_area_of_a_friction_loop_is_the_energy_lost(beads: xr.Dataset, cli: Run, tmp_path: Path) -> None:
     two = [COULOMB, FORCE]

@@ -108,12 +108,16 @@ def curves_over(
     Curves of friction are named by the friction law too.
     """
     first = histories[0]
-    is_single = len({str(history["model"].item()) for history in histories}) == 1
+    is_single = of_friction and len({str(history["model"].item()) for history in histories}) == 1
     panels = []
     for x, y, end in pairs:
         curves = [
             curve_of(
-                _pair_label(history, is_single) if of_friction else _model_label(history, choice.equations),
+                # a single model is not named beside every friction law
+                law_name(
+                    "" if is_single else _model_label(history, choice.equations),
+                    _friction_label(history) if of_friction else "",
+                ),
                 str(history["model"].item()),
                 history[x].values,
                 history[y].values,
@@ -126,7 +130,7 @@ def curves_over(
         x_label, y_label = (words_of(first[name].attrs, name) for name in (x, y))
         x_unit, y_unit = (unit_of(first[name]) for name in (x, y))
         panels.append(Panel(x_label, y_label, tuple(curves), x_unit, y_unit, x_name=x, y_name=y))
-    model = _model_label(first, choice.equations) if of_friction and is_single else ""
+    model = _model_label(first, choice.equations) if is_single else ""
     conditions = ", ".join(filter(None, (model, _conditions_text(histories))))
     return CurveData(title, conditions, tuple(panels))
 
@@ -138,11 +142,9 @@ def _with_impulse(history: xr.Dataset) -> xr.Dataset:
     return history.assign(tau=("t", impulse, {"units": "N s", "long_name": "Impulse"}))
 
 
-def _pair_label(history: xr.Dataset, is_single: bool) -> str:
-    """Write the names of both laws; a single model is not named beside every friction law."""
+def _friction_label(history: xr.Dataset) -> str:
     inputs = impact_inputs(history)
-    friction = friction_text(str(history["friction"].item()), inputs, _units_of(inputs))
-    return law_name("" if is_single else _model_label(history, numbered=False), friction)
+    return friction_text(str(history["friction"].item()), inputs, _units_of(inputs))
 
 
 def _model_label(history: xr.Dataset, numbered: bool) -> str:
