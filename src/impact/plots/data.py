@@ -15,7 +15,7 @@ from ..config.measurements import MEASURED_OUTPUTS, SIGMA, SPECIMEN, derive_impa
 from ..config.quantities import Quantity
 from ..config.tables import LABORATORY, STANDARD_GRAVITY, SWEEP_QUANTITIES
 from ..contact.variables import HISTORY, OUTPUTS
-from ..display import TableForm, encode_frame
+from ..display import encode_frame
 from ..errors import ConfigError, warn
 from ..formatting import heading, safe_text
 from ..results.schema import plain_unit
@@ -67,13 +67,6 @@ class PlotData(Protocol):
 
     def draw(self, all_axes: Sequence[Axes], labels: Mapping[str, str], points: Points | None) -> LegendEntries:
         """Draw the panels, with labels that replace those of names; returns handles and names of the legend."""
-
-
-def encode_table(
-    plot_data: PlotData, suffix: str, form: str = "wide", table_form: TableForm | None = None
-) -> bytes:
-    """Encode the data of a picture as a table."""
-    return encode_frame(plot_data.long_table() if form == "long" else plot_data.wide_table(), suffix, table_form)
 
 
 def encode_history(history: xr.Dataset) -> bytes:

@@ -11,11 +11,11 @@ import xarray as xr
 
 from ..atomic import check_outputs, write_file
 from ..contact.model import ForceModel
-from ..display import TableForm, check_suffix
+from ..display import TableForm, check_suffix, encode_frame
 from ..errors import UsageError
 from ..formatting import argument
 from ..results.xarray_backend import load
-from .data import PlotData, encode_table, read_points
+from .data import PlotData, read_points
 from .draw import check_log, draw, get_plot_data, label_keys
 from .kinds import Choice, Look, check_choice, check_kind, default_kind, find_kind
 from .labels import check_labels
@@ -132,7 +132,9 @@ def plot_to_files(
         own_look = replace(look, labels={key: text for key, text in (labels or {}).items() if key in keys})
         try:
             figure = draw(shown, own_look, measured)
-            numbers = encode_table(shown, table.suffix.lower(), data_form, table_form) if table else b""
+            if table:
+                frame = shown.long_table() if data_form == "long" else shown.wide_table()
+                numbers = encode_frame(frame, table.suffix.lower(), table_form)
         except UsageError as error:
             left_out[kind] = str(error)
             continue
