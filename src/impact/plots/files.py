@@ -17,7 +17,7 @@ from ..formatting import argument
 from ..results.xarray_backend import load
 from .data import PlotData, read_points
 from .draw import check_log, draw, get_plot_data, label_keys
-from .kinds import Choice, Look, check_choice, check_kind, default_kind, find_kind
+from .kinds import Choice, Look, check_choice, default_kind, find_kind
 from .labels import check_labels
 from .style import check_picture, save_figure
 
@@ -100,9 +100,7 @@ def plot_to_files(
     choice = Choice(x, y, variable, sel, models, log, equations, frictions)
     look = Look(width, height, style, title, labels, legend, decimal)
     table_form = TableForm(rows, digits, decimal)
-    kinds = list(dict.fromkeys(kinds))
-    for kind in kinds:
-        check_kind(kind)
+    kinds = [find_kind(kind).name for kind in dict.fromkeys(kinds)]
     result = Path(result)
     output = Path(output) if output is not None else result.with_suffix(".png")
     check_picture(output)

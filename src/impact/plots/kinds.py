@@ -153,12 +153,6 @@ def length(size: str | float | None, origin: str) -> float | None:
     return float(inches)
 
 
-def check_kind(name: str) -> None:
-    """Raise a UsageError that suggests the nearest kind, if there is no such kind of picture."""
-    if name not in KINDS:
-        raise UsageError(f'{argument("kind")}: no kind "{name}"; {did_you_mean(name, list(KINDS))}')
-
-
 def check_choice(choice: Choice, kinds: Sequence[Kind]) -> None:
     """Refuse an axis or a variable that none of some kinds of picture shows."""
     shows: dict[str, Callable[[Kind], bool]] = {
@@ -176,7 +170,9 @@ def check_choice(choice: Choice, kinds: Sequence[Kind]) -> None:
 
 
 def find_kind(name: str) -> Kind:
-    check_kind(name)
+    """Find a kind of picture; an unknown one is a UsageError that suggests the nearest."""
+    if name not in KINDS:
+        raise UsageError(f'{argument("kind")}: no kind "{name}"; {did_you_mean(name, list(KINDS))}')
     module = import_module(f".{KINDS[name]}", __package__)
     kind: Kind = getattr(module, name.upper().replace("-", "_"))
     return kind
