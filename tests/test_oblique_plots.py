@@ -108,6 +108,14 @@ def test_negative_values_are_not_left_out_on_a_logarithmic_axis(beads: xr.Datase
         impact.plot(beads, kind=kind, log="xy")
 
 
+def test_a_guide_is_named_at_its_end_on_a_logarithmic_axis(beads: xr.Dataset) -> None:
+    choice = {"sel": {"mu": 0.3}, "models": [TSUJI], "frictions": [COULOMB]}
+    (axes,) = impact.plot(beads, kind="impulse-ratio", log="y", **choice).axes
+    (name,) = (text for text in axes.texts if text.get_text() == "μ")
+    (_, drawn), (_, expected) = name.xy, axes.transAxes.inverted().transform(axes.transData.transform((0.1, 0.3)))
+    assert drawn == pytest.approx(expected)
+
+
 def test_a_pair_that_cannot_be_combined_is_named_with_the_reason(beads: xr.Dataset) -> None:
     data = curves_of(beads, "beta")
     reason = "the contact force lacks what the friction law needs"

@@ -315,10 +315,11 @@ def _draw_band(axes: Axes, curve: Curve, line: Line2D) -> Artist:
 
 def _label_guides(axes: Axes, guides: Sequence[Curve]) -> None:
     """Write the cases of guides at their ends, without overlap."""
-    low, high = axes.get_ylim()
+    to_axes = axes.transScale + axes.transLimits
     lowest = -math.inf
     for guide in sorted(guides, key=lambda curve: curve.y[-1]):
-        lowest = max((guide.y[-1] - low) / (high - low), lowest + LABEL_DISTANCE)
+        _, height = to_axes.transform((guide.x[-1], guide.y[-1])).tolist()
+        lowest = max(height, lowest + LABEL_DISTANCE)
         text = pretty_conditions(guide.case.replace(" ", NO_BREAK))
         annotate_right_edge(axes, text, lowest, 4, xycoords="axes fraction", fontsize="small")
 
