@@ -197,7 +197,7 @@ def test_restitution_and_its_error_are_the_stored_values(figure6: xr.Dataset) ->
     assert absolute.y_log
     # smaller errors are errors of the solver, and are drawn at the end of the logarithmic axis
     assert min(min(size.y) for size in absolute.curves) < 1e-9
-    drawn = draw(get_curve_data(figure6, "error")).axes[1].lines
+    drawn = draw(get_curve_data(figure6, "error"), Look()).axes[1].lines
     assert min(np.min(np.asarray(line.get_ydata(), float)) for line in drawn) == 1e-9
     assert (signed.bands, absolute.bands) == ((0.05, 0.01), (0.05, 0.01))
 
@@ -389,7 +389,7 @@ def test_a_legend_takes_at_most_a_fifth_of_the_height_unless_names_are_chosen(
 @pytest.mark.parametrize("size", [(3.0, 3.5), (10.0, 8.0), (4.0, 6.0)])
 def test_a_figure_can_be_resized(plot_data_by_kind: dict[str, CurveData], size: tuple[float, float]) -> None:
     for kind in ("restitution", "history" if size[1] > 4.0 else "loop"):
-        figure = draw(plot_data_by_kind[kind])
+        figure = draw(plot_data_by_kind[kind], Look())
         figure.set_size_inches(*size)
         check_layout(figure)
 
@@ -484,7 +484,7 @@ def test_parameters_of_a_model_are_named_beside_its_title_only(wide: xr.Dataset)
         assert labels.pop("ismail-stronge-2008").endswith("(2008), gamma = 4")
         assert "bilinear" in labels
         assert not any("gamma" in label for label in labels.values())
-        assert any(r"$\gamma$" in name for name in names_of(draw(curve_data)))
+        assert any(r"$\gamma$" in name for name in names_of(draw(curve_data, Look())))
 
 
 def test_values_that_vary_together_have_to_agree(wide: xr.Dataset) -> None:

@@ -37,8 +37,6 @@ from .labels import (
 from .layout import LEGEND_PART, Picture
 from .style import default_size, styled
 
-DEFAULT_LOOK = Look()
-
 
 def plot(
     dataset: xr.Dataset | Impact | str | Path,
@@ -160,7 +158,7 @@ def label_keys(plot_data: PlotData, look: Look) -> set[str]:
 
 def draw(
     plot_data: PlotData,
-    look: Look = DEFAULT_LOOK,
+    look: Look,
     points: Points | None = None,
     ax: Axes | Sequence[Axes] | None = None,
 ) -> Figure:
