@@ -20,8 +20,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path
 from matplotlib.patheffects import withStroke
-from numpy.typing import NDArray
 
+from ..array_types import Array, Mask
 from ..errors import UsageError, did_you_mean
 from ..formatting import argument, heading, percentage, safe_text
 from ..results.ranking import error_floor
@@ -41,7 +41,6 @@ from .layout import Picture
 from .slices import choose_plane, conditions_of, not_a_sweep, read, take_plane, unit_of
 from .style import is_geometric, law_name, model_styles, tint
 
-FloatArray = NDArray[np.float64]
 # a value at each y and x
 Plane = tuple[tuple[float, ...], ...]
 MAX_PANELS = 12
@@ -121,7 +120,7 @@ class MapData:
         return {self.x, self.y, *variable, *(panel.key for panel in self.panels)}
 
     @cached_property
-    def edges(self) -> tuple[FloatArray, FloatArray]:
+    def edges(self) -> tuple[Array, Array]:
         """The edges of the cells along x and along y."""
         return edges_of(self.x_values, self.x_log), edges_of(self.y_values, self.y_log)
 
@@ -292,7 +291,7 @@ class MapData:
                 entries[level] = line, f"{name}{level:g}"
         return mesh, [entries[level] for level in sorted(entries)]
 
-    def _merged_cells(self, mask: NDArray[np.bool_], style: dict[str, Any]) -> PathPatch:
+    def _merged_cells(self, mask: Mask, style: dict[str, Any]) -> PathPatch:
         """Join the cells in a mask, of shape (y, x), into a patch; neighbours in a row are one rectangle."""
         (x, y), rectangles = self.edges, []
         for low, high, row in zip(y[:-1], y[1:], mask, strict=True):
@@ -327,7 +326,7 @@ def validity_map(dataset: xr.Dataset, choice: Choice) -> MapData:
     return replace(plot_data, closest=_nested_tuples(closest), distance=_nested_tuples(distance))
 
 
-def _nested_tuples(values: NDArray[Any]) -> tuple[Any, ...]:
+def _nested_tuples(values: np.ndarray) -> tuple[Any, ...]:
     return tuple(map(tuple, values.tolist()))
 
 
@@ -389,7 +388,7 @@ def _map_data(
     )
 
 
-def edges_of(values: Sequence[float], log: bool) -> FloatArray:
+def edges_of(values: Sequence[float], log: bool) -> Array:
     """Compute the edges of cells, half way between their values, of shape (values + 1,).
 
     >>> edges_of([0.0, 1.0, 3.0], log=False).tolist(), edges_of([1.0, 100.0], log=True).round(9).tolist()

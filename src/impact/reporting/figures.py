@@ -13,8 +13,8 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from ..array_types import Array
 from ..config.grid import SAMPLE
 from ..config.input_names import InputName, is_input
 from ..contact.model import ForceModel
@@ -257,7 +257,7 @@ def _and(names: Sequence[object]) -> str:
     return " and ".join(filter(None, (", ".join(words[:-1]), *words[-1:])))
 
 
-def _numbers(plot_data: PlotData | None) -> tuple[NDArray[np.float64], list[object]] | None:
+def _numbers(plot_data: PlotData | None) -> tuple[Array, list[object]] | None:
     """Read the numbers that a picture shows, and the closest models."""
     if plot_data is None:
         return None
@@ -267,9 +267,7 @@ def _numbers(plot_data: PlotData | None) -> tuple[NDArray[np.float64], list[obje
     return shown.to_numpy(float), closest
 
 
-def _are_equal(
-    first: tuple[NDArray[np.float64], list[object]] | None, second: tuple[NDArray[np.float64], list[object]] | None
-) -> bool:
+def _are_equal(first: tuple[Array, list[object]] | None, second: tuple[Array, list[object]] | None) -> bool:
     """Whether no number differs by more than MAX_DIFFERENCE of the largest in its column, or than rounding."""
     if first is None or second is None:
         return first is second
