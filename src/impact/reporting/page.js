@@ -61,8 +61,7 @@ function value(output, law, at) {
 // ---- numbers as text
 
 const PREFIXES = {"-9": "n", "-6": "µ", "-3": "m", 0: "", 3: "k", 6: "M", 9: "G"};
-const minus = text => text.replace("-", "−");
-const digits = (number, count = 4) => Number.isFinite(number) ? minus(String(+number.toPrecision(count))) : "–";
+const digits = number => Number.isFinite(number) ? String(+number.toPrecision(6)).replace("-", "−") : "–";
 
 // a factor, and a unit with its prefix, for values up to `largest`
 function scale(unit, largest) {
@@ -165,10 +164,10 @@ function draw() {
   for (const number of ticks(low * factor, high * factor, false, height / 60)) {
     const y = toY(number / factor);
     add(svg, "line", {x1: left, x2: right, y1: y, y2: y, class: "grid"});
-    add(svg, "text", {x: left - 8, y: y + 4, "text-anchor": "end"}, digits(number, 6));
+    add(svg, "text", {x: left - 8, y: y + 4, "text-anchor": "end"}, digits(number));
   }
   for (const number of hasWords ? x : ticks(first * xFactor, last * xFactor, isLog, width / 90)) {
-    const at = toX(hasWords ? number : number / xFactor), text = hasWords ? axis.texts[number] : digits(number, 6);
+    const at = toX(hasWords ? number : number / xFactor), text = hasWords ? axis.texts[number] : digits(number);
     add(svg, "line", {x1: at, x2: at, y1: top, y2: bottom, class: "grid"});
     add(svg, "text", {x: at, y: bottom + 18, "text-anchor": "middle"}, text);
   }
@@ -216,7 +215,7 @@ function list() {
   const {target, before, after, share, isOnGrid} = atCursor(picture);
   const ends = {x1: toX(target), x2: toX(target), y1: top, y2: bottom};
   for (const [name, content] of Object.entries(ends)) cursor.setAttribute(name, content);
-  const text = axis.has_words ? axis.texts[target] : `${digits(target * xFactor, 6)} ${xUnit}`;
+  const text = axis.has_words ? axis.texts[target] : `${digits(target * xFactor)} ${xUnit}`;
   const remark = isOnGrid ? "" : ": between values of the grid, interpolated";
   note.textContent = `at ${axis.label} = ${text.trim()}${remark}`;
   for (const {law, y} of drawn) {
@@ -224,7 +223,7 @@ function list() {
     const row = body.insertRow(), name = row.insertCell();
     name.textContent = law ? law.label : page.reference;
     name.style.borderLeft = `4px solid ${colorOf(law)}`;
-    row.insertCell().textContent = `${isOnGrid ? "" : "≈ "}${digits(number * factor, 6)} ${unit}`.trim();
+    row.insertCell().textContent = `${isOnGrid ? "" : "≈ "}${digits(number * factor)} ${unit}`.trim();
   }
 }
 
