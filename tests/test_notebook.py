@@ -274,6 +274,20 @@ def test_a_study_begins_with_its_own_picture(
     assert list(controls) == ["kind", "models", "x", "y", *axes]
 
 
+def test_a_result_over_words_alone_has_controls() -> None:
+    glass, steel = {"E": 7e10, "nu": 0.25, "rho": 2500.0}, {"E": 2.1e11, "nu": 0.3, "rho": 7850.0}
+    inputs = {"v1": 1.0, "material1": ["glass", "steel"], "material2": "steel", "R1": 0.01, "R2": 0.01}
+    result = impact.sweep({"models": ["hertz"], "sweep": inputs, "materials": {"glass": glass, "steel": steel}})
+    controls, picture, message = controls_of(impact.explore(result, kind="loop"))
+    assert message.value == ""
+    assert controls["x"].value == "material1"
+    first = picture.value
+    controls["material1"].value = "steel"
+    assert picture.value != first
+    controls["kind"].value = "final-velocities"
+    assert message.value.startswith("cannot draw over")
+
+
 def test_a_history_has_no_controls() -> None:
     history = impact.run(SHOT).history
     with pytest.raises(UsageError, match=r"impact\.plot draws a time history"):

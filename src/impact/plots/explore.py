@@ -29,7 +29,7 @@ from ..results.sweep import sweep_in_memory
 from ..results.xarray_backend import result_of
 from .draw import plot
 from .kinds import STUDIES, default_kind, find_kind, kinds_of, source_of
-from .slices import unit_of, x_axis
+from .slices import choose_line, unit_of
 from .style import is_geometric
 
 if TYPE_CHECKING:
@@ -108,7 +108,7 @@ def explore(
     friction_list = ipywidgets.SelectMultiple(
         options=laws, value=laws, description="frictions", rows=min(len(laws) + 1, 8)
     )
-    first = x_axis(dataset, None) if axes else None
+    first = choose_line(dataset, keys).x
     first = first if first in axes else next(iter(axes), None)
     others = [name for name in axes if name != first]
     x = ipywidgets.Dropdown(options=axes, value=first, description="x")
