@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..array_types import Array, Mask
 from .powers import power
-from .slip_motion import TangentialForm
+from .slip_motion import SLIDES, STICKS, TangentialForm
 
 # names of the values of a tangential problem, which no value of a law has: the size of the slip at first contact,
 # stiffness and damping of the tangential spring per power of x, 1 where only a pressing force limits friction, the
@@ -44,7 +44,7 @@ class FixedStepSlip:
     memory : z, a displacement or a force
     last_power : X at the step before, NaN before the first
     impulse : the integral of the limiting normal force
-    sticks, slips : whether the contact has stuck, and slipped
+    regime : what the contact has done, see `impact.contact.slip_motion.STICKS`
     slipped : whether it slipped in the last step
     changes : how often one followed the other
     """
@@ -59,8 +59,7 @@ class FixedStepSlip:
     memory: Array
     last_power: Array
     impulse: Array
-    sticks: NDArray[np.bool_]
-    slips: NDArray[np.bool_]
+    regime: NDArray[np.int8]
     slipped: NDArray[np.bool_]
     changes: NDArray[np.int32]
 
@@ -83,8 +82,7 @@ class FixedStepSlip:
             memory=np.zeros(count),
             last_power=np.full(count, np.nan),
             impulse=np.zeros(count),
-            sticks=np.zeros(count, bool),
-            slips=np.zeros(count, bool),
+            regime=np.zeros(count, np.int8),
             slipped=np.zeros(count, bool),
             changes=np.zeros(count, np.int32),
         )
@@ -124,8 +122,8 @@ class FixedStepSlip:
         if form.kind == "spring":
             self._remember(np.where(slips, self._spring_left(spring, drag, limit, at_limit), spring), slips)
         self.slip = self.slip - step * phi
-        self.changes = self.changes + ((self.sticks | self.slips) & (slips != self.slipped)).astype(np.int32)
-        self.sticks, self.slips, self.slipped = self.sticks | ~slips, self.slips | slips, slips
+        self.changes = self.changes + ((self.regime != 0) & (slips != self.slipped)).astype(np.int32)
+        self.regime, self.slipped = self.regime | np.where(slips, SLIDES, STICKS), slips
 
     @property
     def remembers_force(self) -> bool:

@@ -20,6 +20,7 @@ from .powers import all_within
 from .records import CollisionResult
 from .rigid import ObliqueImpacts
 from .simulate import ComputeCollisions, RecordedMotion, simulate
+from .slip_motion import SLIDES, STICKS
 from .status import FIRST_FAILURE, LIMIT, NO_IMPACT, STATUS_OK
 from .tangential import TangentialResult, simulate_friction
 from .variables import CENTRAL_OUTPUTS
@@ -266,9 +267,9 @@ def _contact_regime(
     """Whether the contact sticks (1), slides (2) or does both (3); 0 where that is not defined."""
     regime = tangential.regime
     if kind == "coulomb":
-        regime = np.where(np.abs(oblique.G0) >= tangential.sliding_impulse, np.int8(2), np.int8(3))
-    regime = _replace_where(regime, _mask_if_any(oblique.mu == 0.0), np.int8(2))
-    regime = _replace_where(regime, _without_slip(oblique, friction_status), np.int8(1))
+        regime = np.where(np.abs(oblique.G0) >= tangential.sliding_impulse, SLIDES, STICKS | SLIDES)
+    regime = _replace_where(regime, _mask_if_any(oblique.mu == 0.0), SLIDES)
+    regime = _replace_where(regime, _without_slip(oblique, friction_status), STICKS)
     undefined = friction_status >= FIRST_FAILURE
     return np.where(undefined if missed is None else undefined | missed, np.int8(0), regime).astype(np.int8)
 
@@ -277,7 +278,7 @@ def _slip_changes(
     oblique: ObliqueImpacts, tangential: TangentialResult, kind: str, contact_regime: NDArray[np.int8]
 ) -> NDArray[np.int32]:
     if kind == "coulomb":
-        return np.where(contact_regime == 3, np.int32(1), np.int32(0))
+        return np.where(contact_regime == STICKS | SLIDES, np.int32(1), np.int32(0))
     return np.where(contact_regime == 0, np.int32(0), tangential.slip_changes)
 
 

@@ -30,6 +30,8 @@ from .piecewise import Breakpoint
 from .velocity_coordinates import signed_power
 
 FrictionKind = Literal["coulomb", "spring", "dashpot", "regularized", "cone"]
+# what a contact has done, the bits of a contact regime; 0 where that is not defined
+STICKS, SLIDES = np.int8(1), np.int8(2)
 
 # rows of the joint state and its rates after s and v; the first four rows are components, those from time on the
 # quadratures of `TangentialForm.quadratures`; the last row of rates is the normal force
@@ -170,7 +172,7 @@ class Track:
     work against the limit, and it and `damping_work` what happens where a mode begins and ends; `stick_energy`
     is what the spring gains while sticking, `held_memory` the memory work in the modes -2 and 2. `order` is the
     leading power of x in N at first contact, and `touches` tells that the spring was at its limit at x = 0.
-    `modes` has a bit for sticking, slipping forwards and backwards.
+    `regime` has the bits STICKS and SLIDES.
     """
 
     mode: Array
@@ -187,14 +189,14 @@ class Track:
     held_memory: Array
     order: Array
     touches: Mask
-    modes: NDArray[np.int8]
+    regime: NDArray[np.int8]
     changes: NDArray[np.int32]
     is_slow: Mask
 
     @classmethod
     def of(cls, n: int) -> Track:
         """Begin n trajectories."""
-        dtypes: dict[str, Any] = {"touches": bool, "is_slow": bool, "modes": np.int8, "changes": np.int32}
+        dtypes: dict[str, Any] = {"touches": bool, "is_slow": bool, "regime": np.int8, "changes": np.int32}
         arrays: dict[str, Any] = {name: np.zeros(n, dtypes.get(name, float)) for name in cls.__annotations__}
         return cls(**{**arrays, "sign": np.ones(n), "v": np.ones(n), "slip": np.ones(n)})
 
@@ -234,8 +236,7 @@ class Track:
         self.damping_work[index] += np.where(begins, rest + after, 0.0) - np.where(ends, rest + before, 0.0)
         self.mode[index] = new
         self.changes[index] += old != new
-        self.modes[index] |= np.where(new == 0.0, 1, np.where(new > 0.0, 2, 4)).astype(np.int8)
-        self.modes[index] |= np.where(is_held, 1, 0).astype(np.int8)
+        self.regime[index] |= np.where(is_held, STICKS | SLIDES, np.where(is_slip, SLIDES, STICKS))
 
 
 class Local(NamedTuple):
@@ -641,7 +642,7 @@ class SlipPhase:
         y = np.zeros((N_COMPONENTS + len(self.form.quadratures), start.shape[1]))
         y[: len(start)] = start
         index = self.columns(params).row.astype(np.intp)
-        is_contact = self.track.modes[index[0]] == 0
+        is_contact = self.track.regime[index[0]] == 0
         return self._at_contact(y, params, index) if is_contact else self._at_change(y, params, index)
 
     def _at_change(self, y: Array, params: Params, index: NDArray[np.intp]) -> tuple[Array, Params]:

@@ -35,7 +35,9 @@ from .piecewise import in_parts
 from .records import Record
 from .slip_motion import (
     ORDER_TOLERANCE,
+    SLIDES,
     SLIP_ROW,
+    STICKS,
     TIME_ROW,
     Columns,
     SlipPhase,
@@ -43,9 +45,6 @@ from .slip_motion import (
     Track,
 )
 from .status import LIMIT, STATUS_OK, FrictionStatus, Status
-
-# contact regimes, 0 where they are not defined
-STICKS, SLIDES, BOTH = 1, 2, 3
 
 
 @dataclass(frozen=True)
@@ -211,11 +210,10 @@ def _slip_at_fixed_steps(
     )
     if form.kind == "coulomb":
         return result
-    regime = np.where(slip.sticks, np.where(slip.slips, BOTH, STICKS), SLIDES)
     return replace(
         result,
         slip=np.where(has_answer, slip.slip, np.nan),
-        regime=np.where(has_answer, regime, 0).astype(np.int8),
+        regime=np.where(has_answer, slip.regime, np.int8(0)),
         slip_changes=np.where(has_answer, slip.changes, 0).astype(np.int32),
         stiffness=slip.stiffness / n if form.kind == "spring" else np.full(count, np.nan),
     )
@@ -320,9 +318,7 @@ def _result(form: TangentialForm, n: float, base: Columns, track: Track, state: 
     if form.kind == "coulomb":
         # without tension Lambda is 1 + e_out
         return replace(result, exact=np.where(ended & (track.sign > 0.0), 1.0, np.nan))
-    regime = np.where(track.modes == 1, STICKS, np.where(track.modes & 1, BOTH, SLIDES))
-    if form.kind == "regularized":
-        regime = np.zeros_like(regime)
+    regime = np.zeros_like(track.regime) if form.kind == "regularized" else track.regime
     exact = np.where(regime == SLIDES, G0 - track.signed, nan)
     if form.kind == "spring" and form.stiffness_power == 0.0:
         swing = G0 * np.cos(base.root * state[TIME_ROW])
@@ -334,7 +330,7 @@ def _result(form: TangentialForm, n: float, base: Columns, track: Track, state: 
         damping_work=scale * damping_work,
         memory_work=scale * memory_work,
         elastic_left=scale * np.where(ended, track.energy, np.nan),
-        regime=np.where(ended, regime, 0).astype(np.int8),
+        regime=np.where(ended, regime, np.int8(0)),
         slip_changes=np.where(ended, track.changes, 0).astype(np.int32),
         exact=np.where(ended, exact, np.nan),
         stiffness=base.root**2 / n if form.kind == "spring" else nan,
