@@ -15,7 +15,7 @@ from impact.contact.friction import (
     FrictionLaw,
     Pair,
     check_friction,
-    declared_dashpot,
+    dashpot_power,
     friction_problems,
     friction_values,
     parameter_problem,
@@ -24,6 +24,7 @@ from impact.contact.friction import (
 from impact.contact.frictions import find_friction, frictions
 from impact.contact.impacts import Impacts
 from impact.contact.materials import hertz_stiffness
+from impact.contact.model import COORDINATE_COEFFICIENTS
 from impact.contact.models import catalogue, find
 from impact.contact.rigid import ObliqueImpacts
 from impact.contact.status import FrictionStatus
@@ -285,18 +286,17 @@ def test_lammps_takes_a_multiple_of_the_damping_of_the_contact_force(
 
 
 def test_the_dashpot_of_a_law_is_found_where_it_is_declared() -> None:
-    found = {key: declared_dashpot(law, law.exponent or 1.5) for key, law in catalogue().items()}
-    without = {key for key, dashpot in found.items() if dashpot is None}
+    found = {key: dashpot_power(law, law.exponent or 1.5) for key, law in catalogue().items()}
+    without = {key for key, power in found.items() if power is None}
     assert {"bilinear", "jkr-1971", "adams-impact", "jankowski-2006", "hertz-power-damping"} <= without
     assert len(without) < 30
-    for key, dashpot in found.items():
+    for key, power in found.items():
         law = catalogue()[key]
-        if dashpot is not None and dashpot.coefficient:
-            names = {"elastic": 2.0, "v": 0.3, "x": 1.3, "n": 1.5, "v0": 1.0, "K": 1.0, dashpot.coefficient: 0.7}
+        coefficients = COORDINATE_COEFFICIENTS[law.velocity_coordinate]
+        if power is not None and coefficients:
             n = law.exponent or 1.5
-            names |= {"elastic": 1.3**n, "n": n}
+            names = {"elastic": 1.3**n, "v": 0.3, "x": 1.3, "n": n, "v0": 1.0, "K": 1.0, coefficients[0]: 0.7}
             arguments = {name: np.asarray(names[name]) for name in _arguments(law) if name in names}
-            power = declared_dashpot(law, n).power  # type: ignore[union-attr]
             assert law.force(**arguments) == pytest.approx(1.3**n + 0.7 * 1.3**power * 0.3), key
 
 

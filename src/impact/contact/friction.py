@@ -19,13 +19,13 @@ from ..array_types import Array, Mask
 from ..errors import ModelError
 from . import fixed_step_slip
 from .closed_forms.dashpot import gap_damping
-from .dimensionless import LawValues, required_quantities, with_coefficients, with_units
+from .dimensionless import LawValues, dimensionless_values, with_coefficients, with_units
 from .evidence import Evidence
 from .force_expressions import spring
 from .formula_calls import Formula, argument_names, call_by_name
 from .impacts import Impacts
 from .materials import effective_shear_modulus
-from .model import NOT_VERIFIED, ForceModel, Parameter
+from .model import COORDINATE_COEFFICIENTS, NOT_VERIFIED, ForceModel, Parameter
 from .powers import distinct_values
 from .rigid import ObliqueImpacts
 from .slip_motion import FrictionKind, TangentialForm
@@ -106,17 +106,6 @@ class FrictionLaw:
 
 
 @dataclass(frozen=True)
-class Dashpot:
-    """The damping of a force K x^n + C x^q v: q, and the coefficient that is C in the contact's own units.
-
-    The name "" is that of a force without damping.
-    """
-
-    power: float
-    coefficient: str
-
-
-@dataclass(frozen=True)
 class Pair:
     """A contact force model with a friction law."""
 
@@ -132,32 +121,31 @@ class Pair:
         """Find the form of its tangential problems at an exponent n."""
         law = self.friction
         stiffness_power = _stiffness_power(law, n)
-        dashpot = declared_dashpot(self.model, n)
-        normal_power = 0.0 if dashpot is None else dashpot.power
         damping_power = 0.0
         if law.damping == "betas" or (law.damping == "liggghts" and n == HERTZ):
             damping_power = 0.5 * stiffness_power
         elif law.damping in ("xt", "liggghts", "kratos"):
-            damping_power = normal_power
+            damping_power = dashpot_power(self.model, n) or 0.0
         return TangentialForm(law.kind, stiffness_power, damping_power, law.memory, law.cap, law.coefficient)
 
 
-def declared_dashpot(model: ForceModel, n: float) -> Dashpot | None:
-    """Find the damping of a law that declares the form K x^n + C x^q v for the whole contact; None for others.
+def dashpot_power(model: ForceModel, n: float) -> float | None:
+    """Find q of a law that declares the form K x^n + C x^q v for the whole contact; None for others.
 
-    The hysteresis laws K x^n (1 + chi v/v0) have q = n and C = chi K/v0; an elastic law has no damping.
+    C is the first of the coefficients of its velocity coordinate: the hysteresis laws K x^n (1 + chi v/v0) have
+    q = n and C = chi K/v0. An elastic law has none, and no damping.
 
     >>> from impact.contact.models import find
-    >>> declared_dashpot(find("tsuji-1992"), 1.5), declared_dashpot(find("bilinear"), 1.0)
-    (Dashpot(power=0.25, coefficient='c'), None)
+    >>> dashpot_power(find("tsuji-1992"), 1.5), dashpot_power(find("bilinear"), 1.0)
+    (0.25, None)
     """
     if model.unloading is not None:
         return None
     if model.velocity_coordinate == "force":
-        return Dashpot(float(call_by_name(model.coefficients["q"], {"n": n})), "c")
+        return float(call_by_name(model.coefficients["q"], {"n": n}))
     if model.velocity_coordinate == "log":
-        return Dashpot(n, "chi")
-    return Dashpot(0.0, "") if model.force is spring else None
+        return n
+    return 0.0 if model.force is spring else None
 
 
 def friction_values(pair: Pair, oblique: ObliqueImpacts) -> dict[str, Array]:
@@ -365,7 +353,7 @@ def _cone_compliance(law: FrictionLaw, oblique: ObliqueImpacts) -> Array:
 
 def _force_at_first_contact(model: ForceModel, impacts: Impacts) -> Array:
     """Compute the force at first contact in the contact's own units, in which the velocity is 1."""
-    values, shape = _law_values(model, model.quantities, impacts, float(impacts.n.flat[0]))
+    values, shape = _law_values(model, impacts, float(impacts.n.flat[0]))
     force = call_by_name(model.force, {**values, "x": 0.0, "v": 1.0, "elastic": 0.0})
     return np.broadcast_to(force, int(np.prod(shape))).reshape(shape)
 
@@ -378,29 +366,18 @@ def _product(factor: Array, c: Array) -> Array:
 def _normal_damping(model: ForceModel, impacts: Impacts) -> Array:
     """Compute C of the force K x^n + C x^q v, in the contact's own units; NaN where a law has no such force."""
     damping = _ones(impacts) * np.nan
-    exponents = distinct_values(impacts.n)
+    exponents, names = distinct_values(impacts.n), COORDINATE_COEFFICIENTS[model.velocity_coordinate]
     for n in exponents.tolist():
-        dashpot = declared_dashpot(model, n)
-        if dashpot is not None:
-            c = _coefficient(model, dashpot.coefficient, impacts, n)
+        if dashpot_power(model, n) is not None:
+            values, shape = _law_values(model, impacts, n)
+            c = np.asarray(values[names[0]]).reshape(shape) if names else 0.0 * _ones(impacts)
             damping = c if exponents.size == 1 else np.where(impacts.n == n, c, damping)
     return damping
 
 
-def _coefficient(model: ForceModel, name: str, impacts: Impacts, n: float) -> Array:
-    """Compute a coefficient of a law, of the shape of the quantities that its coefficients depend on; "" is 0."""
-    if not name:
-        return 0.0 * _ones(impacts)
-    arguments = {argument for formula in model.coefficients.values() for argument in argument_names(formula)}
-    values, shape = _law_values(model, arguments, impacts, n)
-    return np.asarray(values[name]).reshape(shape)
-
-
-def _law_values(
-    model: ForceModel, names: Collection[str], impacts: Impacts, n: float
-) -> tuple[LawValues, tuple[int, ...]]:
-    """Compute some quantities and all coefficients of a law, in one dimension, and the shape that they have."""
-    values = {name: impacts.dimensionless(model, name) for name in required_quantities(model) if name in names}
+def _law_values(model: ForceModel, impacts: Impacts, n: float) -> tuple[LawValues, tuple[int, ...]]:
+    """Compute the quantities and coefficients of a law, in one dimension, and the shape that they have."""
+    values = dimensionless_values(model, impacts)
     shape = np.broadcast_shapes(_ones(impacts).shape, *(value.shape for value in values.values()))
     flat = {name: np.broadcast_to(value, shape).reshape(-1) for name, value in values.items()}
     count = int(np.prod(shape))
@@ -433,9 +410,7 @@ def _problems(pair: Pair, oblique: ObliqueImpacts) -> Iterator[tuple[Mask, str]]
     if law.damping in _FACTORS_OF_DAMPING:
         name, off = _FACTORS_OF_DAMPING[law.damping]
         factor = _value(law, oblique, name) if name else _ones(oblique.impacts)
-        others = [
-            exponent for exponent in distinct_values(n).tolist() if declared_dashpot(model, exponent) is None
-        ]
+        others = [exponent for exponent in distinct_values(n).tolist() if dashpot_power(model, exponent) is None]
         is_needed = (factor != 0.0) & (law.damping != "liggghts" or n != HERTZ)
         yield np.isin(n, others) & is_needed, f"the contact force has no dashpot C x^q v for the damping{off}"
 
