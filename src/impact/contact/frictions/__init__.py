@@ -4,23 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cache
+from typing import get_args
 
 from ..catalogue import by_key, declared_laws, look_up, pickle_by_key
 from ..friction import FrictionLaw
-
-# the order of a list of friction laws, by what they remember
-KINDS = ("coulomb", "spring", "dashpot", "regularized", "cone")
+from ..slip_motion import FrictionKind
 
 
 @cache
 def frictions() -> Mapping[str, FrictionLaw]:
-    """Collect the friction laws by key.
+    """Collect the friction laws by key, in the order of their kinds.
 
     >>> list(frictions())[:2]
     ['coulomb-1785', 'cundall-strack-1979']
     """
-    laws = declared_laws(__name__, __path__, FrictionLaw)
-    return by_key(sorted(laws, key=lambda law: (KINDS.index(law.kind), law.year, law.key)), "friction law")
+    laws, kinds = declared_laws(__name__, __path__, FrictionLaw), get_args(FrictionKind)
+    return by_key(sorted(laws, key=lambda law: (kinds.index(law.kind), law.year, law.key)), "friction law")
 
 
 def find_friction(key: str) -> FrictionLaw:
