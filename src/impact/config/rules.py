@@ -9,7 +9,7 @@ from dataclasses import replace
 from ..contact.dimensionless import required_quantities
 from ..contact.fixed_step import EXACT, SCHEMES, friction_problem, has_scheme, law_problem
 from ..contact.formula_calls import argument_names
-from ..contact.friction import HERTZ, FrictionLaw, parameter_problem, required_inputs
+from ..contact.friction import FrictionLaw, parameter_problem, required_inputs
 from ..contact.frictions import frictions
 from ..contact.materials import hertz_stiffness
 from ..contact.model import ForceModel, with_base_quantities
@@ -326,9 +326,7 @@ def _tangential_stiffness_problem(draft: Draft, law: FrictionLaw) -> str:
     for model in draft.models:
         has_stiffness = "K" in draft.table("sweep") or _sets_stiffness(draft, model)
         for n in _exponents(draft, model):
-            # 8 G* a is of n = 3/2: other pairs have no values, which the sweep notes
-            is_combinable = law.stiffness != "mindlin" or n == HERTZ
-            problem = parameter_problem(law, given, n=n, has_stiffness=has_stiffness and is_combinable)
+            problem = parameter_problem(law, given, n=n, has_stiffness=has_stiffness)
             if problem:
                 return problem
     return ""
