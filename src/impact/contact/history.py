@@ -16,15 +16,12 @@ from numpy.typing import NDArray
 from ..array_types import Array
 from ..ode.problem import Params, Problem, Step
 from . import motion
-from .dimensionless import dimensionless_values
-from .fixed_step_slip import LIMIT_POSITIVE
-from .friction import Pair, friction_values
 from .impacts import Impacts
 from .rigid import ObliqueImpacts
 from .simulate import RecordedMotion
 from .slip_motion import LEAST_S, SLIP_ROW, TIME_ROW
 from .status import Status
-from .tangential import RecordedSlip, record_friction, simulate_friction
+from .tangential import RecordedSlip
 
 # points at which a step is sampled, and Gauss points by which it is integrated
 SAMPLES_PER_STEP, GAUSS_POINTS = 4, 5
@@ -130,39 +127,28 @@ def history_of(recorded: RecordedMotion, impacts: Impacts, times: int | Array | 
     )
 
 
-def integrate_slip(
-    pair: Pair,
+def oblique_history_of(
+    recorded: RecordedMotion,
+    recorded_slip: Sequence[RecordedSlip],
     oblique: ObliqueImpacts,
-    recorded_motion: RecordedMotion,
-    *,
-    rtol: float,
-    max_steps: int,
     times: int | None = None,
 ) -> tuple[History | None, SlipHistory | None]:
-    """Integrate the slip of one impact (a batch of length one): its history, and slip and friction over it.
+    """Find the history of one impact (a batch of length one), and slip and friction over it.
 
-    Without `times` there are SAMPLES_PER_STEP per step of the joint motion.
+    `recorded_slip` is empty without slip or friction. Without `times` there are SAMPLES_PER_STEP per step of the
+    joint motion; that by Coulomb's friction is of every slip, and has none of its own.
     """
-    impacts = oblique.impacts
-    with np.errstate(all="ignore"):
-        values = {**dimensionless_values(pair.model, impacts), **friction_values(pair, oblique)}
-    values = {name: np.broadcast_to(value, 1) for name, value in values.items()}
-    recorded = record_friction(pair, float(impacts.n[0]), values, rtol=rtol, max_steps=max_steps)
-    steps = _all_steps(recorded)
+    has_slip = bool(recorded_slip) and recorded_slip[0].phase.form.kind != "coulomb"
     grid: int | Array | None = times
-    if times is None and steps:
+    if times is None and has_slip:
+        steps = _all_steps(recorded_slip)
         numbers, fractions = _fractions(steps)
         grid = np.maximum.accumulate(Step.each(steps, numbers).at(fractions)[TIME_ROW])
-    history = history_of(recorded_motion, impacts, grid)
+    history = history_of(recorded, oblique.impacts, grid)
     if history is None:
         return None, None
-    if steps:
-        return history, _slip_history(history, pair, oblique, recorded)
-    status = np.full(1, Status.OK, np.int8)
-    result = simulate_friction(pair, impacts.n, values, status, rtol=rtol, max_steps=max_steps)
-    # without slip or friction nothing is integrated
-    impulse = np.nan_to_num(result.sliding_impulse).item()
-    return history, _coulomb_history(history, oblique, bool(values[LIMIT_POSITIVE][0]), impulse)
+    slip_history = _slip_history if has_slip else _coulomb_history
+    return history, slip_history(history, oblique, recorded_slip)
 
 
 def _all_steps(recorded: Sequence[RecordedSlip]) -> list[Step]:
@@ -170,9 +156,7 @@ def _all_steps(recorded: Sequence[RecordedSlip]) -> list[Step]:
     return [replace(step, params=()) for part in recorded for step in part.steps]
 
 
-def _slip_history(
-    history: History, pair: Pair, oblique: ObliqueImpacts, recorded: Sequence[RecordedSlip]
-) -> SlipHistory:
+def _slip_history(history: History, oblique: ObliqueImpacts, recorded: Sequence[RecordedSlip]) -> SlipHistory:
     """Find slip and friction of an impact over the times of its history, from the steps of the joint motion."""
     impacts, g0 = oblique.impacts, oblique.slip.item()
     unit_t = (impacts.length / impacts.v0).item()
@@ -191,16 +175,19 @@ def _slip_history(
             rows.append(np.array([y[SLIP_ROW], -k[SLIP_ROW] / k[TIME_ROW], np.where(mode, mode, 0.0)]))
         first += len(part.steps)
     slip, force, mode = np.concatenate(rows, axis=1)
-    if pair.friction.kind == "regularized":
+    if recorded[0].phase.form.kind == "regularized":
         mode = np.sign(slip)
     return SlipHistory(g0 * slip, oblique.m_t.item() * g0 / unit_t * force, (np.sign(g0) * mode).astype(np.int8))
 
 
-def _coulomb_history(
-    history: History, oblique: ObliqueImpacts, is_positive: bool, sliding_impulse: float
-) -> SlipHistory:
+def _coulomb_history(history: History, oblique: ObliqueImpacts, recorded: Sequence[RecordedSlip]) -> SlipHistory:
     """Slip until the impulse of the limiting normal force has stopped it; the slip stays without friction."""
     m_t, mu, g0 = oblique.m_t.item(), oblique.mu.item(), oblique.slip.item()
+    sliding_impulse, is_positive = 0.0, False
+    if recorded:
+        phase, steps = recorded[0]
+        sliding_impulse = phase.track.impulse[0].item()
+        is_positive = bool(phase.columns(steps[0].params).is_positive[0])
     limit = mu * (np.maximum(history.F, 0.0) if is_positive else np.abs(history.F))
     # by the momentum of ball 1, between the samples of which the force may change its sign
     impulses = -np.diff(history.v)

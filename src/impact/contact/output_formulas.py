@@ -22,7 +22,7 @@ from .rigid import ObliqueImpacts
 from .simulate import ComputeCollisions, RecordedMotion, simulate
 from .slip_motion import SLIDES, STICKS
 from .status import FIRST_FAILURE, LIMIT, NO_IMPACT, STATUS_OK
-from .tangential import TangentialResult, simulate_friction
+from .tangential import RecordedSlip, TangentialResult, simulate_friction
 from .variables import CENTRAL_OUTPUTS
 
 Outputs = dict[str, NDArray[Any]]
@@ -85,6 +85,7 @@ def collide(
     oblique: tuple[Pair, ObliqueImpacts] | None = None,
     compute: ComputeCollisions | None = None,
     recorded: list[RecordedMotion] | None = None,
+    recorded_slip: list[RecordedSlip] | None = None,
 ) -> Outputs:
     """Simulate impacts by a law: their `outputs`; one that fails has NaN and a status, and affects no other.
 
@@ -98,6 +99,7 @@ def collide(
     fixed_step : the phase and the step of a scheme by name, see `impact.contact.simulate.simulate`, of shape (n,)
     errors : receives a line for each distinct error of the law, see `impact.contact.formula_calls.describe_error`
     compute, recorded : see `impact.contact.simulate.simulate`
+    recorded_slip : see `impact.contact.tangential.simulate_friction`
     oblique : the model with a friction law, and the tangential inputs of the impacts, for outputs of friction
     """
     with np.errstate(all="ignore"):
@@ -137,6 +139,7 @@ def collide(
         collapse=collapse,
         integrator=integrator,
         errors=errors,
+        recorded=recorded_slip,
     )
     return outputs(model, impacts, result, names, checked, (inputs, tangential, pair.friction.kind))
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,8 +72,7 @@ class TangentialResult(Record):
     status: NDArray[np.int8]
 
 
-@dataclass(frozen=True)
-class RecordedSlip:
+class RecordedSlip(NamedTuple):
     """The joint motion of one impact in a phase, and its steps, with the modes of friction among their params."""
 
     phase: SlipPhase
@@ -91,6 +91,7 @@ def simulate_friction(
     core: str = "numpy",
     integrator: str = EXACT,
     errors: dict[str, str] | None = None,
+    recorded: list[RecordedSlip] | None = None,
 ) -> TangentialResult:
     """Integrate the slip of impacts by a pair of laws; one that fails has a status, and affects no other.
 
@@ -103,31 +104,20 @@ def simulate_friction(
         integrated, nor are those without slip, or without friction, whose G0 is 0 or infinite
     core : "numpy"; another core, which only integrates normal motions, is not used
     integrator : "exact", or a scheme with a fixed step, which has no works
+    recorded : receives both phases of the slip of a single impact
 
     Raises
     ------
     ModelError : of the errors of a law, only what is raised outside its formulas
     """
     simulate_part: simulate.SimulatePart[TangentialResult] = partial(
-        _simulate_distinct, pair, rtol=rtol, max_steps=max_steps
+        _simulate_distinct, pair, rtol=rtol, max_steps=max_steps, recorded=recorded
     )
     if integrator != EXACT:
         compute = partial(simulate.integrate_collisions, rtol=rtol, max_steps=max_steps, core=core)
         collide_part = partial(_slip_at_fixed_steps, pair, scheme=integrator, compute=compute, max_steps=max_steps)
         simulate_part = partial(simulate.simulate_fixed_steps, collide_part=collide_part)
     return simulate.simulate_parts(TangentialResult, pair.key, n, values, status, simulate_part, collapse, errors)
-
-
-def record_friction(
-    pair: Pair, n: float, values: simulate.ValueArrays, *, rtol: float, max_steps: int
-) -> list[RecordedSlip]:
-    """Integrate the slip of one impact, a batch of length one, and record it; empty for Coulomb's friction."""
-    recorded: list[RecordedSlip] = []
-    if pair.form(n).kind == "coulomb":
-        return recorded
-    with np.errstate(all="ignore"):
-        _simulate_distinct(pair, n, values, 1, rtol=rtol, max_steps=max_steps, collapse=False, recorded=recorded)
-    return recorded
 
 
 def _simulate_distinct(
@@ -138,10 +128,10 @@ def _simulate_distinct(
     *,
     rtol: float,
     max_steps: int,
+    recorded: list[RecordedSlip] | None,
     collapse: bool,
-    recorded: list[RecordedSlip] | None = None,
 ) -> TangentialResult:
-    """Integrate each distinct dimensionless problem once; `recorded` receives the steps of one impact."""
+    """Integrate each distinct dimensionless problem once."""
     form = pair.form(n)
     model = _smooth_model(pair.model, form)
     law_values = with_coefficients(model, with_units(values, n), count)

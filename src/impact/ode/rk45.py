@@ -127,7 +127,7 @@ def _advance(problem: Problem, state: State, rtol: float, record: bool) -> Step 
         remain = accepted[ended]
         ended, offset = ended[remain], offset[remain]
         if step is not None and beyond.size:
-            step = replace(step, end=1.0 + beyond)
+            step = replace(step, end=1.0 + beyond[:1])
 
     if problem.watch:
         update_peaks(problem, state, trial, accepted, ended)

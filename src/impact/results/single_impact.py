@@ -37,7 +37,7 @@ from ..contact.fixed_step import EXACT
 from ..contact.force_expressions import unload_to_residual, unload_with_stiffness
 from ..contact.friction import FrictionLaw, Pair
 from ..contact.frictions import find_friction
-from ..contact.history import History, SlipHistory, history_of, integrate_slip
+from ..contact.history import History, SlipHistory, history_of, oblique_history_of
 from ..contact.impacts import Impacts
 from ..contact.materials import Material
 from ..contact.model import ForceModel, with_base_quantities
@@ -45,6 +45,7 @@ from ..contact.models import find
 from ..contact.output_formulas import collide
 from ..contact.simulate import RecordedMotion
 from ..contact.status import FIRST_FAILURE, FrictionStatus, Status
+from ..contact.tangential import RecordedSlip
 from ..contact.units import with_numbers
 from ..contact.variables import CENTRAL_OUTPUTS, HISTORY, OUTPUTS, SLIP_HISTORY, Variable
 from ..display import Block, Displayed, Styled, Table
@@ -371,6 +372,7 @@ def run_single_impact(plan: Plan, first: tuple[str, ...], times: int | None = No
     solver = config.solver
     errors: dict[str, str] = {}
     recorded: list[RecordedMotion] = []
+    recorded_slip: list[RecordedSlip] = []
     collision = collide(
         law,
         impacts,
@@ -383,6 +385,7 @@ def run_single_impact(plan: Plan, first: tuple[str, ...], times: int | None = No
         oblique=oblique,
         # a history is that of the continuous law
         recorded=recorded if solver.integrator == EXACT else None,
+        recorded_slip=recorded_slip,
     )
     values = {name: array[0].item() for name, array in collision.items()}
     for error in errors.values():
@@ -391,9 +394,7 @@ def run_single_impact(plan: Plan, first: tuple[str, ...], times: int | None = No
     has_slip = values.get("friction_status", FrictionStatus.OK) < FIRST_FAILURE
     if values["status"] == Status.OK and recorded and has_slip:
         if oblique:
-            history, slip = integrate_slip(
-                *oblique, recorded[0], rtol=solver.rtol, max_steps=solver.max_steps, times=times
-            )
+            history, slip = oblique_history_of(recorded[0], recorded_slip, oblique[1], times)
         else:
             history = history_of(recorded[0], impacts, times)
     v0 = impacts.v0[0].item()
