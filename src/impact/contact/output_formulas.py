@@ -103,15 +103,13 @@ def collide(
     oblique : the model with a friction law, and the tangential inputs of the impacts, for outputs of friction
     """
     with np.errstate(all="ignore"):
-        of_law, checked = dimensionless_values(model, impacts), check_inputs(model, impacts)
-    values = {**of_law, **(fixed_step or {})}
-    if oblique is not None and integrator == MUJOCO_CONE:
-        with np.errstate(all="ignore"):
-            values |= friction_values(*oblique)
+        values, checked = dimensionless_values(model, impacts), check_inputs(model, impacts)
+        of_friction = friction_values(*oblique) if oblique is not None else {}
+    values |= fixed_step or {}
     result = simulate(
         model,
         impacts.n,
-        values,
+        values | of_friction if integrator == MUJOCO_CONE else values,
         checked,
         rtol=rtol,
         max_steps=max_steps,
@@ -127,7 +125,7 @@ def collide(
     pair, inputs = oblique
     with np.errstate(all="ignore"):
         own = np.where(checked == STATUS_OK, check_friction(pair, inputs), checked).astype(np.int8)
-        columns = {**values, **friction_values(pair, inputs)}
+    columns = values | of_friction
     shape = np.broadcast_shapes(impacts.n.shape, own.shape, *(column.shape for column in columns.values()))
     tangential = simulate_friction(
         pair,
