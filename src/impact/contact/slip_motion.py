@@ -41,7 +41,7 @@ N_COMPONENTS = 4
 NORMAL_ROWS = [0, 1, TIME_ROW, TIME_ROW, -1]
 # errors of Gamma and z are judged against 1
 JOINT_FLOOR = (*motion.ERROR_FLOOR, 1.0, 1.0)
-# the force of a dashpot that is not there
+# the force of a dashpot or a spring that is not there
 NO_FORCE = np.zeros(1)
 # number of the margin of the sign of the normal force, after that of the mode
 SIGN_MARGIN = 1
@@ -516,15 +516,14 @@ class SlipPhase:
     def change(self, which: NDArray[np.intp], y: Array, k: Array, params: Params) -> tuple[Array, Params]:
         """Change the modes and signs of trajectories where margins vanish, see `Switch`."""
         y, columns = self._released(y, params), self.columns(params)
-        local = self.local(y, k, params)
-        if not self.form.has_modes:
-            which = np.full_like(which, SIGN_MARGIN)
-        index = columns.row.astype(np.intp)
+        index, old = columns.row.astype(np.intp), columns.mode
         self.track.add_impulse(index, columns, k[0], y[SLIP_ROW])
+        if not self.form.has_modes:
+            # the only margin is that of the sign
+            return self._enter(index, old, old, -columns.sign, NO_FORCE, NO_FORCE, y, params)
         turned = which == SIGN_MARGIN
         sign = np.where(turned, -columns.sign, columns.sign)
-        self.track.sign[index] = sign
-        old, other = columns.mode, columns.changed(columns.mode, sign)
+        local, other = self.local(y, k, params), columns.changed(old, sign)
         # at a change of the sign there is neither a limit nor a force
         spring_force = np.where(turned, local.spring_force - local.trial, local.spring_force)
         # the rate of N changes its sign with the sign of the force
@@ -548,8 +547,6 @@ class SlipPhase:
         self, growth: Array, direction: Array, y: Array, columns: Columns, turned: Mask | bool = False
     ) -> Array:
         """Find the modes at the limit, where the trial force grows by this more; where `turned` it is zero."""
-        if not self.form.has_modes:
-            return columns.mode
         # without a limit the mode does not matter
         free = columns.share == 0.0
         forwards = np.where(y[SLIP_ROW] < 0.0, -1.0, 1.0)
@@ -573,6 +570,7 @@ class SlipPhase:
         columns = self.columns(params)
         before, after = self._energy(y[0], force_before, columns), self._energy(y[0], force, columns)
         self.track.set_mode(self.form, index, old, new, y, before, after)
+        self.track.sign[index] = sign
         scale = self._times(columns.root, _away_from_zero(y[0]), self.memory * self.stiffness_power)
         z = np.where(columns.root > 0.0, force / scale, 0.0)
         y = y.copy()
@@ -652,7 +650,6 @@ class SlipPhase:
         k = self.rates(y[:N_COMPONENTS], params)
         force = k[-1]
         sign = np.where(np.abs(force) > MARGIN_TOLERANCE, np.sign(force), self.track.sign[index])
-        self.track.sign[index] = sign
         columns = columns.changed(old, sign)
         params = self._replaced(params, columns)
         local = self.local(y, k, params)
@@ -662,14 +659,12 @@ class SlipPhase:
         at_limit = np.abs(trial) >= local.N * (1.0 - CAP_TOLERANCE) - MARGIN_TOLERANCE / columns.G0
         direction = np.where(trial < 0.0, -1.0, 1.0)
         spring_force = np.where(at_limit, direction * local.N - local.capped_drag, force_before)
-        rate = self.trial_rate(y, k, columns, spring_force, direction * local.N)
-        if self.form.kind == "dashpot":
-            new = np.where(at_limit, direction, 0.0)
-        else:
+        new, was_held = direction, np.abs(old) == 2.0
+        if self.form.kind == "spring":
+            rate = self.trial_rate(y, k, columns, spring_force, direction * local.N)
             new = self._mode_at_limit(direction * rate - local.dN, direction, y, columns)
-            new = np.where(at_limit, new, 0.0)
-            was_held = np.abs(old) == 2.0
-            new = self._held_mode(at_limit & was_held, ~was_held, direction, new, y, params)
+        new = np.where(at_limit, new, 0.0)
+        new = self._held_mode(at_limit & was_held, ~was_held, direction, new, y, params)
         return self._enter(index, old, new, sign, force_before, spring_force, y, params)
 
     def _replaced(self, params: Params, columns: Columns) -> Params:
@@ -683,12 +678,11 @@ class SlipPhase:
         force, twice_force = k[-1], self.rates(twice[:N_COMPONENTS], params)[-1]
         self.track.order[index] = np.log2(twice_force / force) / self.law.model.coordinate_power
         sign = np.where(force < 0.0, -1.0, 1.0)
-        self.track.sign[index] = sign
         columns = columns.changed(np.zeros(n), sign)
         params = self._replaced(params, columns)
         if not self.form.has_modes:
             mode = np.full(n, 1.0 if form.kind == "regularized" else 0.0)
-            return self._enter(index, mode, mode, sign, np.zeros(n), np.zeros(n), y, params)
+            return self._enter(index, mode, mode, sign, NO_FORCE, NO_FORCE, y, params)
         local = self.local(near, k, params)
         kp = form.stiffness_power
         spring_force = (
@@ -699,20 +693,17 @@ class SlipPhase:
         trial = local.drag if form.kind == "dashpot" else spring_force + local.capped_drag
         below = trial < local.N
         spring_force = np.where(below, 0.0, local.N - local.capped_drag)
-        if form.kind == "dashpot":
-            new = np.where(below, 0.0, 1.0)
-        else:
-            growth = self._growth_at_contact(y, params)
-            if self.form.is_total and kp * self.memory == form.damping_power > 0.0:
-                # the leading powers cancel
-                growth = np.where(local.capped_drag >= local.N, columns.root**2 * columns.G0 - 1.0, growth)
-            new = np.where(below, 0.0, np.where(growth > 0.0, 1.0, 0.0))
-            if self.form.is_total and self.memory == 1.0 and form.damping_power < kp:
-                self.track.is_slow[index] = is_slow = local.drag > local.N
-                new = np.where(is_slow, -1.0, new)
+        growth = np.ones(n) if form.kind == "dashpot" else self._growth_at_contact(y, params)
+        if form.is_total and kp * self.memory == form.damping_power > 0.0:
+            # the leading powers cancel
+            growth = np.where(local.capped_drag >= local.N, columns.root**2 * columns.G0 - 1.0, growth)
+        new = np.where(~below & (growth > 0.0), 1.0, 0.0)
+        if form.is_total and self.memory == 1.0 and form.damping_power < kp:
+            self.track.is_slow[index] = is_slow = local.drag > local.N
+            new = np.where(is_slow, -1.0, new)
         self.track.touches[index] = (new != 0.0) | ~below
         # not at s = 0 itself, where the share of the spring in the limit is 0/0
-        return self._enter(index, new, new, sign, np.zeros(n), spring_force, near, params)
+        return self._enter(index, new, new, sign, NO_FORCE, spring_force, near, params)
 
     def _rows_near_contact(self, y: Array, params: Params, s: float) -> Array:
         """Make rows at an indentation so small that the velocities are those at first contact."""
