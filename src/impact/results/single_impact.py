@@ -738,15 +738,14 @@ def _has_input(draft: Draft, name: InputName) -> bool:
         value = as_table(draft.table("materials").get(name.material)).get(name.key)
         return isinstance(value, list | dict)
     if name.owner:
-        laws = draft.models if name.model else draft.frictions
-        return any(law.key == name.owner and name.key in law_quantities(law) for law in laws)
+        return any(law.key == name.owner and name.key in law_quantities(law) for law in draft.laws[name.table])
     return name.key in SWEEP_INPUTS
 
 
 def _unknown_input(draft: Draft, name: str) -> UsageError:
     parameters = [
         str(InputName(table, law.key, parameter.name))
-        for table, laws in (("model", draft.models), ("friction", draft.frictions))
+        for table, laws in draft.laws.items()
         for law in laws
         for parameter in law.parameters
     ]
