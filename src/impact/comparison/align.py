@@ -11,7 +11,7 @@ import xarray as xr
 
 from ..array_types import Array
 from ..config.input_names import InputName, is_input
-from ..contact.variables import OUTPUTS
+from ..contact.variables import LAW_DIMS, OUTPUTS
 from ..formatting import number, safe_text
 from ..results.attributes import read_attribute
 from ..results.schema import MODEL_METADATA, columns_along, is_case
@@ -21,8 +21,6 @@ from .verdict import Difference, DifferenceKind
 MAX_NAMED_LABELS = 3  # labels of one side that a message lists
 # coordinates that vary with the model
 MODEL_COORDINATES = ("model", "exponent", *MODEL_METADATA)
-# dimensions of laws, which not every variable has
-LAW_DIMS = ("model", "friction")
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ import xarray as xr
 
 from ..config.input_names import is_input
 from ..contact.fixed_step import EXACT
-from ..contact.variables import OUTPUTS
+from ..contact.variables import LAW_DIMS, OUTPUTS
 from ..errors import UsageError
 from ..formatting import argument, number, safe_text
 from ..results.attributes import read_attribute
@@ -19,7 +19,7 @@ from ..results.kinds import kind_of, require_sweep
 from ..results.replay_command import command_start
 from ..results.schema import MODEL_METADATA, SCHEMA, SCHEMA_VERSION, is_case
 from ..results.xarray_backend import load
-from .align import LAW_DIMS, MODEL_COORDINATES, Alignment, align_sweeps
+from .align import MODEL_COORDINATES, Alignment, align_sweeps
 from .boards import align_boards, version_notes
 from .calibrations import align_calibrations, fit_notes
 from .tolerances import ALL_VARIABLES, Tolerances, calibration_tolerances, effective_tolerances

@@ -14,6 +14,8 @@ from .status import FrictionStatus, Status
 
 # stands for the swept axes among the dimensions of a variable
 AXES = "axes"
+# dimensions of laws, which not every variable has
+LAW_DIMS = ("model", "friction")
 Scale = Literal[
     "v0",
     "1",

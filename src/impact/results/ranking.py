@@ -20,7 +20,7 @@ from ..config.quantities import Quantity
 from ..config.tables import TOLERANCE
 from ..contact.status import FIRST_FAILURE, FrictionStatus, Status
 from ..contact.units import names_in
-from ..contact.variables import OUTPUTS
+from ..contact.variables import LAW_DIMS, OUTPUTS
 from ..display import Block, Displayed, Table, html_of
 from ..errors import UsageError, did_you_mean
 from ..formatting import argument, percentage, prefixed, safe_text
@@ -363,7 +363,7 @@ def rankable_parts(
     """Select the part of each law to rank; refuse a result that lacks a target or has too many points."""
     _check_rankable(dataset, criterion)
     selected = select_laws(select(dataset[list(criterion.names)], sel), models, frictions)
-    dims = [dim for dim in ("model", "friction") if dim in selected.dims]
+    dims = [dim for dim in LAW_DIMS if dim in selected.dims]
     parts = []
     for place in np.ndindex(*(selected.sizes[dim] for dim in dims)):
         part = selected.isel(dict(zip(dims, place, strict=True)))

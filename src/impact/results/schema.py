@@ -23,7 +23,7 @@ from ..config.input_names import InputName, is_foreign, is_input
 from ..config.tables import MATERIAL_KEYS
 from ..contact.fixed_step import EXACT
 from ..contact.materials import effective_mass
-from ..contact.variables import AXES, HISTORY, OUTPUTS, Variable, by_name, default_variables
+from ..contact.variables import AXES, HISTORY, LAW_DIMS, OUTPUTS, Variable, by_name, default_variables
 from ..engine.build_impacts import mass_at, radius_at, restitution_at, velocity_at
 from ..engine.inputs import Index, Inputs
 from ..engine.plan import Plan
@@ -424,7 +424,7 @@ def places_of_laws(
 
     Each is at the first position along the parameters of other laws; without the dimension of models it is all.
     """
-    law_dims = [dim for dim in ("model", "friction") if dim in dims] if "model" in dims else []
+    law_dims = [dim for dim in LAW_DIMS if dim in dims] if "model" in dims else []
     keys = [dataset[dim].values.tolist() for dim in law_dims]
     columns = {dim: columns_along(dataset, dim) for dim in (dataset.dims if law_dims else ())}
     for place in np.ndindex(*map(len, keys)):

@@ -12,7 +12,7 @@ from ..array_types import Mask
 from ..config.files import to_plain_data, to_plain_value
 from ..config.input_names import InputName
 from ..config.quantities import number_in
-from ..contact.variables import OUTPUTS
+from ..contact.variables import LAW_DIMS, OUTPUTS
 from ..errors import UsageError, did_you_mean
 from ..formatting import argument, prefixed, safe_text
 from .schema import plain_unit
@@ -88,7 +88,7 @@ def select_laws(dataset: xr.Dataset, models: object = None, frictions: object = 
 
 def select(dataset: xr.Dataset, sel: Mapping[str, object]) -> xr.Dataset:
     """Select at values of coordinates; an axis is dropped, unless several numbered points have the value."""
-    axes = [str(dim) for dim in dataset.sizes if dim not in ("model", "friction")]
+    axes = [str(dim) for dim in dataset.sizes if dim not in LAW_DIMS]
     masks: dict[Hashable, Mask] = {}
     for name, value in sel.items():
         if name not in dataset.coords or len(dataset[name].dims) != 1 or dataset[name].dims == ("model",):

@@ -47,7 +47,7 @@ from ..contact.simulate import RecordedMotion
 from ..contact.status import FIRST_FAILURE, FrictionStatus, Status
 from ..contact.tangential import RecordedSlip
 from ..contact.units import with_numbers
-from ..contact.variables import CENTRAL_OUTPUTS, HISTORY, OUTPUTS, SLIP_HISTORY, Variable
+from ..contact.variables import CENTRAL_OUTPUTS, HISTORY, LAW_DIMS, OUTPUTS, SLIP_HISTORY, Variable
 from ..display import Block, Displayed, Styled, Table
 from ..engine.build_impacts import build_impacts, build_oblique, fixed_steps_at
 from ..engine.plan import Plan
@@ -66,8 +66,6 @@ from .xarray_backend import open_result
 STARTER_E = "sweep.e=0.5"
 
 ConfigSource = str | Path | Mapping[str, object] | xr.Dataset | None
-# dimensions of laws
-LAW_DIMS = ("model", "friction")
 # name, unit and meaning of the quantities that are derived from the inputs of one impact, and from its motion
 INPUT_QUANTITIES = (
     ("m1", "kg", "mass of ball 1"),
@@ -251,7 +249,7 @@ class Impact(Displayed):
     def records(self) -> Sequence[Mapping[str, Any]]:
         """One row: the model, the inputs and the outputs."""
         data = self.as_dict()
-        keys = {name: data[name] for name in ("model", "friction") if name in data}
+        keys = {name: data[name] for name in LAW_DIMS if name in data}
         return [{**keys, **data["inputs"], **data["outputs"]}]
 
     def sections(self, width: int) -> Iterable[Block]:

@@ -15,7 +15,7 @@ from ..config.input_names import InputName
 from ..config.tables import MATERIAL_KEYS, MATERIAL_QUANTITIES, SWEEP_QUANTITIES
 from ..contact.simulate import TABLE_COLUMNS
 from ..contact.tangential import TangentialResult
-from ..contact.variables import AXES, OUTPUTS
+from ..contact.variables import AXES, LAW_DIMS, OUTPUTS
 from ..errors import ResultError
 from ..formatting import safe_text
 from .attributes import ATTRIBUTE_TYPES, read_attribute
@@ -170,7 +170,7 @@ def _status_violations(dataset: xr.Dataset) -> Iterator[str]:
 def _history_violations(dataset: xr.Dataset) -> Iterator[str]:
     """Variables of a time history along other axes than t."""
     for name, variable in dataset.variables.items():
-        if variable.dims != (() if name in ("model", "friction") else ("t",)):
+        if variable.dims != (() if name in LAW_DIMS else ("t",)):
             yield f"{name}: expected t as its only axis"
 
 
