@@ -308,6 +308,8 @@ def test_the_json_has_the_names_of_the_contract(cli: Run) -> None:
     assert of_spring.keys() == {"estimate", "lower", "upper", "identifiable"}
     assert (of_spring["lower"], of_spring["upper"], of_spring["identifiable"]) == (None, None, False)
     assert law["determined"] == ["C/sqrt(m K)"]
+    printed = cli("calibrate", FOLDER / "dashpot.toml", "--set", "solver.rtol=1e-6").stdout
+    assert "kelvin-voigt: K, C: only C/sqrt(m K) is determined" in " ".join(printed.split())
 
 
 def test_what_is_determined_has_no_dimension_whether_or_not_its_units_have_a_mass() -> None:

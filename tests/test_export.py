@@ -17,6 +17,7 @@ import pytest
 
 import impact
 from impact.errors import ConfigError, UsageError
+from impact.exporters.code import Code
 from impact.exporters.export import comment_lines
 from impact.exporters.programs import run_program
 from impact.exporters.registry import CODES
@@ -967,6 +968,22 @@ def test_lammps_takes_the_numbers_of_a_friction_law(
     assert not any("no friction" in remark for remark in export.header)
     assert export.as_dict()["beta_at_dt"]["mean"] == pytest.approx(export.beta_continuous, abs=0.2)
     assert "omega 0 0 0.0" in str(export.script)
+
+
+def test_the_lines_for_liggghts_say_which_properties_their_wall_has() -> None:
+    ball, wall = (
+        impact.export("liggghts", "liggghts-hertz", source=source("soft", "hard", **change), code_version="3.8.0")
+        for change in ({}, WALL)
+    )
+    remark = "the wall has the properties of type 2"
+    assert (remark in ball.header, remark in wall.header) == (False, True)
+
+
+@pytest.mark.parametrize("code", [code for code in CODES.values() if code.program is not None])
+def test_a_program_that_runs_scripts_says_how_to_install_it(code: Code) -> None:
+    assert code.program is not None
+    assert "install" in code.program.install
+    assert "install" not in code.program.name
 
 
 def test_the_tangential_stiffness_of_two_materials_is_a_number_in_lammps() -> None:

@@ -46,6 +46,15 @@ def test_polynomials_agree_with_the_integration(key: str, name: str, n: float) -
     assert any(interval.is_accurate for interval in compute.group[1].intervals)
 
 
+def test_samples_are_values_of_the_function_with_its_extrema() -> None:
+    interpolant = Interpolant(lambda x: np.sin(3.0 * x)[:, None], [0.1, 1.0, 3.0], np.ones(1))
+    interpolant(np.array([0.5, 2.0]))
+    x, values = interpolant.samples()
+    np.testing.assert_allclose(values, np.sin(3.0 * x), rtol=0, atol=1e-10)
+    for extremum in np.pi / 6.0 * np.array([1.0, 3.0, 5.0]):
+        assert np.abs(x - extremum).min() < 1e-8
+
+
 def test_a_limit_and_what_is_beside_it_have_their_status() -> None:
     """At C = 2 in the contact's own units the dashpot is critically damped."""
     values = np.array([0.5, 1.5, 2.0, 2.5, 40.0])

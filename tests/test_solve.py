@@ -114,6 +114,13 @@ def test_the_least_peak_force_of_a_dashpot_is_right_to_six_digits(wanted: float,
     assert result.attainable[0] == 572.845
 
 
+AT_FIXED_STEPS = {
+    "models": "damped",
+    "sweep": {"v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 1e6, "n": 1.0, "steps_per_contact": 20, "phase": 0.5},
+    "solver": {"integrator": "kick-drift"},
+}
+
+
 def law_of(damping: Callable[[Array], Array]) -> impact.ForceModel:
     """A linear contact whose dashpot is a function of a number p from 0 to 3."""
     return new_law(
@@ -135,15 +142,18 @@ def test_a_root_is_right_to_more_digits_than_the_polynomial_that_finds_it() -> N
 def test_with_a_fixed_step_the_least_value_lies_between_two_values_of_the_scan() -> None:
     """These are at 1.005 and 1.02."""
     law = law_of(lambda p: 0.5 - 20.0 * np.minimum(np.abs(p - 1.0075), 0.1) ** 2)
-    source = {
-        "models": "damped",
-        "sweep": {"v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 1e6, "n": 1.0, "steps_per_contact": 20, "phase": 0.5},
-        "solver": {"integrator": "kick-drift"},
-    }
-    result = impact.solve("damped", "p", {"e_out": 0.3}, source=source, plugins=[law])
-    least = impact.run(source, at={"damped.p": 1.0075}, plugins=[law]).values["e_out"]
+    result = impact.solve("damped", "p", {"e_out": 0.3}, source=AT_FIXED_STEPS, plugins=[law])
+    least = impact.run(AT_FIXED_STEPS, at={"damped.p": 1.0075}, plugins=[law]).values["e_out"]
     assert result.status == "no_root"
     assert result.attainable[0] == pytest.approx(least, abs=1e-6)
+
+
+def test_roots_between_two_powers_of_ten_of_the_scan_are_found_by_its_even_steps_between_the_bounds() -> None:
+    """The damping is less from 2.55 to 2.65 only."""
+    law = law_of(lambda p: 0.5 - 8.0 * np.maximum(0.05 - np.abs(p - 2.6), 0.0))
+    target = impact.run(AT_FIXED_STEPS, at={"damped.p": 2.575}, plugins=[law]).values["e_out"]
+    result = impact.solve("damped", "p", {"e_out": target}, source=AT_FIXED_STEPS, plugins=[law])
+    assert [root.value for root in result.roots] == pytest.approx([2.575, 2.625], abs=1e-6)
 
 
 @pytest.mark.slow
