@@ -738,6 +738,15 @@ def test_a_signal_while_storing_is_not_lost(
     assert impact.load(tmp_path / "results.h5").sizes["e"] == 3
 
 
+def test_the_third_signal_stops_a_force_function_that_never_returns() -> None:
+    with exits.catch_signals() as should_stop:
+        for _ in range(2):
+            signal.raise_signal(signal.SIGINT)
+        assert should_stop()
+        with pytest.raises(exits.Interrupted, match="stopped immediately"):
+            signal.raise_signal(signal.SIGTERM)
+
+
 def test_an_internal_error_is_one_line_and_a_report(forked: ForkServer, tmp_path: Path, stored: Path) -> None:
     # a function that is replaced by a failing one stands for a bug
     code = (

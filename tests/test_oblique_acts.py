@@ -385,6 +385,15 @@ def test_calibrate_says_which_pair_cannot_be_combined_and_why() -> None:
         impact.calibrate({**source, "models": ["kelvin-voigt"]})
 
 
+def test_a_fit_at_a_speed_has_no_v1_which_follows_from_the_measured_angle() -> None:
+    sweep = {"e": 0.8, "speed": 1.0, "m1": 0.1, "m2": 0.2, "R1": 0.01, "K": 1e7, "mu": {"fit": [0.05, 0.6]}}
+    columns = {"angle": [0.5, 0.6], "beta": [-0.5, -0.4]}
+    source = {"models": "hertz", "frictions": "coulomb-1785", "sweep": sweep, "data": {"columns": columns}}
+    coordinates = impact.calibrate(source).coords
+    assert {"speed", "m1", "m2", "R1", "K"} <= set(coordinates)
+    assert "v1" not in coordinates
+
+
 @pytest.fixture(scope="module")
 def fitted() -> xr.Dataset:
     """A calibration of a pair of laws by two measured values."""
