@@ -372,6 +372,7 @@ def test_calibrate_says_which_pair_cannot_be_combined_and_why() -> None:
         "sweep": {"e": 0.8, "v1": 1.0, "u1": 0.5, "m1": 0.1, "m2": 0.2, "R1": 0.01, "mu": {"fit": [0.05, 0.6]}},
         "model": {"kelvin-voigt": {"C": 1000.0}},
         "data": {"columns": {"beta": [0.1, 0.12]}},
+        "solver": {"rtol": 1e-5},
     }
     source["sweep"] |= {"material": "steel"}
     source["materials"] = {"steel": {"E": 2.1e11, "nu": 0.3, "rho": 7850.0}}

@@ -323,13 +323,13 @@ def test_bad_input_is_one_line(cli: Run, words: tuple[str, ...], message: str) -
 @pytest.mark.parametrize(
     ("name", "at", "note"),
     [
-        ("A", {"kuwabara-kono-1987.A": 1e-5}, "A is solved for, and this value changes nothing"),
-        ("A", {"A": 1e-5}, "A is solved for, and this value changes nothing"),
-        ("A", {"e": 0.7}, "e is not an input of kuwabara-kono-1987, and changes nothing"),
+        ("C", {"kelvin-voigt.C": 1.0}, "C is solved for, and this value changes nothing"),
+        ("C", {"C": 1.0}, "C is solved for, and this value changes nothing"),
+        ("C", {"e": 0.7}, "e is not an input of kelvin-voigt, and changes nothing"),
     ],
 )
 def test_a_given_value_that_changes_nothing_is_noted(name: str, at: dict[str, float], note: str) -> None:
-    without = impact.solve("kuwabara-kono-1987", name, {"e_out": 0.6})
+    without = impact.solve("kelvin-voigt", name, {"e_out": 0.6})
     with pytest.warns(impact.ImpactWarning, match=re.escape(note)):
-        result = impact.solve("kuwabara-kono-1987", name, {"e_out": 0.6}, at=at)
+        result = impact.solve("kelvin-voigt", name, {"e_out": 0.6}, at=at)
     assert result.roots == without.roots
