@@ -146,6 +146,18 @@ def test_a_history_conserves_momentum_at_all_times() -> None:
     assert (v1[-1], v2[-1]) == pytest.approx((collision.values["v1_post"], collision.values["v2_post"]), abs=1e-8)
 
 
+def test_the_kinematic_restitution_is_relative_to_the_closing_speed() -> None:
+    collision = impact.run(model="exact-hysteresis", at={"e": 0.6, "v1": 3.0, "v2": -1.0})
+    assert collision.e_kinematic == pytest.approx(0.6, abs=1e-8)
+
+
+def test_a_stiffness_at_the_exponent_of_the_law_is_that_of_all_laws_whatever_the_order() -> None:
+    at = {"K": 1e6, "n": 1.0, "e": 0.5}
+    for values in (at, dict(reversed(at.items()))):
+        inputs = impact.run(model="bilinear", at=values).as_dict()["inputs"]
+        assert ("K" in inputs, "bilinear.K" in inputs) == (True, False)
+
+
 @pytest.mark.parametrize("key", ["exact-hysteresis", "gharib-hurmuzlu-2012", "lankarani-nikravesh-1994"])
 def test_limits_of_restitutions_impulses_and_works_at_e_0(key: str) -> None:
     collision = impact.run(model=key, at={"e": 0.0})
