@@ -335,16 +335,22 @@ def _declared_bytes(name: str, dataset: h5d.DatasetID) -> int:
     return declared if dataset.get_storage_size() else 0
 
 
+def _dim_ids(dataset: h5py.Dataset, name: str) -> list[int] | None:
+    """Read an attribute of dimension IDs; None without it.
+
+    It is not looked up in vain: the text of that error of HDF5 was once unreadable (h5py 3.16.0, HDF5 2.0.0).
+    """
+    return np.ravel(dataset.attrs[name]).tolist() if name in dataset.attrs else None
+
+
 def _dims_by_dataset(datasets: Mapping[str, h5py.Dataset]) -> dict[str, tuple[str, ...]]:
     """Find the dimensions of each dataset by the dimension IDs of netCDF."""
-    numbers = {
-        name: np.ravel(dataset.attrs.get("_Netcdf4Coordinates", ())).tolist() for name, dataset in datasets.items()
-    }
+    numbers = {name: _dim_ids(dataset, "_Netcdf4Coordinates") or [] for name, dataset in datasets.items()}
     scales: dict[int, str] = {}
     for name, dataset in datasets.items():
-        if dataset.attrs.get("CLASS") == b"DIMENSION_SCALE":
-            ids = np.ravel(dataset.attrs.get("_Netcdf4Dimid", numbers[name])).tolist()
-            scales |= dict.fromkeys(ids[:1], name)
+        if "CLASS" in dataset.attrs and dataset.attrs["CLASS"] == b"DIMENSION_SCALE":
+            ids = _dim_ids(dataset, "_Netcdf4Dimid")
+            scales |= dict.fromkeys((numbers[name] if ids is None else ids)[:1], name)
     sizes = {name: datasets[name].shape[0] for name in scales.values() if datasets[name].shape}
     dims = {}
     for name, dataset in datasets.items():
