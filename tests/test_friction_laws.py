@@ -607,3 +607,9 @@ def test_a_pair_reaches_the_reference_numbers(
     normal = reference.spring_dashpot(n) if is_elastic else reference.normal_law(pair.model, n, of_law)
     outcome = reference.solve(normal, law, values[SLIP])
     assert reference.beta(outcome, values[SLIP]) == pytest.approx(beta, abs=2e-9)
+
+
+@pytest.mark.parametrize("key", frictions())
+def test_the_description_of_a_law_with_a_stiffness_says_what_it_is(key: str) -> None:
+    lines = str(impact.describe(find_friction(key))).splitlines()
+    assert any(line.startswith("stiffness  ") for line in lines) == bool(find_friction(key).stiffness)

@@ -66,7 +66,7 @@ class FrictionLaw:
 
     Raises
     ------
-    ModelError : the key is not kebab-case, or a parameter that a rule needs is missing
+    ModelError : the key is not kebab-case
     """
 
     key: str

@@ -16,6 +16,7 @@ STIFFNESS = {
     "constant": "k_t or kt_over_kn",
     "mindlin": "8 G* a of the materials, k_t or kt_over_kn",
     "liggghts": "8 G* a of the materials (n = 3/2), K (n = 1) or kt_over_kn",
+    "kratos": "4 G*/E* of the materials times that of the contact force",
     "classic": "k_t a",
 }
 MEMORY = {
