@@ -286,11 +286,11 @@ def test_lammps_takes_a_multiple_of_the_damping_of_the_contact_force(
 
 
 def test_the_dashpot_of_a_law_is_found_where_it_is_declared() -> None:
-    found = {key: dashpot_power(law, law.exponent or 1.5) for key, law in catalogue().items()}
-    without = {key for key, power in found.items() if power is None}
+    powers = {key: dashpot_power(law, law.exponent or 1.5) for key, law in catalogue().items()}
+    without = {key for key, power in powers.items() if power is None}
     assert {"bilinear", "jkr-1971", "adams-impact", "jankowski-2006", "hertz-power-damping"} <= without
     assert len(without) < 30
-    for key, power in found.items():
+    for key, power in powers.items():
         law = catalogue()[key]
         coefficients = COORDINATE_COEFFICIENTS[law.velocity_coordinate]
         if power is not None and coefficients:

@@ -46,22 +46,22 @@ class Engine:
 
     def command(self, program: str | None) -> list[str]:
         """Make the command of the adapter, in the requested interpreter or in this one, or for its program."""
-        found = self.program.find(program)
-        if found is None and program is not None:
+        path = self.program.find(program)
+        if path is None and program is not None:
             raise _no_program(program)
-        version = None if found is None else self.program.version_of(found)
-        if found is None or version is None:
-            place = "on the path" if found is None else f"in {found}" if self.is_package else f"as {found}"
+        version = None if path is None else self.program.version_of(path)
+        if path is None or version is None:
+            place = "on the path" if path is None else f"in {path}" if self.is_package else f"as {path}"
             missing = f"{self.name}: {self.title} is not installed {place}"
             raise UsageError(f"{missing}; {self.program.install}, or {argument('program')}")
         file = FOLDER / f"{self.file or self.name}.py"
         if self.is_package:
-            return python_command(found, file, self.function)
+            return python_command(path, file, self.function)
         if self.is_interpreter:
             # it prints a greeting on stdout, where answers are expected
-            words = [*self.program.command(found, str(SERVE)), f"{file}:{self.function}", "3"]
+            words = [*self.program.command(path, str(SERVE)), f"{file}:{self.function}", "3"]
             return ["sh", "-c", 'exec "$@" 3>&1 >&2', "sh", *words]
-        return [*python_command(sys.executable, file, self.function), "1", found, version]
+        return [*python_command(sys.executable, file, self.function), "1", path, version]
 
 
 ENGINES: Mapping[str, Engine] = {
