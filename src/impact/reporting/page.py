@@ -123,7 +123,6 @@ def _page_of(dataset: xr.Dataset, models: Sequence[str] | None) -> str:
     _check_size(len(data))
     return template("page.html.j2").render(
         title=content["title"],
-        running_title='""',
         summary=conditions_of(dataset, *(name for axis in inputs.axes for name in axis.columns)),
         data=Markup(data),
         version=__version__,
