@@ -71,6 +71,7 @@ def test_the_workflow_has_the_stages_of_the_local_run_and_all_interpreters() -> 
     assert jobs["test"]["steps"][-1]["run"] == test
     # wheels that are installed ahead
     assert commands == stages - {"make test", "make peers"} | {"make release-check"}
+    assert jobs["long"]["steps"][-1]["run"] == "make test-long"
     matrix = jobs["test"]["strategy"]["matrix"]
     assert {job["os"].partition("-")[0] for job in matrix["include"]} == {"windows", "macos"}
     assert f">={matrix['python'][0]}" == PROJECT["requires-python"]
