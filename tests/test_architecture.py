@@ -43,6 +43,7 @@ def test_the_page_draws_the_floors_that_are_tested() -> None:
         assert drawn == [part or "impact" for part in parts if not part.startswith("_") and part != "array_types"]
 
 
+@pytest.mark.slow
 def test_a_value_of_e_takes_the_steps_of_the_page_in_their_order(tmp_path: Path) -> None:
     """Each function of the table is called, the first time in the order of the table, by the two commands."""
     functions = re.findall(r"^\| \d+ \| `(impact\.[\w.]+)` \|", PAGE, re.MULTILINE)

@@ -40,6 +40,7 @@ def drops() -> xr.Dataset:
     return impact.calibrate(FOLDER / "drops.toml", overrides=[models, "solver.rtol=1e-6"])
 
 
+@pytest.mark.slow
 def test_the_law_that_made_the_data_is_first_with_its_parameter_in_the_interval(drops: xr.Dataset) -> None:
     first = drops.isel(model=0).sel(parameter="kuwabara-kono-1987.A")
     assert drops["model"].values[0] == "kuwabara-kono-1987"
@@ -234,6 +235,7 @@ sweep = { R1 = "2.5 mm", m2 = inf, material = "steel" }
 """
 
 
+@pytest.mark.slow
 def test_specimens_that_all_deviate_to_one_side_are_named(cli: Run, tmp_path: Path) -> None:
     """A law with too little change within each specimen fits it at restitutions that none of them has."""
     rows = ["1,a,0.9", "1,a,0.91", "2,a,0.85", "1,b,0.95", "2,b,0.9", "1,c,0.88", "2,c,0.83"]
@@ -244,6 +246,7 @@ def test_specimens_that_all_deviate_to_one_side_are_named(cli: Run, tmp_path: Pa
     assert "the specimens deviate from kuwabara-kono-1987 to one side, by 0." in done.stdout
 
 
+@pytest.mark.slow
 def test_specimens_that_agree_with_a_law_do_not_deviate_to_one_side(cli: Run, tmp_path: Path) -> None:
     """The rounding of exact values is the same for all specimens, and far below sigma."""
     inputs = {"R1": "2.5 mm", "m2": math.inf, "material": "steel", "kuwabara-kono-1987.A": 1e-6}
@@ -303,6 +306,7 @@ def test_several_outputs_identify_the_spring_and_the_dashpot() -> None:
         assert float(fit["estimate"].sel(parameter=name)) == pytest.approx(value, rel=1e-8)
 
 
+@pytest.mark.slow
 def test_the_json_has_the_names_of_the_contract(cli: Run) -> None:
     data = json.loads(cli("calibrate", FOLDER / "dashpot.toml", "--set", "solver.rtol=1e-6", "--json").stdout)
     (law,) = data["models"]
@@ -421,6 +425,7 @@ def test_laws_are_compared_by_name_whatever_their_rank(drops: xr.Dataset) -> Non
     assert impact.compare(drops.isel(model=[0]), drops, subset=True).equal
 
 
+@pytest.mark.slow
 def test_the_value_of_a_parameter_that_is_not_identified_is_not_judged() -> None:
     fit = impact.calibrate(FOLDER / "dashpot.toml", overrides=["solver.rtol=1e-6"])
     moved = fit.assign(estimate=fit["estimate"] * 1.5)
@@ -453,6 +458,7 @@ def test_a_law_of_the_best_config_that_is_not_fitted_is_refused_before_the_fit(t
     assert not fit.exists()
 
 
+@pytest.mark.slow
 def test_the_best_config_gives_the_predictions(cli: Run, tmp_path: Path) -> None:
     words = ("--set", 'models=["kuwabara-kono-1987"]', "--set", "solver.rtol=1e-8")
     done = cli(

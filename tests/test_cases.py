@@ -243,6 +243,7 @@ def test_ten_models_with_their_parameters_as_axes_cost_as_much_as_each_alone(ten
         assert trajectories.count == alone.count <= len(VALUES) * len(SPEEDS)
 
 
+@pytest.mark.slow
 def test_a_model_does_not_depend_on_parameters_of_other_models(
     ten: tuple[Plan, xr.Dataset], results_alone: dict[str, xr.Dataset]
 ) -> None:

@@ -139,6 +139,7 @@ def test_failed_points_are_printed_and_change_the_exit_code(cli: Run, small: Pat
     assert (allowed.returncode, allowed.stderr) == (0, "")
 
 
+@pytest.mark.slow
 def test_plot_prints_the_plotted_numbers(cli: Run, stored: Path, tmp_path: Path) -> None:
     drawn = cli("plot", stored, "-o", tmp_path / "a.svg", "--json", "--model", "gharib-hurmuzlu-2012")
     (panel,) = json.loads(drawn.stdout)["final-velocities"]["panels"]
@@ -150,6 +151,7 @@ def test_plot_prints_the_plotted_numbers(cli: Run, stored: Path, tmp_path: Path)
     assert panel["curves"][2]["y"][50] == pytest.approx(0.5 - 0.41072 / 2, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_several_kinds_in_one_call_and_the_numbers_behind_them(cli: Run, stored: Path, tmp_path: Path) -> None:
     drawn = cli("plot", stored, "-k", "restitution", "-k", "error", "--width", "single",
                 "--model", "gharib-hurmuzlu-2012", "-o", "a.svg", "--data", "a.csv", cwd=tmp_path)  # fmt: skip

@@ -497,6 +497,7 @@ def test_the_natural_range_is_about_the_size_in_units_of_the_contact() -> None:
     assert sizes[0] / sizes[1] == pytest.approx(100.0)
 
 
+@pytest.mark.slow
 def test_the_natural_range_of_a_damping_of_lammps_contains_that_of_small_balls() -> None:
     """The damping per contact radius of a bead is a million times that of a ball of 1 kg."""
     from impact.inverse.calibrate import natural_bounds

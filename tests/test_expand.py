@@ -165,6 +165,7 @@ def test_only_inputs_that_may_be_invalid_are_checked() -> None:
     assert checks_that_may_fail(plan.inputs, plan.models[0]) == {"e"}
 
 
+@pytest.mark.slow
 @settings(max_examples=3, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(configs())
 def test_a_factored_file_holds_the_values_of_a_full_one(tmp_path: Path, config: dict[str, object]) -> None:

@@ -694,6 +694,7 @@ def predicted(tmp_path_factory: pytest.TempPathFactory) -> tuple[float, ...]:
     return tuple(verification.predicted)
 
 
+@pytest.mark.slow
 def test_verify_exits_with_0_for_the_predicted_restitutions_and_with_1_for_others(
     cli: Run, tmp_path: Path, predicted: tuple[float, ...]
 ) -> None:

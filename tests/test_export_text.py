@@ -264,6 +264,7 @@ def test_the_header_lists_the_defaults_of_table_1_that_enter() -> None:
     assert not any("Table 1" in line for line in header)
 
 
+@pytest.mark.slow
 def test_the_header_says_which_damping_was_solved_for() -> None:
     export = impact.export("chrono", "kelvin-voigt-no-tension", at={"e": 0.6})
     assert export.solved is not None

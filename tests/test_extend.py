@@ -107,6 +107,7 @@ EXTENSIONS = {
 }
 
 
+@pytest.mark.slow
 def test_trajectories_that_failed_are_not_integrated_again(cli: Run, stored_sweep: StoredSweep) -> None:
     path = stored_sweep(BASE, FACTORED, "solver.max_steps=3", "solver.rtol=1e-10")
     assert not (impact.load(path)["status"] == 1).any()
@@ -128,6 +129,7 @@ def test_an_extended_result_equals_a_single_sweep(
     assert json.loads(larger.attrs["extended"])[-1]["set"] == overrides
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("before", "after"), [(FULL, FACTORED), (FACTORED, FULL)], ids=["factored", "full"])
 def test_an_extended_result_may_have_another_layout(
     stored_sweep: StoredSweep, tmp_path: Path, before: str, after: str
@@ -137,6 +139,7 @@ def test_an_extended_result_may_have_another_layout(
     assert_same_values(larger, single_sweep(BASE, json.loads(larger.attrs["config_set"]), tmp_path))
 
 
+@pytest.mark.slow
 def test_the_command_prints_how_many_trajectories_are_new(cli: Run, stored_sweep: StoredSweep) -> None:
     # hertz depends on no axis: its trajectory is in the table, and is not in a file of values
     for layout, printed in (
@@ -160,6 +163,7 @@ def test_axes_that_vary_together_are_extended_together(
     assert_same_values(larger, single_sweep(DASHPOT, [layout, *more], tmp_path))
 
 
+@pytest.mark.slow
 def test_a_property_of_a_material_with_a_dot_in_its_name_is_extended(
     stored_sweep: StoredSweep, tmp_path: Path
 ) -> None:
@@ -303,6 +307,7 @@ def test_points_that_failed_beforehand_do_not_affect_new_points(
     assert (larger["status"] == 1).any()
 
 
+@pytest.mark.slow
 def test_a_law_that_is_not_combinable_has_this_status_beside_points_that_failed_for_another_reason(
     tmp_path: Path,
 ) -> None:

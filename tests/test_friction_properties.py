@@ -50,6 +50,7 @@ def impacts(pairs: Sequence[tuple[Ball, Ball]], *, mu: float, e: float) -> xr.Da
     return result
 
 
+@pytest.mark.slow
 @settings(max_examples=2)
 @given(
     ball1=BALL, ball2=BALL, mu=st.floats(0.02, 1.5), e=st.floats(0.2, 1.0), closing=st.floats(0.1, 10.0),

@@ -136,6 +136,7 @@ def test_a_run_is_the_point_of_the_sweep_of_its_pair() -> None:
     assert not {"slip", "f", "mode"} & {*map(str, central)}
 
 
+@pytest.mark.slow
 def test_the_command_runs_an_oblique_impact_without_a_config(cli: Run, tmp_path: Path) -> None:
     words = ("run", "--friction", "coulomb-1785", "--at", "mu=0.3", "--at", "angle=30 deg")
     text = cli(*words).stdout
@@ -220,6 +221,7 @@ def test_a_target_of_the_command_may_have_a_unit(cli: Run) -> None:
     assert root["value"] == pytest.approx((math.tan(ANGLE) - math.tan(math.radians(55.0))) / 2.0)
 
 
+@pytest.mark.slow
 def test_solve_finds_a_slip_speed_of_a_friction_law() -> None:
     """Its natural size is a speed, that of the impact, and not a number of the contact law."""
     law = {"drake-regularized": {"v_s": 0.01}}
@@ -365,6 +367,7 @@ def test_calibrate_recovers_mu_and_the_stiffness_and_finds_the_law(tmp_path: Pat
     xr.testing.assert_equal(impact.load(tmp_path / "fit.h5").load(), result)
 
 
+@pytest.mark.slow
 def test_calibrate_says_which_pair_cannot_be_combined_and_why() -> None:
     source: dict[str, Any] = {
         "models": ["kelvin-voigt", "tsuji-1992"],
@@ -386,6 +389,7 @@ def test_calibrate_says_which_pair_cannot_be_combined_and_why() -> None:
         impact.calibrate({**source, "models": ["kelvin-voigt"]})
 
 
+@pytest.mark.slow
 def test_a_fit_at_a_speed_has_no_v1_which_follows_from_the_measured_angle() -> None:
     sweep = {"e": 0.8, "speed": 1.0, "m1": 0.1, "m2": 0.2, "R1": 0.01, "K": 1e7, "mu": {"fit": [0.05, 0.6]}}
     columns = {"angle": [0.5, 0.6], "beta": [-0.5, -0.4]}
@@ -402,6 +406,7 @@ def fitted() -> xr.Dataset:
     return impact.calibrate({**fit, "data": {"columns": {"beta": [-0.6, -0.59]}}})
 
 
+@pytest.mark.slow
 def test_a_calibration_of_pairs_is_repeated_from_its_file(fitted: xr.Dataset, tmp_path: Path) -> None:
     impact.save(fitted, tmp_path / "fit.h5")
     assert impact.rerun(tmp_path / "fit.h5").equal
@@ -475,6 +480,7 @@ def test_an_uncertain_angle_is_described_in_degrees() -> None:
 # ---- the sweep
 
 
+@pytest.mark.slow
 def test_a_pair_without_meaning_is_noted_and_a_failed_pair_has_the_command_that_repeats_it(tmp_path: Path) -> None:
     source = config(
         models=["tsuji-1992", "lankarani-nikravesh-1994"],
@@ -511,6 +517,7 @@ def test_a_pair_without_meaning_is_noted_and_a_failed_pair_has_the_command_that_
         )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("layout", ["full", "factored"])
 def test_info_counts_the_points_of_pairs_and_writes_words(swept: dict[str, xr.Dataset], layout: str) -> None:
     described = impact.info(swept[layout].encoding["source"])

@@ -103,6 +103,7 @@ def oblique(**sweep: object) -> dict[str, object]:
     }
 
 
+@pytest.mark.slow
 def test_a_million_points_need_a_trajectory_for_each_scaled_slip() -> None:
     source = oblique(
         v1={"linspace": [1.0, 3.0, 1000]},
@@ -173,6 +174,7 @@ def test_merged_shards_have_the_bytes_of_the_whole_sweep(folder: Path, layout: s
     assert output.read_bytes() == (folder / f"{layout}.h5").read_bytes()
 
 
+@pytest.mark.slow
 @EACH_LAYOUT
 def test_a_resumed_sweep_has_the_bytes_of_the_whole_sweep(
     folder: Path, layout: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -272,6 +274,7 @@ def test_momentum_and_angular_momentum_are_kept(whole: xr.Dataset) -> None:
     assert moves.values[ok].sum() == 5 * 12
 
 
+@pytest.mark.slow
 def test_pairs_that_cannot_be_combined_are_marked_and_named(folder: Path, whole: xr.Dataset) -> None:
     marked = whole.friction_status == FrictionStatus.NOT_COMBINABLE
     expected = ((whole.model == "lankarani-nikravesh-1994") & (whole.friction == DAMPED)).broadcast_like(marked)

@@ -433,6 +433,7 @@ def test_a_variable_or_an_axis_that_no_picture_shows_is_refused(coarse: xr.Datas
         impact.plot_to_files(file, kinds=["error", "loop"], variable="peak_force")
 
 
+@pytest.mark.slow
 def test_a_logarithmic_axis_that_no_picture_has_is_refused(coarse: xr.Dataset, tmp_path: Path) -> None:
     with pytest.raises(
         UsageError, match=r'^log="x": the axis x would stay linear: it has values <= 0, or this kind'
@@ -911,6 +912,7 @@ def test_the_table_of_a_plot_has_a_column_for_each_curve(cli: Run, coarse_file: 
     assert loops.notna().all(axis=None) == (len({loops[name].count() for name in loops}) == 1)
 
 
+@pytest.mark.slow
 def test_a_table_is_latex_by_its_ending_and_parquet_needs_pyarrow(
     forked: ForkServer, coarse_file: Path, tmp_path: Path
 ) -> None:

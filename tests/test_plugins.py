@@ -245,6 +245,7 @@ def test_an_output_never_overwrites_the_plug_in(forked: ForkServer, folder: Path
     assert (folder / "my_model.py").read_text(encoding="utf-8") == before
 
 
+@pytest.mark.slow
 def test_a_run_of_a_result_needs_the_plug_in_of_the_sweep(forked: ForkServer, folder: Path) -> None:
     forked("sweep", "config.toml", "--plugin", "my_model.py", cwd=folder)
     words = ["run", "results.h5", "--model", "mine-2026", "--at", "e=0.8", "--json"]

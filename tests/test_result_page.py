@@ -68,6 +68,7 @@ def content_of(text: str) -> dict[str, Any]:
     return content
 
 
+@pytest.mark.slow
 def test_a_page_has_no_law_no_network_and_texts_that_do_not_end_its_script(
     table_file: Path, results: dict[str, xr.Dataset]
 ) -> None:

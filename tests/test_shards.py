@@ -123,6 +123,7 @@ def test_a_request_to_stop_that_comes_late_ends_a_complete_shard_and_a_merge(fol
     assert impact.merge([shard], output).summary.points == 2
 
 
+@pytest.mark.slow
 def test_a_missing_shard_is_reported_with_the_command_that_integrates_it(cli: Run, folder: Path) -> None:
     folders = run_shards(folder, "1/3", "3/3", overrides=["sweep.v1=2.0"])
     completed = cli("merge", *folders, cwd=folder)

@@ -148,6 +148,7 @@ def test_with_a_fixed_step_the_least_value_lies_between_two_values_of_the_scan()
     assert result.attainable[0] == pytest.approx(least, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_roots_between_two_powers_of_ten_of_the_scan_are_found_by_its_even_steps_between_the_bounds() -> None:
     """The damping is less from 2.55 to 2.65 only."""
     law = law_of(lambda p: 0.5 - 8.0 * np.maximum(0.05 - np.abs(p - 2.6), 0.0))
@@ -250,6 +251,7 @@ def test_a_range_of_one_value_is_refused(value: object) -> None:
         impact.solve("tsuji-1992", "e", {"e_out": 0.6}, over={"v1": value})
 
 
+@pytest.mark.slow
 def test_the_text_has_a_line_for_each_root() -> None:
     result = impact.solve("mujoco-solref", "dampratio", {"contact_time": 0.01})
     (root,) = result.roots
@@ -320,6 +322,7 @@ def test_bad_input_is_one_line(cli: Run, words: tuple[str, ...], message: str) -
     assert_refused(cli("solve", "--model", "mujoco-solref", *words), message)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "at", "note"),
     [

@@ -82,6 +82,7 @@ def test_the_examples_print_what_the_page_shows(cli: Run, tmp_path: Path, monkey
     assert printed == "models = 'hertz'\n[\"sweep.e=0.5\"]\n"
 
 
+@pytest.mark.slow
 def test_the_layouts_hold_the_same_values(cli: Run, tmp_path: Path) -> None:
     (chosen,) = (text for language, text in blocks() if language == "toml" and "[output]" in text)
     config = (ROOT / "configs" / "figure6.toml").read_text(encoding="utf-8") + "\n[solver]\nrtol = 1e-4\n"

@@ -473,6 +473,7 @@ def test_a_file_of_version_1_is_refused_and_the_command_that_replaces_it_is_name
     assert [path.name for path in tmp_path.iterdir()] == ["old.h5"]
 
 
+@pytest.mark.slow
 def test_a_time_history_is_written_by_run_and_read_again(cli: Run, tmp_path: Path) -> None:
     words = ["run", ROOT / "configs" / "figure6.toml", "--model", "gharib-hurmuzlu-2012", "--at", "e=0.5"]
     for name in ("a.h5", "b.h5"):

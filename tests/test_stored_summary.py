@@ -58,6 +58,7 @@ def described(dataset: xr.Dataset) -> str:
     return json.dumps({name: value for name, value in impact.info(dataset).items() if name != "seal"})
 
 
+@pytest.mark.slow
 def test_the_summary_in_a_file_is_the_summary_of_its_points(large: Path, without: Path) -> None:
     with open_result(large) as stored, open_result(without) as computed:
         summary = summarize(computed)

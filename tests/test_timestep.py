@@ -220,6 +220,7 @@ def test_bad_input_is_one_line(cli: Run, words: tuple[str, ...], message: str) -
     assert_refused(cli("timestep", "--model", LINEAR, *words), message)
 
 
+@pytest.mark.slow
 def test_no_steps_are_tried_where_surfaces_part_later_than_a_collision_is_followed(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -234,6 +235,7 @@ def test_no_steps_are_tried_where_surfaces_part_later_than_a_collision_is_follow
     assert (result.needed, result.rows[0].status, result.rows[-1].status) == (None, "ok", "not_separated")
 
 
+@pytest.mark.slow
 def test_a_step_that_cannot_be_changed_needs_a_time_constant(cli: Run) -> None:
     """At 2 ms MuJoCo delivers 0.7 at every phase from a time constant of about 0.225 s on, in 80 ms of contact."""
     words = ("timestep", "--model", "mujoco-solref", "--at", "e=0.7", "--at", "v1=1", "--tol", "1%")
