@@ -16,7 +16,7 @@ import impact
 from impact.errors import ConfigError, UsageError
 from impact.results.schema import FIT_STATUSES
 
-from .conftest import Run
+from .conftest import ROOT, Run
 
 ANGLE = math.radians(60.0)
 # like solid spheres of the linear or Hertzian contact: m_t/m is 2/7
@@ -219,6 +219,16 @@ def test_a_target_of_the_command_may_have_a_unit(cli: Run) -> None:
     (root,) = json.loads(cli(*words, "--target", "rebound_angle=55 deg", "--json").stdout)["roots"]
     # elastic balls that slide throughout lose 2 mu v0 of their tangential velocity
     assert root["value"] == pytest.approx((math.tan(ANGLE) - math.tan(math.radians(55.0))) / 2.0)
+
+
+@pytest.mark.slow
+def test_solve_finds_the_values_beside_an_extremum_between_those_of_its_scan() -> None:
+    at = {"angle": "45 deg", "omega1": 0}
+    words: Any = ("exact-dashpot-no-tension", "kt_over_kn", {"e_t": 0.7405})
+    found = impact.solve(*words, friction="cundall-strack-1979", source=ROOT / "docs" / "spin.toml", at=at)
+    # the scan has 2.74 and 3.16, of a smaller e_t, and a soft spring gives it, too
+    assert [root.value for root in found.roots] == pytest.approx([0.077158, 2.753365, 3.107913], rel=1e-5)
+    assert found.attainable == pytest.approx((0.282051, 1.0), abs=1e-6)
 
 
 @pytest.mark.slow
