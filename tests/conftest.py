@@ -23,6 +23,7 @@ from impact import formatting
 from impact.conformance.engines.liggghts import ALONE
 from impact.errors import ConfigError
 
+from .clusters import ClusterServer, start_cluster_server
 from .fork_server import CompletedCommand, ForkServer, start_fork_server
 
 if TYPE_CHECKING:
@@ -197,6 +198,16 @@ def sweeps(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SweepServer]:
     from .faults import start_sweep_server
 
     with start_sweep_server(tmp_path_factory.mktemp("sweeps")) as server:
+        yield server
+
+
+@pytest.fixture(scope="session")
+def clusters() -> Iterator[ClusterServer]:
+    """Run clusters of dask, and sweeps: processes of a server that makes blocks small and slow."""
+    if not hasattr(os, "fork"):
+        pytest.skip("this system has no fork")
+    pytest.importorskip("distributed")
+    with start_cluster_server() as server:
         yield server
 
 

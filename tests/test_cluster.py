@@ -8,6 +8,7 @@ import shutil
 import signal
 import urllib.request
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -19,11 +20,11 @@ from impact.results.sweep import read_plan
 from .clusters import (
     BLOCK_COUNT,
     CONFIG,
+    ClusterServer,
     DaskCluster,
     content,
     processes_of_group,
-    start_cluster,
-    start_sweep,
+    start_new_sweep,
     wait_until,
 )
 from .conftest import ROOT
@@ -42,31 +43,33 @@ PLUGIN_CONFIG = CONFIG.replace('models = ["hertz", "lankarani-nikravesh-1990"]',
 
 
 @pytest.fixture(scope="module")
-def expected(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+def expected(clusters: ClusterServer, tmp_path_factory: pytest.TempPathFactory) -> bytes:
     """The file of the sweep in a single process."""
-    running = start_sweep(tmp_path_factory.mktemp("one") / "sweep")
+    running = clusters.start_sweep(tmp_path_factory.mktemp("one") / "sweep")
     running.wait()
     return running.content
 
 
-def resume_sweep(folder: Path, *words: str) -> bytes:
+def resume_sweep(clusters: ClusterServer, folder: Path, *words: str) -> bytes:
     """Resume a sweep and return its file."""
-    resumed = start_sweep(folder, "--resume", *words)
+    resumed = clusters.start_sweep(folder, "--resume", *words)
     resumed.wait()
     return resumed.content
 
 
 @pytest.fixture
-def cluster(tmp_path: Path) -> Iterator[DaskCluster]:
-    with start_cluster(tmp_path / "cluster", "a", "b") as cluster:
+def cluster(clusters: ClusterServer, tmp_path: Path) -> Iterator[DaskCluster]:
+    with clusters.start_cluster(tmp_path / "cluster", "a", "b") as cluster:
         yield cluster
 
 
 def test_a_scheduler_by_address_or_file_and_a_local_cluster_give_the_same_file(
-    cluster: DaskCluster, tmp_path: Path, expected: bytes
+    clusters: ClusterServer, cluster: DaskCluster, tmp_path: Path, expected: bytes
 ) -> None:
     ways = {"address": ("--scheduler", cluster.address), "file": ("--scheduler-file", cluster.file)}
     for name, words in {**ways, "local": ("--scheduler", "local")}.items():
+        # the local one by a new interpreter, with larger blocks
+        start_sweep = partial(start_new_sweep, config=CONFIG) if name == "local" else clusters.start_sweep
         running = start_sweep(tmp_path / name, *words)
         printed = running.wait()
         assert running.content == expected
@@ -81,9 +84,9 @@ def test_a_scheduler_by_address_or_file_and_a_local_cluster_give_the_same_file(
 
 @pytest.mark.parametrize("count", [4, *(pytest.param(count, marks=pytest.mark.long) for count in (1, 8))])
 def test_a_killed_worker_changes_nothing(
-    cluster: DaskCluster, tmp_path: Path, expected: bytes, count: int
+    clusters: ClusterServer, cluster: DaskCluster, tmp_path: Path, expected: bytes, count: int
 ) -> None:
-    running = start_sweep(tmp_path / "sweep", "--scheduler", cluster.address)
+    running = clusters.start_sweep(tmp_path / "sweep", "--scheduler", cluster.address)
     running.wait_for_blocks(count)
     cluster.kill("a")
     running.wait()
@@ -92,12 +95,12 @@ def test_a_killed_worker_changes_nothing(
 
 @pytest.mark.parametrize("count", [7, pytest.param(1, marks=pytest.mark.long)])
 def test_new_workers_continue_after_all_were_killed(
-    cluster: DaskCluster, tmp_path: Path, expected: bytes, count: int
+    clusters: ClusterServer, cluster: DaskCluster, tmp_path: Path, expected: bytes, count: int
 ) -> None:
-    running = start_sweep(tmp_path / "sweep", "--scheduler", cluster.address)
+    running = clusters.start_sweep(tmp_path / "sweep", "--scheduler", cluster.address)
     running.wait_for_blocks(count)
     cluster.kill("a", "b")
-    assert running.process.poll() is None
+    assert not running.process.has_ended
     cluster.worker("c")
     running.wait()
     assert running.content == expected
@@ -105,22 +108,22 @@ def test_new_workers_continue_after_all_were_killed(
 
 @pytest.mark.parametrize("count", [1, pytest.param(7, marks=pytest.mark.long)])
 def test_a_sweep_is_resumed_without_its_killed_scheduler(
-    cluster: DaskCluster, tmp_path: Path, expected: bytes, count: int
+    clusters: ClusterServer, cluster: DaskCluster, tmp_path: Path, expected: bytes, count: int
 ) -> None:
-    running = start_sweep(tmp_path / "sweep", "--scheduler", cluster.address)
+    running = clusters.start_sweep(tmp_path / "sweep", "--scheduler", cluster.address)
     running.wait_for_blocks(count)
     cluster.kill("scheduler")
     printed = running.wait(4)
     assert re.search(
         rf"{cluster.address}: the connection to the scheduler was lost; "
-        r"[\d,]+ of 400,000 trajectories are kept in",
+        r"[\d,]+ of 7,000 trajectories are kept in",
         printed,
     ), printed
     assert "--resume continues" in printed
     assert "Traceback" not in printed
     kept = {path: path.stat().st_mtime_ns for path in running.folder.glob("*.work/*.npz")}
     assert count <= len(kept) < BLOCK_COUNT
-    resumed = start_sweep(tmp_path / "sweep", "--resume")
+    resumed = clusters.start_sweep(tmp_path / "sweep", "--resume")
     resumed.wait_for_blocks(len(kept) + 1)
     assert all(path.stat().st_mtime_ns == then for path, then in kept.items() if path.exists())
     resumed.wait()
@@ -138,19 +141,21 @@ def other_version(folder: Path) -> dict[str, str]:
     return {"PYTHONPATH": str(folder)}
 
 
-def test_a_worker_of_another_version_is_refused(cluster: DaskCluster, tmp_path: Path, expected: bytes) -> None:
+def test_a_worker_of_another_version_is_refused(
+    clusters: ClusterServer, cluster: DaskCluster, tmp_path: Path, expected: bytes
+) -> None:
     cluster.worker("old", **other_version(tmp_path / "other"))
-    printed = start_sweep(tmp_path / "sweep", "--scheduler", cluster.address).wait(2)
+    printed = clusters.start_sweep(tmp_path / "sweep", "--scheduler", cluster.address).wait(2)
     assert f"has impact 0.0.1, this is {impact.__version__}; expected the same" in printed
     assert "tcp://127.0.0.1" in printed
     cluster.kill("old")
-    assert resume_sweep(tmp_path / "sweep", "--scheduler", cluster.address) == expected
+    assert resume_sweep(clusters, tmp_path / "sweep", "--scheduler", cluster.address) == expected
 
 
 def test_a_worker_of_another_version_that_joins_later_is_refused(
-    cluster: DaskCluster, tmp_path: Path, expected: bytes
+    clusters: ClusterServer, cluster: DaskCluster, tmp_path: Path, expected: bytes
 ) -> None:
-    running = start_sweep(tmp_path / "sweep", "--scheduler", cluster.address)
+    running = clusters.start_sweep(tmp_path / "sweep", "--scheduler", cluster.address)
     running.wait_for_blocks(1)
     # no other worker is left that could finish the sweep
     cluster.kill("a", "b")
@@ -162,34 +167,38 @@ def test_a_worker_of_another_version_that_joins_later_is_refused(
     assert "--resume continues" in printed
     cluster.kill("old")
     cluster.worker("c")
-    assert resume_sweep(tmp_path / "sweep", "--scheduler", cluster.address) == expected
+    assert resume_sweep(clusters, tmp_path / "sweep", "--scheduler", cluster.address) == expected
 
 
-def test_a_worker_without_the_package_is_refused(cluster: DaskCluster, tmp_path: Path) -> None:
+def test_a_worker_without_the_package_is_refused(
+    clusters: ClusterServer, cluster: DaskCluster, tmp_path: Path
+) -> None:
     (tmp_path / "other").mkdir()
     (tmp_path / "other" / "impact.py").write_text("raise ImportError('none here')")
     cluster.worker("bare", PYTHONPATH=str(tmp_path / "other"))
-    printed = start_sweep(tmp_path / "sweep", "--scheduler", cluster.address).wait(2)
+    printed = clusters.start_sweep(tmp_path / "sweep", "--scheduler", cluster.address).wait(2)
     assert re.search("^tcp://127.0.0.1:.*: has no impact: none here; expected impact", printed, re.MULTILINE), (
         printed
     )
 
 
-def test_a_scheduler_without_the_package_is_refused(tmp_path: Path) -> None:
+def test_a_scheduler_without_the_package_is_refused(clusters: ClusterServer, tmp_path: Path) -> None:
     (tmp_path / "other").mkdir()
     (tmp_path / "other" / "impact.py").write_text("raise ImportError('none here')")
-    with start_cluster(tmp_path / "cluster", PYTHONPATH=str(tmp_path / "other")) as cluster:
-        printed = start_sweep(tmp_path / "sweep", "--scheduler", cluster.address).wait(2)
+    with clusters.start_cluster(tmp_path / "cluster", PYTHONPATH=str(tmp_path / "other")) as cluster:
+        printed = clusters.start_sweep(tmp_path / "sweep", "--scheduler", cluster.address).wait(2)
     assert printed == f"the scheduler: has no impact: none here; expected impact {impact.__version__}\n"
 
 
-def test_workers_do_not_need_the_file_of_a_plug_in(cluster: DaskCluster, tmp_path: Path) -> None:
+def test_workers_do_not_need_the_file_of_a_plug_in(
+    clusters: ClusterServer, cluster: DaskCluster, tmp_path: Path
+) -> None:
     text = PLUGIN.replace("DOES", "pass")
     for name in ("one", "two"):
         (tmp_path / name).mkdir()
         (tmp_path / name / "mine.py").write_text(text, encoding="utf-8")
-    start_sweep(tmp_path / "one", "--plugin", "mine.py", config=PLUGIN_CONFIG).wait()
-    running = start_sweep(
+    clusters.start_sweep(tmp_path / "one", "--plugin", "mine.py", config=PLUGIN_CONFIG).wait()
+    running = clusters.start_sweep(
         tmp_path / "two", "--plugin", "mine.py", "--scheduler", cluster.address, config=PLUGIN_CONFIG
     )
     running.wait_for_blocks(1)
@@ -199,7 +208,7 @@ def test_workers_do_not_need_the_file_of_a_plug_in(cluster: DaskCluster, tmp_pat
 
 
 def test_a_block_integrated_twice_gives_the_same_bits(
-    cluster: DaskCluster, tmp_path: Path, expected: bytes
+    clusters: ClusterServer, cluster: DaskCluster, tmp_path: Path, expected: bytes
 ) -> None:
     from distributed import Client
 
@@ -215,60 +224,69 @@ def test_a_block_integrated_twice_gives_the_same_bits(
     for name, values in vars(local).items():
         assert all(getattr(collisions, name).tobytes() == values.tobytes() for collisions, _ in returned), name
     # a block of a killed worker is integrated by another, and blocks that a killed driver did not store again
-    running = start_sweep(tmp_path / "sweep", "--scheduler", cluster.address)
+    running = clusters.start_sweep(tmp_path / "sweep", "--scheduler", cluster.address)
     running.wait_for_blocks(3)
-    running.process.kill()
-    running.process.communicate()
+    running.kill()
     cluster.kill("a")
-    assert resume_sweep(tmp_path / "sweep", "--scheduler", cluster.address) == expected
+    assert resume_sweep(clusters, tmp_path / "sweep", "--scheduler", cluster.address) == expected
 
 
 @pytest.mark.parametrize("location", ["remote", "local"])
 def test_a_block_that_kills_its_worker_is_integrated_by_another(
-    cluster: DaskCluster, tmp_path: Path, location: str
+    clusters: ClusterServer, cluster: DaskCluster, tmp_path: Path, location: str
 ) -> None:
     mark = tmp_path / "died"
     elsewhere = 'multiprocessing.parent_process() is not None or os.path.basename(os.getcwd()) == "cluster"'
-    dies = f"""if ({elsewhere}) and not os.path.exists({str(mark)!r}):
-        open({str(mark)!r}, "w").close()
-        os.kill(os.getpid(), 9)"""
-    text = PLUGIN.replace("import os", "import multiprocessing, os").replace("DOES", dies)
+    # two workers may be here at the same time
+    dies = f"""if {elsewhere}:
+        with contextlib.suppress(FileExistsError):
+            open({str(mark)!r}, "x").close()
+            os.kill(os.getpid(), 9)"""
+    text = PLUGIN.replace("import os", "import contextlib, multiprocessing, os").replace("DOES", dies)
     for name in ("one", "two"):
         (tmp_path / name).mkdir()
         (tmp_path / name / "mine.py").write_text(text, encoding="utf-8")
-    start_sweep(tmp_path / "one", "--plugin", "mine.py", config=PLUGIN_CONFIG).wait()
+    clusters.start_sweep(tmp_path / "one", "--plugin", "mine.py", config=PLUGIN_CONFIG).wait()
     address = cluster.address if location == "remote" else "local"
-    running = start_sweep(tmp_path / "two", "--plugin", "mine.py", "--scheduler", address, config=PLUGIN_CONFIG)
+    running = clusters.start_sweep(
+        tmp_path / "two", "--plugin", "mine.py", "--scheduler", address, config=PLUGIN_CONFIG
+    )
     running.wait()
     assert mark.exists()
     assert running.content == content(tmp_path / "one")
 
 
-def test_an_interrupted_sweep_is_resumed(cluster: DaskCluster, tmp_path: Path, expected: bytes) -> None:
-    running = start_sweep(tmp_path / "sweep", "--scheduler", cluster.address)
+def test_an_interrupted_sweep_is_resumed(
+    clusters: ClusterServer, cluster: DaskCluster, tmp_path: Path, expected: bytes
+) -> None:
+    running = clusters.start_sweep(tmp_path / "sweep", "--scheduler", cluster.address)
     running.wait_for_blocks(2)
     running.process.send_signal(signal.SIGINT)
     printed = running.wait(130)
     assert "--resume continues" in printed
-    assert resume_sweep(tmp_path / "sweep", "--scheduler", cluster.address) == expected
+    assert resume_sweep(clusters, tmp_path / "sweep", "--scheduler", cluster.address) == expected
 
 
-def test_an_interrupted_sweep_without_workers_ends(cluster: DaskCluster, tmp_path: Path, expected: bytes) -> None:
-    running = start_sweep(tmp_path / "sweep", "--scheduler", cluster.address)
+def test_an_interrupted_sweep_without_workers_ends(
+    clusters: ClusterServer, cluster: DaskCluster, tmp_path: Path, expected: bytes
+) -> None:
+    running = clusters.start_sweep(tmp_path / "sweep", "--scheduler", cluster.address)
     running.wait_for_blocks(2)
     cluster.kill("a", "b")
     running.process.send_signal(signal.SIGINT)
     assert "--resume continues" in running.wait(130)
-    assert resume_sweep(tmp_path / "sweep") == expected
+    assert resume_sweep(clusters, tmp_path / "sweep") == expected
 
 
-def test_a_block_that_kills_every_worker_is_reported(tmp_path: Path) -> None:
+def test_a_block_that_kills_every_worker_is_reported(clusters: ClusterServer, tmp_path: Path) -> None:
     # not in the process of the sweep
     dies = "if multiprocessing.parent_process() is not None and elastic.size > 100: os.kill(os.getpid(), 9)"
     (tmp_path / "mine.py").write_text(
         PLUGIN.replace("import os", "import multiprocessing, os").replace("DOES", dies)
     )
-    printed = start_sweep(tmp_path, "--plugin", "mine.py", "--scheduler", "local", config=PLUGIN_CONFIG).wait(4)
+    printed = clusters.start_sweep(
+        tmp_path, "--plugin", "mine.py", "--scheduler", "local", config=PLUGIN_CONFIG
+    ).wait(4)
     assert printed.splitlines()[-1].startswith(
         "processes were killed 4 times at the same trajectories: too little memory"
     )
@@ -276,8 +294,10 @@ def test_a_block_that_kills_every_worker_is_reported(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
-def test_a_local_cluster_ends_with_the_sweep(tmp_path: Path, expected: bytes, number: int) -> None:
-    running = start_sweep(tmp_path / "sweep", "--scheduler", "local")
+def test_a_local_cluster_ends_with_the_sweep(
+    clusters: ClusterServer, tmp_path: Path, expected: bytes, number: int
+) -> None:
+    running = clusters.start_sweep(tmp_path / "sweep", "--scheduler", "local")
     running.wait_for_blocks(2)
     group = running.process.pid
     if number == signal.SIGINT:
@@ -285,25 +305,24 @@ def test_a_local_cluster_ends_with_the_sweep(tmp_path: Path, expected: bytes, nu
         os.killpg(group, number)
         printed = running.wait(130)
         assert printed.splitlines()[-1].endswith(
-            "of 400,000 trajectories are kept in results.h5.work; --resume continues"
+            "of 7,000 trajectories are kept in results.h5.work; --resume continues"
         )
         assert "Traceback" not in printed
     else:
-        running.process.kill()
-        running.process.communicate()
+        running.kill()
     wait_until(lambda: not processes_of_group(group))
-    assert resume_sweep(tmp_path / "sweep") == expected
+    assert resume_sweep(clusters, tmp_path / "sweep") == expected
 
 
-def test_an_unreachable_scheduler_is_reported(tmp_path: Path) -> None:
-    printed = start_sweep(tmp_path / "sweep", "--scheduler", "tcp://127.0.0.1:1").wait(2)
+def test_an_unreachable_scheduler_is_reported(clusters: ClusterServer, tmp_path: Path) -> None:
+    printed = clusters.start_sweep(tmp_path / "sweep", "--scheduler", "tcp://127.0.0.1:1").wait(2)
     assert "tcp://127.0.0.1:1: " in printed
     assert "expected the address of a scheduler of dask, such as tcp://host:8786" in printed
     assert "Traceback" not in printed
     assert not (tmp_path / "sweep" / "results.h5.work").exists()
-    printed = start_sweep(tmp_path / "sweep", "--scheduler", "localhorst").wait(2)
+    printed = clusters.start_sweep(tmp_path / "sweep", "--scheduler", "localhorst").wait(2)
     assert (
         printed == "localhorst: expected the address of a scheduler of dask, such as tcp://host:8786; or local\n"
     )
-    printed = start_sweep(tmp_path / "sweep", "--scheduler", "local", "--jobs", "2").wait(2)
+    printed = clusters.start_sweep(tmp_path / "sweep", "--scheduler", "local", "--jobs", "2").wait(2)
     assert "--jobs 2: got --scheduler local as well, expected one of the two" in printed

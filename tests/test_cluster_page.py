@@ -38,7 +38,7 @@ def script(name: str) -> str:
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     """A folder with a config, and with a virtual environment of the name that the scripts use."""
-    (tmp_path / "config.toml").write_text(CONFIG.replace("200000", "40000"))
+    (tmp_path / "config.toml").write_text(CONFIG.replace("3500", "40000"))
     (tmp_path / "venv" / "bin").mkdir(parents=True)
     bin_folder = Path(sys.executable).parent
     (tmp_path / "venv" / "bin" / "activate").write_text(f'PATH="{bin_folder}:$PATH"\nexport PATH\n')

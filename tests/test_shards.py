@@ -7,7 +7,6 @@ import json
 import re
 import shlex
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -20,7 +19,7 @@ import impact
 from impact import ImpactError
 from impact.errors import UnfinishedError, UsageError
 
-from .clusters import content, start_sweep
+from .clusters import ClusterServer, content
 from .conftest import PLUGIN, Run, assert_refused
 from .fork_server import ForkServer
 
@@ -292,18 +291,17 @@ def test_a_merge_with_failed_points_exits_with_3(cli: Run, folder: Path) -> None
 
 
 @pytest.mark.slow
-def test_killed_shards_are_continued_and_merge_to_the_whole(tmp_path: Path) -> None:
-    start_sweep(tmp_path / "whole").wait()
+def test_killed_shards_are_continued_and_merge_to_the_whole(clusters: ClusterServer, tmp_path: Path) -> None:
+    clusters.start_sweep(tmp_path / "whole").wait()
     kept: dict[Path, int] = {}
     for number, count in ((1, 1), (1, 4), (2, 9)):
-        running = start_sweep(tmp_path / "shards", "--shard", f"{number}/2")
+        running = clusters.start_sweep(tmp_path / "shards", "--shard", f"{number}/2")
         running.wait_for_blocks(count)
-        running.process.kill()
-        running.process.communicate()
+        running.kill()
         kept = {path: path.stat().st_mtime_ns for path in running.folder.glob("*.work/*.npz")}
     for number in (1, 2):
-        start_sweep(tmp_path / "shards", "--shard", f"{number}/2").wait()
+        clusters.start_sweep(tmp_path / "shards", "--shard", f"{number}/2").wait()
     assert all(path.stat().st_mtime_ns == modified for path, modified in kept.items())
     folders = list((tmp_path / "shards").glob("*.work"))
-    subprocess.run([sys.executable, "-m", "impact", "merge", *folders], cwd=tmp_path / "shards", check=True)
+    assert clusters.start("merge", *folders, cwd=tmp_path / "shards").wait().returncode == 0
     assert content(tmp_path / "shards") == content(tmp_path / "whole")

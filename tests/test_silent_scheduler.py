@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from .clusters import CONFIG, TIMEOUT_S, processes_of_group, start_cluster, start_sweep
+from .clusters import LARGE_CONFIG, TIMEOUT_S, ClusterServer, processes_of_group, start_new_sweep
 
 # starts many processes: run by `make test-faults`
 pytestmark = pytest.mark.slow
@@ -20,7 +20,7 @@ pytestmark = pytest.mark.slow
 pytest.importorskip("distributed")
 # dask's setting of its connection timeout
 TIMEOUT = "DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT"
-SHORT = CONFIG.replace("200000", "50000")
+SHORT = LARGE_CONFIG.replace("200000", "50000")
 CODES = {signal.SIGINT: 130, signal.SIGTERM: 143}
 
 
@@ -40,7 +40,7 @@ def test_a_host_that_never_answers_is_reported_after_the_time_limit(
     silent: socket.socket, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv(TIMEOUT, "4s")
-    printed = start_sweep(tmp_path, "--scheduler", address(silent)).wait(2)
+    printed = start_new_sweep(tmp_path, "--scheduler", address(silent)).wait(2)
     expected = "expected the address of a scheduler of dask, such as tcp://host:8786"
     assert (
         printed
@@ -53,7 +53,7 @@ def test_a_host_that_never_answers_is_reported_after_the_time_limit(
 def test_the_first_signal_ends_the_wait_for_a_host(
     silent: socket.socket, tmp_path: Path, number: signal.Signals
 ) -> None:
-    running = start_sweep(tmp_path, "--scheduler", address(silent))
+    running = start_new_sweep(tmp_path, "--scheduler", address(silent))
     connection, _ = silent.accept()
     with connection:
         start = time.monotonic()
@@ -64,11 +64,11 @@ def test_the_first_signal_ends_the_wait_for_a_host(
 
 
 def test_a_scheduler_that_stops_answering_is_reported_after_the_time_limit(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    clusters: ClusterServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    with start_cluster(tmp_path / "cluster", "a") as cluster:
+    with clusters.start_cluster(tmp_path / "cluster", "a") as cluster:
         monkeypatch.setenv(TIMEOUT, "4s")
-        running = start_sweep(tmp_path / "sweep", "--scheduler", cluster.address, config=SHORT)
+        running = start_new_sweep(tmp_path / "sweep", "--scheduler", cluster.address, config=SHORT)
         running.wait_for_blocks(1)
         cluster.children["scheduler"].send_signal(signal.SIGSTOP)
         printed = running.wait(4)
@@ -80,13 +80,13 @@ def test_a_scheduler_that_stops_answering_is_reported_after_the_time_limit(
     assert "Traceback" not in printed
 
 
-def test_the_first_signal_ends_a_sweep_whose_scheduler_stopped(tmp_path: Path) -> None:
-    with start_cluster(tmp_path / "cluster", "a") as cluster:
-        running = start_sweep(tmp_path / "sweep", "--scheduler", cluster.address)
+def test_the_first_signal_ends_a_sweep_whose_scheduler_stopped(clusters: ClusterServer, tmp_path: Path) -> None:
+    with clusters.start_cluster(tmp_path / "cluster", "a") as cluster:
+        running = start_new_sweep(tmp_path / "sweep", "--scheduler", cluster.address)
         running.wait_for_blocks(1)
         cluster.children["scheduler"].send_signal(signal.SIGSTOP)
         start = time.monotonic()
-        running.process.terminate()
+        running.process.send_signal(signal.SIGTERM)
         printed = running.wait(143)
     assert time.monotonic() - start < 15.0
     assert re.search(
@@ -109,8 +109,8 @@ def listening(group: int) -> set[str]:
 
 
 @pytest.mark.skipif(not Path("/proc/net/tcp").exists(), reason="needs Linux's list of sockets")
-def test_a_local_cluster_listens_on_this_machine_only(tmp_path: Path) -> None:
-    running = start_sweep(tmp_path, "--scheduler", "local")
+def test_a_local_cluster_listens_on_this_machine_only(clusters: ClusterServer, tmp_path: Path) -> None:
+    running = clusters.start_sweep(tmp_path, "--scheduler", "local")
     running.wait_for_blocks(1)
     addresses = listening(running.process.pid)
     running.process.send_signal(signal.SIGINT)
