@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import errno
 import functools
+import itertools
 import json
 import os
 import re
 import shutil
 import stat
 import subprocess
+import sys
 import tomllib
 import tracemalloc
 from collections.abc import Callable
@@ -174,24 +176,37 @@ def test_h5ls_reads_it(stored: Path, factored: Path) -> None:
     assert re.search(r"trajectory_e_out +Dataset \{303\}", listed)
 
 
+SWEEPS = """import sys
+import impact
+
+number, *names = sys.argv[1:]
+for name in names:
+    impact.sweep_to_file(f"{name}.toml", f"{name}-{number}.h5")
+"""
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("layout", ["full", "factored"])
-@pytest.mark.parametrize("option", OPTIONS)
-def test_two_processes_write_equal_bytes(cli: Run, tmp_path: Path, layout: str, option: str) -> None:
-    if layout == "factored" and "chunks" in OPTIONS[option]:
-        pytest.skip("a factored file has chunks of its own")
+def test_two_processes_write_equal_bytes(tmp_path: Path) -> None:
     config = (ROOT / "configs" / "figure6.toml").read_text(encoding="utf-8")
-    text = f'{config}\n[solver]\nrtol = 1e-4\n[output]\nlayout = "{layout}"\n'
-    for name, value in OPTIONS[option].items():
-        text += f"{name} = {json.dumps(value).replace(':', ' =')}\n"
-    (tmp_path / "c.toml").write_text(text, encoding="utf-8")
-    contents = set()
-    # the hash of a string differs in a new interpreter
-    for name, environment in (("a", {"PYTHONHASHSEED": "1"}), ("b", {})):
-        done = cli("sweep", "c.toml", "-o", f"{name}.h5", cwd=tmp_path, **environment)
-        assert done.returncode == 0, done.stderr
-        contents.add((tmp_path / f"{name}.h5").read_bytes())
-    assert len(contents) == 1
+    names = []
+    for layout, option in itertools.product(("full", "factored"), OPTIONS):
+        # a factored file has chunks of its own
+        if layout == "full" or "chunks" not in OPTIONS[option]:
+            text = f'{config}\n[solver]\nrtol = 1e-4\n[output]\nlayout = "{layout}"\n'
+            for key, value in OPTIONS[option].items():
+                text += f"{key} = {json.dumps(value).replace(':', ' =')}\n"
+            names.append(f"{layout}-{option}")
+            (tmp_path / f"{names[-1]}.toml").write_text(text, encoding="utf-8")
+    assert len(names) == 8
+    # the hash of a string differs in the other interpreter
+    for number in ("1", "2"):
+        environment = {**os.environ, "PYTHONHASHSEED": number}
+        command = [sys.executable, "-c", SWEEPS, number, *names]
+        subprocess.run(command, cwd=tmp_path, env=environment, check=True)
+    contents = {name: {(tmp_path / f"{name}-{number}.h5").read_bytes() for number in "12"} for name in names}
+    assert [name for name, files in contents.items() if len(files) != 1] == []
+    # each option has an effect
+    assert len({content for files in contents.values() for content in files}) == len(names)
 
 
 # two ranges of trajectories
