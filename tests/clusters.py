@@ -1,7 +1,7 @@
 """Sweeps and dask clusters on this machine: a driver, a scheduler and workers, each a process.
 
-Their server makes blocks small, and lets each take a time during which processes can be killed. A process with an
-environment of its own is begun anew, with blocks of the usual size.
+They are forks of a server that makes blocks small, and lets each take a while, in which processes can be killed. A
+process with other environment variables is a new interpreter, with blocks of the usual size.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ BLOCK_S = 0.1  # how much longer a block takes
 # the sweep in as many blocks of the usual size
 LARGE_CONFIG = CONFIG.replace("3500", "200000")
 SINGLE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-# a process group of its own; and threads are waited for at the end, as an interpreter does
+# a separate process group; threads are waited for at the end, as an interpreter does
 BEGIN = "import atexit, os, threading\nos.setsid()\natexit.register(threading._shutdown)\n"
 DASK = "import sys\nfrom dask.__main__ import main\nsys.argv = ['dask', *%r]\nmain()\n"
 
@@ -51,7 +51,7 @@ DASK = "import sys\nfrom dask.__main__ import main\nsys.argv = ['dask', *%r]\nma
 
 
 def slow_down() -> None:
-    """Let each block take longer in this process, which costs no CPU time."""
+    """Let each block take longer in this process, without CPU time."""
     from impact.engine import execute
 
     integrate = execute.integrate_columns
@@ -82,7 +82,7 @@ def _warm_up() -> None:
     from impact.engine import dask
 
     slow_down()
-    # the processes of a local cluster are begun anew
+    # the processes of a local cluster are new interpreters
     dask.WORKER_PRELOAD += "; from tests.clusters import slow_down; slow_down()"
 
 
@@ -91,7 +91,7 @@ def _warm_up() -> None:
 
 @dataclass(frozen=True)
 class ForkedProcess:
-    """A process of the server; its process id stays reserved until `communicate`."""
+    """A process of the server; its process id stays reserved until `wait`."""
 
     forked: ForkServer
     pid: int
@@ -115,7 +115,7 @@ class ForkedProcess:
 
 @dataclass(frozen=True)
 class NewProcess:
-    """The same for a process with an interpreter of its own."""
+    """The same for a new interpreter."""
 
     process: subprocess.Popen[str]
 
@@ -136,7 +136,7 @@ class NewProcess:
 
 
 def start_new(folder: Path, module: str, *words: str, log: Path | None = None, **environment: str) -> NewProcess:
-    """Start a module with an interpreter of its own, in a separate process group."""
+    """Start a module in a new interpreter, in a separate process group."""
     with log.open("w") if log else contextlib.nullcontext(subprocess.PIPE) as stream:
         process = subprocess.Popen(
             [sys.executable, "-m", module, *words],
@@ -286,7 +286,7 @@ class ClusterServer:
 
 
 def start_new_sweep(folder: Path, *words: str | Path, config: str = LARGE_CONFIG) -> RunningSweep:
-    """Start a sweep with an interpreter of its own."""
+    """Start a sweep in a new interpreter."""
     folder.mkdir(exist_ok=True)
     (folder / "c.toml").write_text(config)
     return RunningSweep(folder, start_new(folder, "impact", "sweep", "c.toml", *map(str, words)))

@@ -224,11 +224,17 @@ def test_a_target_of_the_command_may_have_a_unit(cli: Run) -> None:
 @pytest.mark.slow
 def test_solve_finds_the_values_beside_an_extremum_between_those_of_its_scan() -> None:
     at = {"angle": "45 deg", "omega1": 0}
-    words: Any = ("exact-dashpot-no-tension", "kt_over_kn", {"e_t": 0.7405})
-    found = impact.solve(*words, friction="cundall-strack-1979", source=ROOT / "docs" / "spin.toml", at=at)
-    # the scan has 2.74 and 3.16, of a smaller e_t, and a soft spring gives it, too
-    assert [root.value for root in found.roots] == pytest.approx([0.077158, 2.753365, 3.107913], rel=1e-5)
-    assert found.attainable == pytest.approx((0.282051, 1.0), abs=1e-6)
+    result = impact.solve(
+        "exact-dashpot-no-tension",
+        "kt_over_kn",
+        {"e_t": 0.7405},
+        friction="cundall-strack-1979",
+        source=ROOT / "docs" / "spin.toml",
+        at=at,
+    )
+    # beside the soft spring the scan has 2.74 and 3.16, of a smaller e_t
+    assert [root.value for root in result.roots] == pytest.approx([0.077158, 2.753365, 3.107913], rel=1e-5)
+    assert result.attainable == pytest.approx((0.282051, 1.0), abs=1e-6)
 
 
 @pytest.mark.slow

@@ -595,13 +595,12 @@ def _polished(problem: SolveProblem, interpolant: Interpolant | None, roots: Arr
 def _with_extrema(
     problem: SolveProblem, scan: Array, values: Array, target: float, tolerance: float
 ) -> tuple[Array, Array]:
-    """Add the refined interior extrema to a scan that may lie beyond the target, or at an end of the range."""
+    """Add to a scan, refined, those interior extrema that may lie beyond the target or at an end of the range."""
     size = np.ones_like(values) if problem.is_of_order_one else np.abs(values)
     minima, maxima = _minima(values, size), _minima(-values, size)
     extrema, sign = np.append(minima, maxima), np.repeat([1.0, -1.0], [minima.size, maxima.size])
-    extreme = values[extrema]
-    rise = np.abs(values[[extrema - 1, extrema + 1]] - extreme).max(axis=0)
-    distances = np.abs(extreme - np.array([[target], [values.min()], [values.max()]]))
+    rise = np.abs(values[[extrema - 1, extrema + 1]] - values[extrema]).max(axis=0)
+    distances = np.abs(values[extrema] - np.array([[target], [values.min()], [values.max()]]))
     matters = (distances <= OVERSHOOT * rise).any(axis=0) & (distances[0] > tolerance)
     extrema, sign = extrema[matters], sign[matters]
     if not extrema.size:
