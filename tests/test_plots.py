@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import csv
 import hashlib
+import io
 import json
 import re
 import shutil
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
@@ -568,6 +570,24 @@ def test_plots_are_files_of_their_format(coarse: xr.Dataset, tmp_path: Path, for
     # the method of matplotlib works as well
     figure.savefig(tmp_path / f"by_matplotlib.{form}")
     assert (tmp_path / f"by_matplotlib.{form}").read_bytes().startswith(magic)
+
+
+def test_threads_that_draw_at_the_same_time_make_the_pictures_of_a_single_one(figure6: xr.Dataset) -> None:
+    # matplotlib's parser of formulas is shared by all threads
+    def draw_and_save(kind: str) -> bytes:
+        buffer = io.BytesIO()
+        impact.plot(figure6, kind=kind).savefig(buffer)
+        return buffer.getvalue()
+
+    kinds = ["final-velocities", "restitution"] * 2
+    alone = [draw_and_save(kind) for kind in kinds]
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(1e-5)
+    try:
+        with ThreadPoolExecutor(len(kinds)) as threads:
+            assert list(threads.map(draw_and_save, kinds)) == alone
+    finally:
+        sys.setswitchinterval(interval)
 
 
 @pytest.mark.slow

@@ -30,7 +30,7 @@ from ..results.xarray_backend import result_of
 from .draw import plot
 from .kinds import STUDIES, default_kind, find_kind, kinds_of, source_of
 from .slices import choose_line, unit_of
-from .style import is_geometric
+from .style import DRAWING, is_geometric
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -122,7 +122,7 @@ def explore(
     )
     message = ipywidgets.HTML(layout={"min_height": "2em"})
 
-    def draw() -> None:
+    def draw_values() -> None:
         message.value = COMPUTING
         found = find_kind(kind_menu.value)
         drawn = found.inputs_along(x.value, y.value)
@@ -161,6 +161,11 @@ def explore(
         picture.value = png.getvalue()
         values = ", ".join(f"{name} = {value:.6g}" for name, value in off_grid.items())
         message.value = escape(f"{values}: between values of the grid, integrated again") if values else ""
+
+    def draw() -> None:
+        # JupyterLab handles changes in several threads: each reads the values when it is its turn
+        with DRAWING:
+            draw_values()
 
     waiting: list[asyncio.TimerHandle] = []
 

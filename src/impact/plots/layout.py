@@ -22,7 +22,7 @@ from matplotlib.text import Text
 
 from ..errors import UsageError
 from ..formatting import argument
-from .style import SOFT, encoded, tint
+from .style import DRAWING, SOFT, encoded, tint
 
 # space between the parts of a picture, and at its edges
 GAP_INCHES = 0.05
@@ -102,7 +102,16 @@ class Picture(Figure):
         super().set_size_inches(w, h, forward)
         # matplotlib also calls this method when the resolution changes
         if self.get_figwidth() != before and self.entries:
-            self.place_legend(self.entries)
+            with DRAWING:
+                self.place_legend(self.entries)
+
+    def draw(self, renderer: RendererBase) -> None:
+        with DRAWING:
+            super().draw(renderer)
+
+    def savefig(self, *args: Any, **kwargs: Any) -> None:
+        with DRAWING:
+            super().savefig(*args, **kwargs)
 
     def add_legend(self, body: float, height: float | None, entries: Sequence[tuple[Artist, str]]) -> None:
         """Add the legend, and choose the height [in] for panels of the height `body` if the user chose none."""

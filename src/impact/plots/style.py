@@ -7,6 +7,7 @@ import io
 import re
 import shutil
 import tempfile
+import threading
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence, Set
 from importlib.resources import files
@@ -47,18 +48,21 @@ METADATA: dict[str, dict[str, None]] = {
 FRAMES_PER_SECOND = 20
 # share of the colour of texts in what is less important
 SOFT, FAINT = 2 / 3, 8 / 15
+# all threads share matplotlib's settings and its parser of formulas: one draws at a time
+DRAWING = threading.RLock()
 
 
 @contextlib.contextmanager
 def styled(style: str | Path | None = None) -> Iterator[None]:
     """Draw with the style sheet of this package; settings that the user changed, and `style`, override it."""
     ours = rc_params_from_file(str(STYLE_SHEET), use_default_template=False)
-    unchanged = {key: value for key, value in ours.items() if rcParams[key] == rcParamsDefault[key]}
-    with matplotlib.rc_context({**unchanged, **_style_of(style)}):
-        # styles that have no grid may give it the colour of texts, such as dark_background
-        if to_rgb(rcParams["grid.color"]) == to_rgb(rcParams["text.color"]):
-            rcParams["grid.color"] = tint(0.1)
-        yield
+    with DRAWING:
+        unchanged = {key: value for key, value in ours.items() if rcParams[key] == rcParamsDefault[key]}
+        with matplotlib.rc_context({**unchanged, **_style_of(style)}):
+            # styles that have no grid may give it the colour of texts, such as dark_background
+            if to_rgb(rcParams["grid.color"]) == to_rgb(rcParams["text.color"]):
+                rcParams["grid.color"] = tint(0.1)
+            yield
 
 
 def _style_of(style: str | Path | None) -> Mapping[Any, Any]:
