@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from html import escape
 from io import BytesIO
 from pathlib import Path
@@ -162,11 +163,7 @@ def explore(
         values = ", ".join(f"{name} = {value:.6g}" for name, value in off_grid.items())
         message.value = escape(f"{values}: between values of the grid, integrated again") if values else ""
 
-    def draw() -> None:
-        # JupyterLab handles changes in several threads: each reads the values when it is its turn
-        with DRAWING:
-            draw_values()
-
+    draw = partial(_draw_in_turn, draw_values)
     waiting: list[asyncio.TimerHandle] = []
 
     def update(change: object) -> None:
@@ -195,6 +192,12 @@ def explore(
     ]
     box = ipywidgets.Box(columns, layout={"flex_flow": "row wrap", "width": "100%", "grid_gap": "4px 16px"})
     return ipywidgets.VBox([box])
+
+
+def _draw_in_turn(draw: Callable[[], None]) -> None:
+    """Draw when no other thread does: JupyterLab handles changes in several, and each draws the present values."""
+    with DRAWING:
+        draw()
 
 
 def _notes(swept: Sequence[str], reasons: Mapping[str, str]) -> str:
