@@ -11,7 +11,9 @@ where W is the work done against the force. Where the damping is strong, another
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -54,6 +56,9 @@ ZERO_SPEED = 1e-10
 BOUND_EXPONENTS = (1.0, 1.25, 1.5, 2.0)
 BOUND_RATES = np.geomspace(1e-4, 1e4, 65)
 BOUND_INDENTATIONS = 10.0 ** -np.linspace(0.0, 40.0, 81)
+# rows that are written to, and the force at components y with params
+Rows = Array | Sequence[Any]
+Force = Callable[[Array, Params], Array]
 # trajectories checked together in `never_separates`
 MAX_BOUND_BATCH = 4096
 
@@ -97,7 +102,7 @@ class MotionLaw:
 def approach_problem(law: MotionLaw) -> Problem:
     """Pose the approach: from contact to the largest indentation, where v falls to zero."""
     return Problem(
-        rates=_rates(law, law.model.force, ()),
+        rates=_rates(law),
         event=lambda y, k, params: law.coordinate.stop(y, k),
         unreachable=lambda y, k, params: np.asarray(y[0] > MAX_S),
         floor=ERROR_FLOOR,
@@ -108,13 +113,12 @@ def approach_problem(law: MotionLaw) -> Problem:
 
 def restitution_problem(law: MotionLaw) -> Problem:
     """Pose the restitution phase, from the largest indentation until s or the force falls to zero."""
-    branch = law.model.unloading
-    rates = _rates(law, branch or law.model.force, UNLOADING_PARAMS if branch else ())
+    force_at = force_of(law, unloads=True)
 
     def force_event(y: Array, k: Array, params: Params) -> tuple[Array, Array]:
         s, force = y[0], k[-1]
         small = RELEASE_STEP * np.clip(np.abs(s), MIN_RELEASE_S, 1.0)
-        slope = (rates(y + small * k[:2], params)[4] - force) / small
+        slope = (force_at(y + small * k[:2], params) - force) / small
         return release_event(s, k[0], force, slope)
 
     def gap_event(y: Array, k: Array, params: Params) -> tuple[Array, Array]:
@@ -130,7 +134,11 @@ def restitution_problem(law: MotionLaw) -> Problem:
     event = force_event if law.model.release == "force" else gap_event
     unreachable = overdamped if may_be_overdamped(law.model) else turned_back
     return Problem(
-        rates=rates, event=event, unreachable=unreachable, floor=ERROR_FLOOR, step_at_unit_error=RESTITUTION_STEP
+        rates=_rates(law, unloads=True),
+        event=event,
+        unreachable=unreachable,
+        floor=ERROR_FLOOR,
+        step_at_unit_error=RESTITUTION_STEP,
     )
 
 
@@ -256,33 +264,68 @@ def _formula_arguments(
     return arguments
 
 
-def _rates(law: MotionLaw, formula: Formula, extra: tuple[str, ...]) -> Rates:
-    p, n_law_params = law.model.coordinate_power, len(law.names)
-    names = {*argument_names(formula)}
-    # as an array: NumPy converts a number on every call
-    power_factor = np.array(float(p))
+def _rates(law: MotionLaw, *, unloads: bool = False) -> Rates:
+    write = rates_writer(law, unloads=unloads)
 
     def rates(y: Array, params: Params, out: Array | None = None) -> Array:
-        s, arguments = y[0], _formula_arguments(law, names, extra, y, params)
-        v = arguments["v"]
-        force = law.call(formula, params[:n_law_params], arguments)
-        if force.shape != s.shape and force.shape != ():
-            raise ModelError(f"{law.model.key}: the force has shape {force.shape}, expected {s.shape}")
-
-        # rows: the rates of s, v (or its substitute), t and W, then the force; `out` may lack the last ones
-        out = np.empty((5, s.size)) if out is None else out
-        n_rows = len(out)
-        weight = np.multiply(integer_power(s, p - 1), power_factor, out[2] if n_rows > 2 else None)
-        out[0], second = v, out[1]
-        np.multiply(weight, force, second)
-        if n_rows > 3:
-            np.multiply(second, v, out[3])
-        if n_rows > 4:
-            out[4] = force
-        law.coordinate.rates(out, y, weight, arguments.get("elastic", weight), law.strength(params))
+        out = np.empty((5, y.shape[1])) if out is None else out
+        write(out, y, params)
         return out
 
     return rates
+
+
+def rates_writer(law: MotionLaw, *, unloads: bool = False) -> Callable[[Rows, Array, Params], None]:
+    """Make the function that writes the rates of a phase to rows: those of s, v or its substitute, t, W, and F.
+
+    The last rows may be missing, and that of W may be None.
+    """
+    p, move = law.model.coordinate_power, _formula_of_motion(law, unloads)
+    # as an array: NumPy converts a number on every call
+    power_factor = np.array(float(p))
+
+    def write(rows: Rows, y: Array, params: Params) -> None:
+        v, elastic, force = move(y, params)
+        n_rows, strength = len(rows), law.strength(params)
+        weight = np.multiply(integer_power(y[0], p - 1), power_factor, rows[2] if n_rows > 2 else None)
+        np.copyto(rows[0], v)
+        second = np.multiply(weight, force, rows[1])
+        if n_rows > 3 and rows[3] is not None:
+            np.multiply(second, v, rows[3])
+        force = law.coordinate.force(y, force, strength)
+        if n_rows > 4:
+            np.copyto(rows[4], force)
+        law.coordinate.rate(second, y, v, weight, force, weight if elastic is None else elastic, strength)
+
+    return write
+
+
+def force_of(law: MotionLaw, *, unloads: bool = False) -> Force:
+    """Make the function of components and params that computes the force of a phase alone."""
+    move = _formula_of_motion(law, unloads)
+
+    def force(y: Array, params: Params) -> Array:
+        return law.coordinate.force(y, move(y, params)[2], law.strength(params))
+
+    return force
+
+
+def _formula_of_motion(
+    law: MotionLaw, unloads: bool
+) -> Callable[[Array, Params], tuple[Array, Array | None, Array]]:
+    """Make the function of components and params that computes v, K δⁿ if the formula uses it, and F."""
+    branch = law.model.unloading if unloads else None
+    formula, extra = branch or law.model.force, UNLOADING_PARAMS if branch else ()
+    names, n_law_params = {*argument_names(formula)}, len(law.names)
+
+    def move(y: Array, params: Params) -> tuple[Array, Array | None, Array]:
+        arguments = _formula_arguments(law, names, extra, y, params)
+        force = law.call(formula, params[:n_law_params], arguments)
+        if force.shape != y[0].shape and force.shape != ():
+            raise ModelError(f"{law.model.key}: the force has shape {force.shape}, expected {y[0].shape}")
+        return arguments["v"], arguments.get("elastic"), force
+
+    return move
 
 
 # ---- damping so strong that the balls separate at zero speed, or never
@@ -317,7 +360,7 @@ def overdamped_speed(c: Array, n: float, q: float) -> Array:
     return np.where(CRITICAL_MARGIN * c * c >= 4.0 * (q + 1.0), c / (2.0 * (q + 1.0)), -np.inf)
 
 
-def never_separates(rates: Rates, params: Params, peak: Array, coordinate_power: int) -> Mask:
+def never_separates(force_at: Force, params: Params, peak: Array, coordinate_power: int) -> Mask:
     """Find which balls at rest at their peak never separate, by any law whose contact ends at zero indentation.
 
     If F(x, -B x^k) <= -k B^2 x^(2k-1) for all x = s^p from 0 to the peak, with some B and some k >= 1, the speed
@@ -329,11 +372,11 @@ def never_separates(rates: Rates, params: Params, peak: Array, coordinate_power:
     for first in range(0, peak.size, MAX_BOUND_BATCH):
         part = slice(first, first + MAX_BOUND_BATCH)
         batch_params = tuple(column[part] for column in params)
-        never[part] = _never_separates(rates, batch_params, peak[part], coordinate_power)
+        never[part] = _never_separates(force_at, batch_params, peak[part], coordinate_power)
     return never
 
 
-def _never_separates(rates: Rates, params: Params, peak: Array, coordinate_power: int) -> Mask:
+def _never_separates(force_at: Force, params: Params, peak: Array, coordinate_power: int) -> Mask:
     never = np.zeros(peak.size, bool)
     x = (peak[:, None] * BOUND_INDENTATIONS).reshape(-1)
     s = power(x, 1.0 / coordinate_power)
@@ -342,7 +385,7 @@ def _never_separates(rates: Rates, params: Params, peak: Array, coordinate_power
         for rate in BOUND_RATES:
             bound = np.repeat(rate * power(peak, 1.0 - k), BOUND_INDENTATIONS.size)
             try:
-                force = rates(np.array([s, -bound * power(x, k)]), repeated_params)[4]
+                force = force_at(np.array([s, -bound * power(x, k)]), repeated_params)
             except ModelError:
                 # a formula may be undefined in such a state
                 return never

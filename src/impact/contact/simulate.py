@@ -478,9 +478,9 @@ def _mark_never_separating(law: motion.MotionLaw, solution: Solution, params: Pa
     unfinished = np.flatnonzero(stopped)
     if not unfinished.size or law.model.release != "gap":
         return
-    rates = motion.restitution_problem(replace(law, coordinate=VelocityCoordinate())).rates
+    force_at = motion.force_of(replace(law, coordinate=VelocityCoordinate()), unloads=True)
     unfinished_params = tuple(column[unfinished] for column in params)
-    never = motion.never_separates(rates, unfinished_params, recovered[unfinished], law.model.coordinate_power)
+    never = motion.never_separates(force_at, unfinished_params, recovered[unfinished], law.model.coordinate_power)
     solution.termination[unfinished[never]] = Termination.EVENT_UNREACHABLE
 
 

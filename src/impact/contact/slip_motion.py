@@ -15,8 +15,9 @@ A slip begins where the trial force reaches the limit, and ends where it would g
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -102,6 +103,11 @@ class TangentialForm:
     def is_total(self) -> bool:
         """Whether the limit caps spring and dashpot together."""
         return self.cap == "total" and self.kind == "spring"
+
+    @property
+    def may_hold(self) -> bool:
+        """Whether the modes -2 and 2 occur."""
+        return self.cap != "total" and self.kind == "spring"
 
     @property
     def quadratures(self) -> dict[str, int]:
@@ -266,7 +272,7 @@ class SlipPhase:
     normal : the normal problem of the phase
     first : number of the first of the `Columns` among the params; the arguments of `TangentialForm.coefficient`
         follow them, with y over Gamma
-    memory : r in this phase
+    unloads : whether it is the restitution phase
     track : of all trajectories
     breakpoints : of the normal force, whose sides are the last params
     """
@@ -275,9 +281,22 @@ class SlipPhase:
     law: motion.MotionLaw
     normal: Problem
     first: int
-    memory: float
+    unloads: bool
     track: Track
     breakpoints: Sequence[Breakpoint] = ()
+
+    @cached_property
+    def _write_normal(self) -> Callable[[motion.Rows, Array, Params], None]:
+        return motion.rates_writer(self.law, unloads=self.unloads)
+
+    @cached_property
+    def _force(self) -> motion.Force:
+        return motion.force_of(self.law, unloads=self.unloads)
+
+    @property
+    def memory(self) -> float:
+        """r in this phase."""
+        return self.form.memory[self.unloads]
 
     @property
     def stiffness_power(self) -> float:
@@ -320,9 +339,11 @@ class SlipPhase:
         form, columns, n = self.form, self.columns(params), y.shape[1]
         rows = form.quadratures
         out = np.empty((TIME_ROW + len(rows) + 1, n)) if out is None else out
-        v, out[1], weight, _, force = self.normal.rates(y[:2], params, np.empty((5, n)))
-        s, slip = y[0], y[SLIP_ROW]
-        out[0] = v
+        # the joint rates that are missing in `out` are needed here
+        weight = out[TIME_ROW] if len(out) > TIME_ROW else np.empty(n)
+        force = out[-1] if len(out) > TIME_ROW + len(rows) else np.empty(n)
+        self._write_normal((out[0], out[1], weight, None, force), y[:2], params)
+        v, s, slip = out[0], y[0], y[SLIP_ROW]
         phi = slip_spring = columns.limit * force
         if form.coefficient is not None:
             phi = phi * self._coefficient(slip, params)
@@ -341,7 +362,6 @@ class SlipPhase:
         np.negative(out[SLIP_ROW], out[SLIP_ROW])
         if len(out) == N_COMPONENTS:
             return out
-        out[TIME_ROW] = weight
         if form.cap == "spring":
             slip_spring = columns.memory_limit * force
         if form.has_dashpot:
@@ -358,8 +378,6 @@ class SlipPhase:
             np.divide(v, signed_power(np.maximum(s, LEAST_S), self.stiffness_power + 1.0), memory_work)
             memory_work *= (0.5 - self.memory) * self.stiffness_power * columns.compliance
             memory_work *= slip_spring * slip_spring
-        if len(out) > TIME_ROW + len(rows):
-            out[-1] = force
         return out
 
     def _coefficient(self, slip: Array, params: Params) -> Array:
@@ -411,12 +429,12 @@ class SlipPhase:
             small = motion.RELEASE_STEP * reach
             if self.breakpoints:
                 small = np.where(self._crosses(y[:2] + small * k[:2], params), -small, small)
-            return np.asarray((self.normal.rates(y[:2] + small * k[:2], params)[4] - k[-1]) / small)
+            return np.asarray((self._force(y[:2] + small * k[:2], params) - k[-1]) / small)
         # the friction force jumps where a slip ends, which makes the time of it matter
         small = RATE_OF_LIMIT_STEP * reach
         is_end, is_start = (self._crosses(y[:2] + step * k[:2], params) for step in (small, -small))
         first, last = np.where(is_start & ~is_end, 0.0, -small), np.where(is_end, 0.0, small)
-        behind, ahead = (self.normal.rates(y[:2] + step * k[:2], params)[4] for step in (first, last))
+        behind, ahead = (self._force(y[:2] + step * k[:2], params) for step in (first, last))
         return np.asarray((ahead - behind) / (last - first))
 
     def _crosses(self, y: Array, params: Params) -> Mask:
@@ -456,11 +474,12 @@ class SlipPhase:
         near_end = np.flatnonzero(leaves & (y[0] <= max(self.end, MIN_REACH)))
         if near_end.size:
             margin[near_end], rate[near_end] = self._margin_near_end(
-                y[:, near_end], k[:, near_end], _taken(params, near_end)
+                y.take(near_end, 1), k.take(near_end, 1), _taken(params, near_end)
             )
-        held = np.flatnonzero((np.abs(columns.mode) == 2.0) & ~(leaves & (y[0] < END_S)))
-        if held.size:
-            margin[held], rate[held] = self._held_margin(y[:, held], _taken(params, held))[0], np.nan
+        if self.form.may_hold:
+            held = np.flatnonzero((np.abs(columns.mode) == 2.0) & ~(leaves & (y[0] < END_S)))
+            if held.size:
+                margin[held], rate[held] = self._held_margin(y.take(held, 1), _taken(params, held))[0], np.nan
         # without a limit the mode does not matter, nor without a force
         free = np.flatnonzero((columns.share == 0.0) | self._without_force(columns))
         margin[free], rate[free] = 1.0, 0.0
@@ -611,14 +630,14 @@ class SlipPhase:
         self, at_limit: Mask, leaves: Mask, direction: Array, new: Array, y: Array, params: Params
     ) -> Array:
         """Replace new modes at the limit, where growth is zero, by a held mode, or by that to which it leaves."""
-        if self.form.cap == "total" or self.form.kind != "spring":
+        if not self.form.may_hold:
             return new
         rows = np.flatnonzero(
             at_limit & (self.columns(params).damping > 0.0) & (self.columns(params).share != 0.0)
         )
         if rows.size:
             ahead = direction[rows]
-            margin, is_near_slip = self._held_margin(y[:, rows], _taken(params, rows), ahead)
+            margin, is_near_slip = self._held_margin(y.take(rows, 1), _taken(params, rows), ahead)
             left = np.where(is_near_slip, ahead, 0.0)
             new = new.copy()
             new[rows] = np.where(leaves[rows], left, np.where(margin > 0.0, 2.0 * ahead, new[rows]))
@@ -626,6 +645,8 @@ class SlipPhase:
 
     def _released(self, y: Array, params: Params) -> Array:
         """Set Gamma where a held mode determines it."""
+        if not self.form.may_hold:
+            return y
         held = np.flatnonzero(np.abs(self.columns(params).mode) == 2.0)
         if held.size:
             part, y = _taken(params, held), y.copy()
@@ -675,7 +696,7 @@ class SlipPhase:
         form, columns, n = self.form, self.columns(params), y.shape[1]
         near, twice = (self._rows_near_contact(y, params, s) for s in (START_S, 2.0 * START_S))
         k = self.rates(near[:N_COMPONENTS], params)
-        force, twice_force = k[-1], self.rates(twice[:N_COMPONENTS], params)[-1]
+        force, twice_force = k[-1], self._force(twice[:2], params)
         self.track.order[index] = np.log2(twice_force / force) / self.law.model.coordinate_power
         sign = np.where(force < 0.0, -1.0, 1.0)
         columns = columns.changed(np.zeros(n), sign)
@@ -715,8 +736,8 @@ class SlipPhase:
         """Compute by how much the trial force at the limit grows more than the limit, near first contact."""
         near = self._rows_near_contact(y, params, RATE_S)
         columns, k = self.columns(params), self.rates(near[:N_COMPONENTS], params)
-        small = RATE_STEP * RATE_S * k[:N_COMPONENTS]
-        ahead, behind = (self.rates(near[:N_COMPONENTS] + step, params)[-1] for step in (small, -small))
+        small = RATE_STEP * RATE_S * k[:2]
+        ahead, behind = (self._force(near[:2] + step, params) for step in (small, -small))
         dN: Array = columns.share * (ahead - behind) / (2.0 * RATE_STEP * RATE_S)
         local = self.local(near, k, params)
         return self.trial_rate(near, k, columns, local.N - local.capped_drag, local.N) - dN
@@ -743,7 +764,7 @@ class SlipPhase:
 
 
 def _taken(params: Params, rows: NDArray[np.intp]) -> Params:
-    return tuple(column[rows] for column in params)
+    return tuple(column.take(rows) for column in params)
 
 
 def _away_from_zero(s: Array) -> Array:

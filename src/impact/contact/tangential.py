@@ -247,8 +247,7 @@ def _integrate(
             rows = np.vstack([start, states[0][2:, recovery.rows]])
         residual = None if recovery is None else recovery.residual
         params, breakpoints = motion.breakpoints(law, params, rows, residual)
-        memory = form.memory[recovery is not None]
-        phase = SlipPhase(form, law, problem, len(params), memory, track, breakpoints)
+        phase = SlipPhase(form, law, problem, len(params), recovery is not None, track, breakpoints)
 
         def run(problem: Problem, start: Array, params: Params) -> Solution:
             y, params = phase.begin(start, params)

@@ -49,9 +49,13 @@ class VelocityCoordinate:
         """Compute a function that falls to zero with the velocity, and its rate, from components y and rates k."""
         return y[1], k[1]
 
-    def rates(self, out: Array, y: Array, weight: Array, elastic: Array, strength: Array) -> None:
-        """Complete the rates in `out`: its second row contains p sᵖ⁻¹ F, its fifth row, if any, F."""
-        np.negative(out[1], out[1])
+    def force(self, y: Array, force: Array, strength: Array) -> Array:
+        """F from the components; `force` is that from v."""
+        return force
+
+    def rate(self, out: Array, y: Array, v: Array, weight: Array, force: Array, elastic: Array, c: Array) -> None:
+        """Write the rate of the second component to `out`, which contains p sᵖ⁻¹ F; c is the strength."""
+        np.negative(out, out)
 
 
 class LogCoordinate(VelocityCoordinate):
@@ -65,8 +69,8 @@ class LogCoordinate(VelocityCoordinate):
     def velocity(self, y: Array, strength: Array) -> Array:
         return np.asarray(np.expm1(y[1]) / strength)
 
-    def rates(self, out: Array, y: Array, weight: Array, elastic: Array, strength: Array) -> None:
-        out[1] = rate_of_log(weight, elastic, strength)
+    def rate(self, out: Array, y: Array, v: Array, weight: Array, force: Array, elastic: Array, c: Array) -> None:
+        out[:] = rate_of_log(weight, elastic, c)
 
 
 def rate_of_log(weight: Array, elastic: Array | float, chi: Array) -> Array:
@@ -101,13 +105,12 @@ class ForceCoordinate(VelocityCoordinate):
     def stop(self, y: Array, k: Array) -> tuple[Array, Array]:
         return k[0], -k[2] * k[4]
 
-    def rates(self, out: Array, y: Array, weight: Array, elastic: Array, strength: Array) -> None:
+    def force(self, y: Array, force: Array, strength: Array) -> Array:
         # the same as the force from v, without the loss of digits near its zero
-        force = strength * signed_power(y[0], self.drag) * y[1]
-        out[1] = rate_of_force(
-            out[0], signed_power(y[0], self.spring - 1.0), self.spring / strength, weight, force
-        )
-        out[4:] = force
+        return np.asarray(strength * signed_power(y[0], self.drag) * y[1])
+
+    def rate(self, out: Array, y: Array, v: Array, weight: Array, force: Array, elastic: Array, c: Array) -> None:
+        out[:] = rate_of_force(v, signed_power(y[0], self.spring - 1.0), self.spring / c, weight, force)
 
 
 def is_strong(model: ForceModel, values: Mapping[str, Array | float], count: int) -> NDArray[np.bool_]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..array_types import Array, Mask
 from .problem import Params, Problem, Termination
-from .state import State, TrialStep
+from .state import State, TrialStep, put_columns
 
 # an offset up to NEAR_EVENT of a step is bridged by a step of order two, forwards or backwards; the event is
 # located when the remaining offset is below EVENT_RTOL of the step, or EVENT_ATOL: a linear step is then exact to
@@ -103,7 +103,7 @@ def locate_event(
     trial.is_accurate[positions[crossed]] = False
     ended = positions[located]
     if ended.size:
-        trial.y[:, ended] = y[:, located]
+        put_columns(trial.y, ended, y.compress(located, 1))
         state.termination[ended] = Termination.EVENT_REACHED
     return ended, offset[located] / h[located]
 
@@ -113,7 +113,7 @@ def _step_to_event(
 ) -> tuple[Array, Array]:
     """Compute the rows at the event, by steps of order two and one, and the offset of the linear step."""
     params = tuple(column[positions] for column in state.params)
-    y, k = step_of_order_two(problem, trial.y[:, positions], trial.k[:, positions], offset, params)
+    y, k = step_of_order_two(problem, trial.y.take(positions, 1), trial.k.take(positions, 1), offset, params)
     remaining = linear_offset(*problem.event(y[: problem.n_components], k, params))
     return y + remaining * k[: problem.n_integrated], remaining
 

@@ -30,8 +30,7 @@ class PeakCandidate:
 
     def put(self, positions: NDArray[np.intp], y: Array, behind: Array, ahead: Array | float) -> None:
         """Replace the candidates at the given positions."""
-        for row, values in zip(self.y, y, strict=True):
-            row[positions] = values
+        put_columns(self.y, positions, y)
         self.behind[positions], self.ahead[positions] = behind, ahead
 
 
@@ -59,6 +58,12 @@ class Workspace:
         stages = [_narrow(stage, n) for stage in self.stages]
         ends = (_narrow(rows, n) for rows in (self.y_end, self.part))
         return Workspace(_narrow(self.y, n), _narrow(self.k, n), stages, *ends)
+
+
+def put_columns(rows: Array, positions: NDArray[np.intp], values: Array) -> None:
+    """Replace columns of the rows; row by row, which is many times faster than by both indices."""
+    for row, new in zip(rows, values, strict=True):
+        row[positions] = new
 
 
 def _narrow(rows: Array, n: int) -> Array:
@@ -151,7 +156,7 @@ class State:
             best=self.best[running],
             peak=self.peak,
             workspace=workspace,
-            margins=(self.margins[0][:, running], self.margins[1][:, running]),
+            margins=(self.margins[0].take(running, 1), self.margins[1].take(running, 1)),
             h_free=self.h_free[running],
         )
 

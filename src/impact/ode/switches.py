@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..array_types import Array, Mask
 from .events import event_offset, is_event_ahead, step_of_order_two
 from .problem import Problem, Switch, Termination
-from .state import RUNNING, State, TrialStep
+from .state import RUNNING, State, TrialStep, put_columns
 
 # a mode changes at the end of a step within this part of the last two steps, or within this time, of the zero; or
 # within the larger part, if the rate of the margin is known: a step of order two bridges it
@@ -37,7 +37,7 @@ def locate_switches(problem: Problem, switch: Switch, state: State, trial: Trial
     ended = (state.termination == Termination.EVENT_REACHED).nonzero()[0]
     if ended.size:
         params = tuple(column[ended] for column in state.params)
-        trial.k[:, ended] = problem.rates(trial.y[: problem.n_components, ended], params)
+        put_columns(trial.k, ended, problem.rates(trial.y[: problem.n_components].take(ended, 1), params))
     margins, rates = switch.margins(trial.y, trial.k, state.params)
     before, rates_before = state.margins
     # most margins are far from zero, and by a glance: one of an unknown rate may vanish soon only below this part
@@ -52,7 +52,8 @@ def locate_switches(problem: Problem, switch: Switch, state: State, trial: Trial
     if positions.size:
         reached, which, offset = _locate(switch, state, trial, positions, margins, rates)
     stay = (~trial.is_accurate).nonzero()[0]
-    margins[:, stay], rates[:, stay] = before[:, stay], rates_before[:, stay]
+    for rows, rows_before in ((margins, before), (rates, rates_before)):
+        put_columns(rows, stay, rows_before.take(stay, 1))
     state.margins = margins, rates
     if reached.size:
         _change_modes(problem, switch, state, trial, reached, which, offset)
@@ -68,21 +69,22 @@ def _locate(
     all_rates: Array,
 ) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
     """Shorten steps to zeros of margins; returns where a zero is reached, of which margin, and its offset."""
-    margins, before = all_margins[:, positions], state.margins[0][:, positions]
+    margins, before = all_margins.take(positions, 1), state.margins[0].take(positions, 1)
     h, h_next = state.h[positions], trial.h_next[positions]
     changes = np.abs(margins - before) > LARGE_CHANGE * np.maximum(np.abs(margins), np.abs(before))
     # kept, since the end of a step is the start of the next one
     kept = (all_rates, state.margins[1])
-    end, start = (positions[(changes & np.isnan(rates[:, positions])).any(axis=0)] for rates in kept)
+    end, start = (positions[(changes & np.isnan(rates.take(positions, 1))).any(axis=0)] for rates in kept)
     at = np.concatenate([end, start])
     if at.size:
         params = tuple(column[at] for column in state.params)
-        y = np.concatenate([trial.y[:, end], state.y[:, start]], axis=1)
-        k = np.concatenate([trial.k[:, end], state.k[:, start]], axis=1)
+        y = np.concatenate([trial.y.take(end, 1), state.y.take(start, 1)], axis=1)
+        k = np.concatenate([trial.k.take(end, 1), state.k.take(start, 1)], axis=1)
         exact = switch.rates_of_margins(y, k, params)
         for rates, where, values in zip(kept, (end, start), np.split(exact, [end.size], axis=1), strict=True):
-            rates[:, where] = np.where(np.isnan(rates[:, where]), values, rates[:, where])
-    slopes, slopes_before = all_rates[:, positions], state.margins[1][:, positions]
+            known = rates.take(where, 1)
+            put_columns(rates, where, np.where(np.isnan(known), values, known))
+    slopes, slopes_before = all_rates.take(positions, 1), state.margins[1].take(positions, 1)
     secant, unknown = (margins - before) / h, np.isnan(slopes)
     slopes = np.where(unknown, secant, slopes)
     slopes_before = np.where(np.isnan(slopes_before), secant, slopes_before)
@@ -121,7 +123,9 @@ def _first_zero(
     crossing = np.where(inside, offset, crossing)
     ahead = np.where(certain & (offset >= 0.0), offset, np.inf)
     turns = (dg_before < 0.0) & (dg > 0.0)
-    ahead = np.where(turns, _low_minimum(g, dg, g_before, dg_before, h), ahead)
+    if turns.any():
+        steps = np.broadcast_to(h, g.shape)
+        ahead[turns] = _low_minimum(*(values[turns] for values in (g, dg, g_before, dg_before, steps)))
     offset = np.where(g < 0.0, crossing, ahead)
     which = offset.argmin(axis=0)
     return which, offset[which, np.arange(which.size)]
@@ -163,13 +167,14 @@ def _change_modes(
 ) -> None:
     """Change the modes of trajectories next to the ends of their steps; they go on with the step of before."""
     params = tuple(column[positions] for column in state.params)
-    y, k = step_of_order_two(problem, trial.y[:, positions], trial.k[:, positions], offset, params)
+    y, k = step_of_order_two(problem, trial.y.take(positions, 1), trial.k.take(positions, 1), offset, params)
     y, params = switch.change(which, y, k, params)
     for column, values in zip(state.params, params, strict=True):
         column[positions] = values
     k = problem.rates(y[: problem.n_components], params)
-    trial.y[:, positions], trial.k[:, positions] = y, k
+    put_columns(trial.y, positions, y)
+    put_columns(trial.k, positions, k)
     trial.h_next[positions] = np.fmax(trial.h_next[positions], state.h_free[positions])
     state.h_free[positions] = 0.0
     for rows, values in zip(state.margins, switch.margins(y, k, params), strict=True):
-        rows[:, positions] = values
+        put_columns(rows, positions, values)
