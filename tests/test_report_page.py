@@ -566,7 +566,7 @@ def check_escaped(make: Callable[[Callable[[str], str]], str], malicious: str) -
 @pytest.mark.parametrize("malicious", MALICIOUS)
 def test_texts_of_a_file_never_become_elements(malicious: str, monkeypatch: pytest.MonkeyPatch) -> None:
     def make(words: Callable[[str], str]) -> str:
-        def refused(dataset: xr.Dataset, kind: str, *_: object) -> NoReturn:
+        def refused(dataset: xr.Dataset, kind: str, *_: object, **__: object) -> NoReturn:
             raise UsageError(words(kind))
 
         monkeypatch.setattr("impact.reporting.figures.get_plot_data", refused)

@@ -8,6 +8,7 @@ import math
 import shlex
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple, TypeAlias
 
@@ -20,10 +21,11 @@ from ..config.input_names import InputName, is_input
 from ..contact.model import ForceModel
 from ..contact.status import FIRST_FAILURE, NO_IMPACT
 from ..contact.units import names_in, with_numbers
+from ..engine.plugins import Plugins
 from ..errors import ImpactError
 from ..formatting import prefixed
 from ..plots.data import PlotData
-from ..plots.draw import draw, get_plot_data
+from ..plots.draw import ReadHistories, draw, get_plot_data
 from ..plots.kinds import STUDIES, Choice, Kind, Look, kinds_of
 from ..plots.slices import numeric_axes, unit_of, varying_inputs
 from ..plots.style import encoded
@@ -31,6 +33,7 @@ from ..results.ranking import MIN_ERROR_FLOOR
 from ..results.replay_command import command_start
 from ..results.schema import columns_along
 from ..results.selection import law_positions
+from ..results.single_impact import histories
 from ..results.slabs import distinct_points, is_computed, slabs
 
 # points that are searched for the first one with an answer, at which the figures are drawn
@@ -82,12 +85,12 @@ class Drawing:
         for of_friction in (False, True):
             more_figures: list[tuple[int, FigurePlan, Position, PlotData | None]] = []
             for plan in plans:
-                kind, choice, position = plan
+                kind, _, position = plan
                 if kind.of_friction != of_friction:
                     continue
                 number = len(figures) + 1
                 try:
-                    plot_data = get_plot_data(self.dataset, kind.name, choice, self.plugins)
+                    plot_data = self.get_plot_data(plan)
                     comparison, more_positions = _compare_values(self, plan)
                     conditions = _condition_sentences(self.dataset, position, self.keys)
                     sentences = [kind.caption, *conditions, *comparison]
@@ -145,9 +148,33 @@ class Drawing:
     def plot_data(self, plan: FigurePlan) -> PlotData | None:
         """Read the data of a figure; None where it has no values."""
         try:
-            return get_plot_data(self.dataset, plan.kind.name, plan.choice, self.plugins)
+            return self.get_plot_data(plan)
         except ImpactError:
             return None
+
+    def get_plot_data(self, plan: FigurePlan) -> PlotData:
+        """Get the data of a figure; a motion that several figures show is integrated once."""
+        return get_plot_data(
+            self.dataset, plan.kind.name, plan.choice, self.plugins, read_histories=self._read_histories
+        )
+
+    @cached_property
+    def _read_histories(self) -> ReadHistories:
+        known: dict[str, tuple[list[xr.Dataset], list[str]]] = {}
+
+        def read(
+            dataset: xr.Dataset,
+            models: Sequence[str] | None,
+            at: Mapping[str, object],
+            plugins: Plugins,
+            frictions: Sequence[str] | None,
+        ) -> tuple[list[xr.Dataset], list[str]]:
+            key = repr((models, sorted(at.items()), frictions))
+            if key not in known:
+                known[key] = histories(dataset, models, at, plugins, frictions)
+            return known[key]
+
+        return read
 
     def has_answer(self, position: Position) -> bool:
         """Whether a model has an answer for an impact at some values of axes."""
