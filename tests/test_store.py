@@ -155,6 +155,7 @@ def test_h5py_reads_it(stored: Path, figure6: xr.Dataset) -> None:
         assert file["e_out"].dims[1].keys() == ["e"]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(shutil.which("ncdump") is None, reason="ncdump (Debian: netcdf-bin) is not installed")
 def test_ncdump_reads_it(stored: Path, factored: Path) -> None:
     header = subprocess.run(["ncdump", "-h", stored], capture_output=True, text=True, check=True).stdout
