@@ -61,7 +61,7 @@ def page_without_figures(dataset: xr.Dataset) -> tuple[str, list[Choice]]:
     """A report whose figures are read and not drawn, and their points."""
     choices = []
 
-    def read(dataset: xr.Dataset, kind: str, choice: Choice, _: object) -> NoReturn:
+    def read(dataset: xr.Dataset, kind: str, choice: Choice, *_: object, **__: object) -> NoReturn:
         # an error of the data would end the test
         get_plot_data(dataset, kind, choice, [BROKEN])
         choices.append(choice)
