@@ -49,6 +49,7 @@ def test_the_law_that_made_the_data_is_first_with_its_parameter_in_the_interval(
     assert drops["weight"].values[0] > 0.999
 
 
+@pytest.mark.slow
 def test_a_fit_at_a_bound_is_ranked_last_and_has_no_weight(drops: xr.Dataset) -> None:
     last = drops.isel(model=-1)
     meanings = drops["fit_status"].attrs["flag_meanings"].split()
@@ -196,6 +197,7 @@ def write_specimens(folder: Path, header: str = "e_out, sigma, specimen") -> Pat
     return folder / "fit.toml"
 
 
+@pytest.mark.slow
 def test_a_column_specimen_gives_each_specimen_a_deviation(tmp_path: Path) -> None:
     """The interval is that of the means of four specimens, in a stored file too."""
     config = write_specimens(tmp_path)

@@ -26,6 +26,7 @@ def drops() -> xr.Dataset:
     return impact.calibrate(FOLDER / "drops.toml", overrides=[models, *QUICK])
 
 
+@pytest.mark.slow
 def test_the_picture_has_measured_values_curves_bands_and_residuals(drops: xr.Dataset) -> None:
     figure = impact.plot(drops)
     values, residuals = figure.axes

@@ -79,6 +79,7 @@ def tables(draw: st.DrawFn) -> dict[str, list[Any]]:
     return {name: [draw(st.sampled_from(COLUMNS[name])) for _ in range(size)] for name in names}
 
 
+@pytest.mark.slow
 @settings(max_examples=4)
 @given(tables())
 def test_a_case_equals_a_sweep_with_its_values(columns: dict[str, list[Any]]) -> None:

@@ -294,6 +294,7 @@ def test_laws_of_codes_name_a_version_except_products_without_versions():
     }
 
 
+@pytest.mark.slow
 def test_the_commands_print_states_of_evidence_and_their_counts(cli):
     listing = cli("models").stdout
     counts = {

@@ -240,6 +240,7 @@ def test_a_history_at_uniform_times(cli: Run, tmp_path: Path) -> None:
     np.testing.assert_allclose(history["delta"], exact, rtol=0, atol=1e-8 * exact.max())
 
 
+@pytest.mark.slow
 def test_run_repeats_a_point_of_a_result(cli: Run, tmp_path: Path) -> None:
     (tmp_path / "wide.toml").write_text(WIDE, encoding="utf-8")
     cli("sweep", "wide.toml", "--set", "sweep.v2=-2.0", "--set", "solver.rtol=1e-4", cwd=tmp_path)

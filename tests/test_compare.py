@@ -830,6 +830,7 @@ def test_the_printed_command_repeats_the_worst_point(forked: ForkServer, tmp_pat
             assert printed["model"] == difference.at["model"]
 
 
+@pytest.mark.slow
 def test_the_printed_command_has_the_labels_of_the_new_file(tmp_path: Path, forked: ForkServer) -> None:
     # `impact run` looks up zipped values, so that those of the baseline would not be found
     config = {

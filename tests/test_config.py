@@ -823,6 +823,7 @@ PIECES = st.one_of(
 )  # fmt: skip
 
 
+@pytest.mark.slow
 @settings(max_examples=75, deadline=None)
 @given(st.integers(0, len(GOOD)), st.integers(0, 30), PIECES, st.lists(PIECES, max_size=2))
 def test_any_text_gives_a_config_or_safe_lines(at: int, cut: int, piece: str, overrides: list[str]) -> None:

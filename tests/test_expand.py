@@ -187,6 +187,7 @@ def test_a_factored_file_holds_the_values_of_a_full_one(tmp_path: Path, config: 
     assert surveys["factored"].trajectories == surveys["full"].trajectories
 
 
+@pytest.mark.slow
 def test_a_factored_file_of_a_plugin_is_read_without_the_plugin(tmp_path: Path) -> None:
     (tmp_path / "stiff.py").write_text(STIFF, encoding="utf-8")
     sweep = {"e": [0.1, 0.5], "v1": [1.0, 2.0, 4.0], "m1": [1.0, 3.0], "m2": [1.0, float("inf")], "n": [1.0, 1.5]}

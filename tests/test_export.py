@@ -84,6 +84,7 @@ def test_a_parameter_that_cannot_be_found_is_reported() -> None:
     assert "no value of materials.table1.E keeps every phase within 1 % at the step" in missing.header
 
 
+@pytest.mark.slow
 def test_the_law_is_the_first_of_the_source_that_the_code_has() -> None:
     hooke, hertz = "lammps-coeff-restitution-hooke", "lammps-coeff-restitution-hertz"
     config = source("soft", "soft") | {"models": ["gonthier-2004", hooke, hertz]}
@@ -251,6 +252,7 @@ def test_a_script_with_a_wall_has_one_ball(name: str) -> None:
     assert not re.search(r"\b(inf|nan)\b|-0\.5", body)
 
 
+@pytest.mark.slow
 def test_a_wall_of_yade_before_hertzian_has_half_the_effective_radius() -> None:
     older, newer = (
         impact.export("yade", "yade-betan", source=source("soft", "soft", **WALL), dt=5e-6, code_version=version)
@@ -478,6 +480,7 @@ def test_the_axes_of_a_source_take_their_first_values_and_the_header_says_so() -
     assert "first value of each axis of the source: e" in export.header
 
 
+@pytest.mark.slow
 def test_the_default_step_is_a_fiftieth_of_the_contact_time(cli: Run) -> None:
     data = json.loads(cli("export", "--to", "mujoco", "--at", "e=0.6", "--json").stdout)
     assert data["e_at_dt"]["dt"] == pytest.approx(data["contact_time"] / 50)
@@ -1029,6 +1032,7 @@ def test_liggghts_takes_the_settings_of_a_friction_law(
         impact.export("liggghts", key, source=ratio, friction=friction, code_version="3.8.0")
 
 
+@pytest.mark.slow
 def test_yade_takes_the_tangential_springs_of_each_ball_and_an_angle_of_friction() -> None:
     key = "yade-viscoelastic"
     at = {"K": 1e6, f"{key}.C": 30.0, "mu": 0.3, "angle": "40 deg"}
@@ -1097,6 +1101,7 @@ def test_mujoco_takes_the_cone_of_a_pair_of_geoms(key: str, solref: str) -> None
         impact.export("mujoco", key, at=at, friction="coulomb-1785", code_version=version)
 
 
+@pytest.mark.slow
 def test_pybullet_takes_the_root_of_a_coefficient_and_newton_a_friction_that_stops_the_slip_in_a_step() -> None:
     at = {"K": 1e6, "mu": 0.3, "angle": "40 deg", "v1": 1.0, "m1": 1.0, "m2": 3.0, "R1": 0.05, "R2": 0.08}
     law, friction = "kelvin-voigt-no-tension", "coulomb-1785"

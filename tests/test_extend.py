@@ -173,6 +173,7 @@ def test_a_property_of_a_material_with_a_dot_in_its_name_is_extended(
     assert_same_values(larger, single_sweep(config, json.loads(larger.attrs["config_set"]), tmp_path))
 
 
+@pytest.mark.slow
 def test_materials_are_extended_and_chosen_whatever_their_names(stored_sweep: StoredSweep, tmp_path: Path) -> None:
     hard = '[materials."a \\u007f \\"b\\""]\nE = 3e9\nnu = 0.3\nrho = 1000\n'
     config = DASHPOT + hard
@@ -328,6 +329,7 @@ output.layout = "factored"
     ]
 
 
+@pytest.mark.slow
 def test_equal_results_are_extended_to_equal_bytes_by_the_core_that_they_have(
     stored_sweep: StoredSweep, tmp_path: Path
 ) -> None:

@@ -1,7 +1,7 @@
 """Codes deliver at an oblique impact what the map of their scheme predicts: velocities and spins.
 
 A sphere meets a plane, or a sphere at rest, at angles from 10 to 80 degrees, with and without a spin, at 12, 31
-and 1000 steps per contact and two phases of a step.
+and 1000 steps per contact, or 200 of a code that Python calls for each step, and two phases of a step.
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ ANGLES, MUS, SPINS, STEPS, PHASES = (
     (12, 31, 1000),
     (0.125, 0.625),
 )
+STEPS_OF_PYTHON = (12, 31, 200)
 BALL: Values = {"v1": 1.0, "m1": 0.01, "R1": 0.05}
 MATERIAL = {"E": 1e9, "nu": 0.3, "rho": 1000.0}
 # so stiff that the indentation is a hundred thousandth of the radius
@@ -214,6 +215,7 @@ PAIRINGS = (
             scheme="mujoco-cone",
             shortens_arms=True,
             second=second,
+            steps=STEPS_OF_PYTHON,
         )
         for values, second in (
             ({}, {}),
@@ -271,6 +273,7 @@ PAIRINGS += (
         lambda values, mu: mujoco(values, mu, " ".join(map(repr, STANDARD.values()))),
         scheme="mujoco-cone",
         shortens_arms=True,
+        steps=STEPS_OF_PYTHON,
     ),
 )
 PYBULLET_WALL = Code("PyBullet", "run_pybullet_wall.py")
@@ -377,6 +380,7 @@ PAIRINGS += tuple(
         # a shorter arm changes one step of one impact, at 45 degrees
         alternates=(name, material, second) == ("linear", "soft", {}),
         second=second,
+        steps=STEPS_OF_PYTHON,
         # Kratos finds the damping ratio by bisection to 1e-4
         slack=1e-4 if name == "linear" else 0.0,
     )
@@ -397,6 +401,7 @@ PAIRINGS += tuple(
         scheme="drake-tamsi",
         shortens_arms=True,
         second=second,
+        steps=STEPS_OF_PYTHON,
     )
     for K in (1e6, 1e12)
     for second in ({}, SECOND)

@@ -55,6 +55,7 @@ def test_samples_are_values_of_the_function_with_its_extrema() -> None:
         assert np.abs(x - extremum).min() < 1e-8
 
 
+@pytest.mark.slow
 def test_a_limit_and_what_is_beside_it_have_their_status() -> None:
     """At C = 2 in the contact's own units the dashpot is critically damped."""
     values = np.array([0.5, 1.5, 2.0, 2.5, 40.0])

@@ -331,6 +331,7 @@ def test_a_command_prints_a_single_note_about_unknown_variables(
     assert len(completed.stderr.splitlines()) == 1 + (command[0] not in ("info", "recommend"))
 
 
+@pytest.mark.slow
 def test_compression_by_another_program_is_not_kept(small: Path, tmp_path: Path) -> None:
     result = impact.load(small)
     encoding = {str(name): {"zlib": True, "chunksizes": (1, 1, 1)} for name in ("v1_post", "status")}

@@ -400,6 +400,7 @@ def test_text_from_a_file_is_text(over_speed: xr.Dataset, tmp_path: Path) -> Non
     save_figure(figure, tmp_path / "odd.svg")
 
 
+@pytest.mark.slow
 def test_ticks_are_labelled_with_their_values(many: xr.Dataset) -> None:
     raised = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹−", "-0123456789-")
     for map_data in (field_map(many, models=MODELS[:1]), validity(many, models=MODELS)):

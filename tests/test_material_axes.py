@@ -129,6 +129,7 @@ def test_a_mass_comes_from_a_radius_and_a_density() -> None:
         np.testing.assert_allclose(result["contact_time"].isel(R1=position), single["contact_time"], rtol=1e-13)
 
 
+@pytest.mark.slow
 def test_a_derived_mass_varies_with_its_radius_and_density(tmp_path: Path) -> None:
     plan = with_axes(
         _prepared(config({**BALLS, "R1": [0.01, 0.02], "R2": 0.01, "material": "steel"}, {"steel": STEEL}, LAW)),

@@ -274,6 +274,7 @@ def test_a_study_begins_with_its_own_picture(
     assert list(controls) == ["kind", "models", "x", "y", *axes]
 
 
+@pytest.mark.slow
 def test_a_result_over_words_alone_has_controls() -> None:
     glass, steel = {"E": 7e10, "nu": 0.25, "rho": 2500.0}, {"E": 2.1e11, "nu": 0.3, "rho": 7850.0}
     inputs = {"v1": 1.0, "material1": ["glass", "steel"], "material2": "steel", "R1": 0.01, "R2": 0.01}

@@ -428,6 +428,7 @@ def test_a_calibration_of_pairs_is_repeated_from_its_file(fitted: xr.Dataset, tm
     assert impact.rerun(tmp_path / "fit.h5").equal
 
 
+@pytest.mark.slow
 def test_the_picture_of_a_calibration_names_both_laws_of_a_pair(fitted: xr.Dataset) -> None:
     legend = [text.get_text() for text in impact.plot(fitted).legends[0].get_texts()]
     assert legend[0] == "Hertz (1882) with Coulomb, too few points"
@@ -444,6 +445,7 @@ def test_calibrate_has_the_same_bits_in_any_number_of_processes() -> None:
 # ---- sensitivity
 
 
+@pytest.mark.slow
 def test_each_pair_has_a_study_and_one_without_meaning_has_not_failed() -> None:
     source = config(
         models=["hertz", "lankarani-nikravesh-1994"],

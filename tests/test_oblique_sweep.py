@@ -128,6 +128,7 @@ def test_slips_of_both_directions_and_by_any_input_share_a_trajectory() -> None:
     assert trajectories(source)[f"tsuji-1992 with {SPRING}"] == len({np.inf, 1.0, 2.0})
 
 
+@pytest.mark.slow
 def test_angle_mu_and_spin_over_one_speed_need_one_normal_trajectory() -> None:
     angles, mu, spins = 17, 5, 3
     axes = {
@@ -221,6 +222,7 @@ def test_an_extended_result_has_the_bits_of_the_whole_sweep(
     assert_same_bits(extended.sel(model=whole.model, friction=whole.friction), whole)
 
 
+@pytest.mark.slow
 def test_impacts_alone_have_the_bits_of_the_sweep(folder: Path, whole: xr.Dataset) -> None:
     overrides = ['sweep.angle="50 deg"', "sweep.omega1=100.0", "sweep.mu=0.3", f"frictions=['{SPRING}']"]
     overrides.append(f"friction={{ {SPRING} = {SPRING_VALUES} }}")

@@ -104,6 +104,7 @@ def test_plots_show_the_exponent_of_each_law() -> None:
             assert f"n = {n}," in f"{conditions},".replace("\N{NO-BREAK SPACE}", " "), (kind, models)
 
 
+@pytest.mark.slow
 def test_info_and_the_report_show_the_exponent_of_the_law(cli: Run, tmp_path: Path) -> None:
     config = ROOT / "configs" / "figure5c.toml"
     impact.save(impact.sweep(config, overrides=["solver.rtol=1e-4"]), tmp_path / "bilinear.h5")

@@ -79,6 +79,7 @@ def test_the_largest_error_of_a_claim_is_the_printed_number(claim: list[str]) ->
         assert f"{max_error:.4f}" == printed
 
 
+@pytest.mark.slow
 def test_restitution_is_independent_of_masses_speeds_and_materials() -> None:
     (count, bound) = re.findall(r"Over (\d+) impacts .*? less than ([\d.e-]+)\.", PAGE, re.DOTALL)[0]
     family = [key for equation, key in LAWS.items() if equation in ("(19)", "(22)", "(23)", "(28)")]

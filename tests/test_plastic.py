@@ -338,6 +338,7 @@ def ramp(**fields) -> ForceModel:
     )
 
 
+@pytest.mark.slow
 def test_no_step_crosses_a_breakpoint():
     depths = np.geomspace(0.01, 2.0, 40)
     impacts = table1_impacts(parameters={"C": 0.7, "d": depths})

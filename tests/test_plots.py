@@ -572,6 +572,7 @@ def test_plots_are_files_of_their_format(coarse: xr.Dataset, tmp_path: Path, for
     assert (tmp_path / f"by_matplotlib.{form}").read_bytes().startswith(magic)
 
 
+@pytest.mark.slow
 def test_threads_that_draw_at_the_same_time_make_the_pictures_of_a_single_one(figure6: xr.Dataset) -> None:
     # matplotlib's parser of formulas is shared by all threads
     def draw_and_save(kind: str) -> bytes:
@@ -655,6 +656,7 @@ def test_a_single_point_without_a_reference_is_drawn(tmp_path: Path) -> None:
 # options of the user
 
 
+@pytest.mark.slow
 def test_the_style_of_the_user_is_respected(coarse: xr.Dataset, tmp_path: Path) -> None:
     assert impact.plot(coarse).axes[0].xaxis.label.get_fontsize() == 9.0
     with matplotlib.rc_context({"font.size": 13.0, "axes.grid": True, "figure.figsize": (5.0, 4.0)}):
@@ -707,6 +709,7 @@ def test_a_floor_of_errors_is_named_where_smaller_ones_are_drawn_at_it(coarse: x
     assert floors(coarse.assign(e_error=coarse["e_error"] + 0.01)) == []
 
 
+@pytest.mark.slow
 def test_labels_titles_and_sizes_are_chosen(coarse: xr.Dataset) -> None:
     labels = {"e": "Restitution $e$", "gharib-hurmuzlu-2012": "G & H", "reference": "Exact", "title": "Mine"}
     figure = impact.plot(coarse, labels=labels, width="84mm", height="60mm")
@@ -959,6 +962,7 @@ def test_a_parquet_table_equals_the_csv_table(forked: ForkServer, coarse_file: P
     np.testing.assert_array_equal(rows.to_numpy(), columns.to_numpy())
 
 
+@pytest.mark.slow
 def test_an_existing_plot_is_replaced_on_request_only(cli: Run, coarse_file: Path, tmp_path: Path) -> None:
     (tmp_path / "a.svg").write_text("mine")
     (tmp_path / "a.csv").write_text("mine")

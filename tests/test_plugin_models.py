@@ -70,6 +70,7 @@ def test_the_commands_of_the_page(cli: Run, folder: Path) -> None:
     assert (folder / "results.png").exists()
 
 
+@pytest.mark.slow
 def test_the_law_of_a_ramped_dashpot_meets_the_contract(cli: Run, folder: Path) -> None:
     done = cli("models", "--check", "ramped.py", "--json", cwd=folder)
     (report,) = json.loads(done.stdout)
@@ -188,6 +189,7 @@ def with_package(forked: ForkServer) -> Callable[..., CompletedCommand]:
     return run
 
 
+@pytest.mark.slow
 def test_the_laws_of_an_installed_package_are_in_the_catalogue(
     cli: Run, with_package: Callable[..., CompletedCommand], tmp_path: Path
 ) -> None:

@@ -132,6 +132,7 @@ def test_a_plug_in_imports_no_file_beside_it(forked: ForkServer, folder: Path) -
     assert (done.returncode, done.stderr) == (2, "code/my.py:1: ModuleNotFoundError: No module named 'beside'\n")
 
 
+@pytest.mark.slow
 def test_a_sweep_is_repeated_only_if_its_plug_in_changed(forked: ForkServer, folder: Path) -> None:
     words = ["sweep", "config.toml", "--plugin", "my_model.py"]
     forked(*words, cwd=folder)
@@ -314,6 +315,7 @@ def test_an_invalid_attribute_is_reported_in_one_line(attribute: str) -> None:
             check_plugins(attributes, Plugins(), "r.h5")
 
 
+@pytest.mark.slow
 def test_hostile_names_in_a_result_are_escaped(forked: ForkServer, folder: Path) -> None:
     result = impact.sweep(folder / "config.toml", overrides=['models="hertz"'])
     bad = "\x1b[31m\u202e\n[red]" + "x" * 5000
@@ -330,6 +332,7 @@ def test_hostile_names_in_a_result_are_escaped(forked: ForkServer, folder: Path)
         assert len(done.stderr) < 600
 
 
+@pytest.mark.slow
 def test_nothing_that_a_data_file_names_is_imported(
     forked: ForkServer, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -432,6 +435,7 @@ def test_every_process_computes_the_same_hash_of_a_python_value(scripts: tuple[P
     assert first == second
 
 
+@pytest.mark.slow
 def test_a_value_without_a_file_never_counts_as_the_same_model(folder: Path) -> None:
     def law(factor: float) -> impact.ForceModel:
         return impact.hysteresis(

@@ -227,6 +227,7 @@ def test_a_selected_value_is_a_number_of_any_library(result: xr.Dataset) -> None
     assert len(set(titles)) == 1
 
 
+@pytest.mark.slow
 def test_an_extension_takes_values_by_path(tmp_path: Path) -> None:
     impact.sweep(BASE, output=tmp_path / "r.h5")
     extended = impact.extend(tmp_path / "r.h5", {"sweep.e": np.array([0.25, 0.5, 0.75])})

@@ -264,6 +264,7 @@ def test_a_single_impact_is_ranked() -> None:
     assert ranking.models[0].served is None
 
 
+@pytest.mark.slow
 def test_the_headline_names_the_best_models_or_the_nearest(cli: Run, fair_and_exact_file: Path) -> None:
     path = fair_and_exact_file
 

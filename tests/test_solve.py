@@ -42,6 +42,7 @@ def test_the_damping_ratio_of_a_linear_contact_depends_on_no_speed(speed: float)
     assert again.values["e_out"] == pytest.approx(0.6, abs=1e-10)
 
 
+@pytest.mark.slow
 def test_a_root_agrees_with_the_closed_form_of_the_linear_dashpot() -> None:
     (root,) = impact.solve("kelvin-voigt", "C", {"e_out": 0.6}, at={"m1": 1.0, "m2": 1.0}).roots
     stiffness = impact.run(model="kelvin-voigt", overrides=[f"model.kelvin-voigt.C={root.value!r}"]).values[
@@ -67,6 +68,7 @@ def test_an_unreachable_target_has_no_root_and_names_the_range() -> None:
     assert result.attainable == pytest.approx((0.0, 0.593624), abs=1e-6)
 
 
+@pytest.mark.slow
 def test_a_target_at_the_end_of_the_allowed_values_is_a_bound() -> None:
     result = impact.solve("tsuji-1992", "e", {"e_out": 1.0})
     assert (result.status, result.roots[0].value) == ("at_bound", 1.0)
@@ -289,6 +291,7 @@ def test_restitution_of_glass_beads_at_a_given_damping() -> None:
     assert impact.sweep(config)["e_out"].values[0] == pytest.approx([0.6939, 0.5635, 0.4908], abs=1e-4)
 
 
+@pytest.mark.slow
 def test_json_of_the_command(cli: Run) -> None:
     words = ("--model", "mujoco-solref", "--for", "dampratio", "--target", "e_out=0.6", "--at", "v1=1", "--json")
     printed = json.loads(cli("solve", *words).stdout)

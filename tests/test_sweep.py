@@ -70,6 +70,7 @@ def blocks(tmp_path: Path) -> Path:
 # ---- dry run
 
 
+@pytest.mark.slow
 def test_a_dry_run_prints_counts_size_and_time_and_writes_nothing(cli: Run, blocks: Path) -> None:
     completed = cli("sweep", blocks, "--dry-run", cwd=blocks.parent)
     assert (completed.returncode, completed.stderr) == (0, "")
@@ -216,6 +217,7 @@ def test_the_rate_of_a_resumed_sweep_counts_this_run_only_and_is_not_extrapolate
 # ---- failed points and finished files
 
 
+@pytest.mark.slow
 def test_a_failed_point_is_reported_with_the_command_that_repeats_it(cli: Run, tmp_path: Path) -> None:
     text = WIDE.replace("e = [0.2, 0.6, 1.0]", "alpha = [0.1, 0.3, 0.5]").replace('"bilinear", ', "")
     (tmp_path / "wide.toml").write_text(f"{text}[solver]\nrtol = 1e-4\n", encoding="utf-8")
@@ -300,6 +302,7 @@ def test_any_executor_integrates(blocks: Path) -> None:
         impact.sweep(blocks, jobs=2, executor=threads)
 
 
+@pytest.mark.slow
 def test_an_executor_gets_no_more_blocks_than_its_capacity(blocks: Path) -> None:
     unfinished, largest = set[Future[object]](), 0
 
@@ -472,6 +475,7 @@ def test_too_many_and_too_large_chunks_are_refused(blocks: Path) -> None:
         read_plan(blocks, ["output.chunks.m1=1", "sweep.v1={linspace=[1,2,250]}"])
 
 
+@pytest.mark.slow
 def test_a_file_with_a_high_compression_ratio_can_be_read(tmp_path: Path) -> None:
     config = {
         "models": ["hertz"],

@@ -59,6 +59,7 @@ def test_digits_are_significant_and_all_without_a_choice() -> None:
     assert "\n0.333333 \\\\" in encode_frame(frame, ".tex").decode()
 
 
+@pytest.mark.slow
 def test_a_table_with_decimal_commas_is_read_again(stored: Path, cli: Run, tmp_path: Path) -> None:
     words = ["--model", "gharib-hurmuzlu-2012", "--kind", "restitution", "-o", "a.png", "--data", "a.csv"]
     done = cli("plot", stored, *words, "--decimal", "comma", "--rows", "11", cwd=tmp_path)
@@ -134,6 +135,7 @@ def test_a_column_without_numbers_is_text() -> None:
     assert encode_frame(frame, ".tex").decode().startswith("\\begin{tabular}{lS[table-format=-1.0]}\n")
 
 
+@pytest.mark.slow
 def test_a_ranking_and_steps_are_tables_of_latex_and_csv(stored: Path, cli: Run, tmp_path: Path) -> None:
     done = cli("recommend", stored, "-o", "r.tex", cwd=tmp_path)
     assert (done.returncode, done.stderr) == (0, "r.tex: written\n")

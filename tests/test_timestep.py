@@ -122,6 +122,7 @@ def test_a_law_without_an_e_has_none_to_ask_for(cli: Run) -> None:
     assert (printed["e"], printed["rows"][0]["e_to_ask"], printed["needed"]) == (None, None, None)
 
 
+@pytest.mark.slow
 def test_json_of_the_command(cli: Run) -> None:
     words = ("--steps-per-contact", "20", "--dt", "1e-6", "--phases", "8", "--tol", "5%", "--json")
     printed = json.loads(cli("timestep", "--model", LINEAR, "--at", "e=0.5", *words).stdout)

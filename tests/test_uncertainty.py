@@ -211,6 +211,7 @@ def test_inputs_that_change_nothing_are_named_and_few_samples_are_noted(cli: Run
     assert row.startswith("sweep.e ")
 
 
+@pytest.mark.slow
 def test_several_outputs_of_one_run_have_the_studies_of_each(cli: Run, tmp_path: Path) -> None:
     (tmp_path / "c.toml").write_text(TEXT)
     changes = ["sweep.e=0.6", "models='kuwabara-kono-1987'", "model.kuwabara-kono-1987.A=5e-4", "design.n=16"]
@@ -446,6 +447,7 @@ def test_distributions_and_the_table_design_need_each_other(tmp_path: Path) -> N
         impact.sensitivity(path, of="peakforce")
 
 
+@pytest.mark.slow
 def test_failed_samples_are_counted_and_not_averaged(cli: Run, tmp_path: Path) -> None:
     """A speed of mean and deviation 0.05 is negative for a sixth of the samples, where the balls do not meet."""
     (tmp_path / "c.toml").write_text(TEXT)

@@ -158,16 +158,28 @@ def _check_clauses(model: ForceModel) -> Iterator[ClauseResult]:
     """Check every clause of the contract with the forty impacts of `sample`."""
     reported: set[str] = set()
 
-    def collided(impacts: Impacts, rtol: float = CONTRACT_RTOL) -> Outputs:
+    def collided(*batches: Impacts, rtol: float = CONTRACT_RTOL) -> list[Outputs]:
+        """Collide batches of the same size together: a step of many takes no longer than one of few."""
         errors: dict[str, str] = {}
-        values = collide(model, impacts, rtol=rtol, max_steps=CONTRACT_MAX_STEPS, errors=errors)
+        joined = Impacts.joined(batches)
+        values = collide(model, joined, rtol=rtol, max_steps=CONTRACT_MAX_STEPS, errors=errors)
         for error in errors.keys() - reported:
             warn(errors[error])
         reported.update(errors)
-        return values
+        # an output that is the same for all impacts has length one
+        columns = {name: np.broadcast_to(column, joined.shape) for name, column in values.items()}
+        parts = {name: np.split(column, len(batches)) for name, column in columns.items()}
+        return [{name: part[number] for name, part in parts.items()} for number in range(len(batches))]
 
     impacts = sample(model)
-    base = collided(impacts)
+    swapped = replace(
+        impacts,
+        v1=-impacts.v2,
+        v2=-impacts.v1,
+        **{f"{name}1": getattr(impacts, f"{name}2") for name in PROPERTIES_OF_A_BALL},
+        **{f"{name}2": getattr(impacts, f"{name}1") for name in PROPERTIES_OF_A_BALL},
+    )
+    base, exchanged, elastic = collided(impacts, swapped, replace(impacts, e=np.ones(len(impacts))))
     ended = base["status"] < FIRST_FAILURE
     yield ClauseResult("every impact ends", float(np.count_nonzero(~ended)), 0)
 
@@ -194,26 +206,20 @@ def _check_clauses(model: ForceModel) -> Iterator[ClauseResult]:
     if model.oracle is not None:
         yield ClauseResult(CLOSED_FORM, worst(base["closed_form_error"]), 10 * CONTRACT_RTOL)
 
-    other = collided(in_other_units(model, impacts))
+    # not together with the others: a law that remembers earlier calls breaks this clause
+    (in_feet,) = collided(in_other_units(model, impacts))
     yield ClauseResult(
-        "a change of units changes nothing", worst(other["e_out"] - base["e_out"]), 10 * CONTRACT_RTOL
+        "a change of units changes nothing", worst(in_feet["e_out"] - base["e_out"]), 10 * CONTRACT_RTOL
     )
-    swapped = replace(
-        impacts,
-        v1=-impacts.v2,
-        v2=-impacts.v1,
-        **{f"{name}1": getattr(impacts, f"{name}2") for name in PROPERTIES_OF_A_BALL},
-        **{f"{name}2": getattr(impacts, f"{name}1") for name in PROPERTIES_OF_A_BALL},
-    )
-    other = collided(swapped)
     yield ClauseResult(
-        "swapped balls swap velocities", worst((other["v1_post"] + base["v2_post"]) / impacts.v0), ROUNDING_ERROR
+        "swapped balls swap velocities",
+        worst((exchanged["v1_post"] + base["v2_post"]) / impacts.v0),
+        ROUNDING_ERROR,
     )
-    elastic = collided(replace(impacts, e=np.ones(len(impacts))))
     # the parameters of a law may damp it to its limit at any e
     odd = elastic["status"] != Status.OK if "e" in model.quantities else elastic["status"] >= FIRST_FAILURE
     yield ClauseResult("at e = 1 the status is OK", float(np.count_nonzero(odd)), 0)
-    tight = collided(impacts, CONTRACT_RTOL / 100)
+    (tight,) = collided(impacts, rtol=CONTRACT_RTOL / 100)
     yield ClauseResult(
         "a tighter tolerance moves nothing", worst(tight["e_out"] - base["e_out"]), 10 * CONTRACT_RTOL
     )
@@ -236,14 +242,10 @@ def in_other_units(model: ForceModel, impacts: Impacts) -> Impacts:
     return Impacts(**arrays, parameters={name: changed(name, value) for name, value in impacts.parameters.items()})
 
 
-def _alone_differs(collided: Callable[[Impacts], Outputs], impacts: Impacts, base: Outputs) -> int:
+def _alone_differs(collided: Callable[[Impacts], list[Outputs]], impacts: Impacts, base: Outputs) -> int:
     """Count the impacts that have other bits when they are integrated alone."""
     differ = 0
-    for index in range(0, len(impacts), 7):
-        alone = collided(impacts[np.array([index])])
-        # an output that is the same for all impacts has length one
-        differ += any(
-            np.broadcast_to(base[name], impacts.shape)[[index]].tobytes() != alone[name].tobytes()
-            for name in CENTRAL_OUTPUTS
-        )
+    for index in range(0, len(impacts), 13):
+        (alone,) = collided(impacts[np.array([index])])
+        differ += any(base[name][[index]].tobytes() != alone[name].tobytes() for name in CENTRAL_OUTPUTS)
     return differ

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 
@@ -63,6 +63,15 @@ class Impacts:
     def __getitem__(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> Impacts:
         arrays = {name: getattr(self, name)[chosen] for name in INPUTS}
         return Impacts(**arrays, parameters={name: a[chosen] for name, a in self.parameters.items()})
+
+    @classmethod
+    def joined(cls, batches: Sequence[Impacts]) -> Impacts:
+        """Make one batch of several by the same law."""
+        arrays = {name: np.concatenate([getattr(batch, name) for batch in batches]) for name in INPUTS}
+        parameters = {
+            name: np.concatenate([batch.parameters[name] for batch in batches]) for name in batches[0].parameters
+        }
+        return cls(**arrays, parameters=parameters)
 
     def broadcast(self, shape: tuple[int, ...] | None = None) -> Impacts:
         """Give every field a shape, by default that of all of them."""
