@@ -152,7 +152,7 @@ def calls_of_results(folder: Path) -> dict[str, Call]:
     return {
         "`plot`": lambda result: impact.plot(result).axes[0].lines[-1].get_ydata(),
         "`recommend`": lambda result: impact.recommend(result)[0].max_error,
-        "`report`": lambda result: len(impact.report(result)) > 0,
+        "`report`": lambda result: len(impact.report(result, sections=["answer"])) > 0,
         "`page`": lambda result: len(impact.page(result)) > 0,
         "`info`": lambda result: impact.info(result).as_dict()["points"],
         "`compare`": lambda result: impact.compare(result, path).equal,

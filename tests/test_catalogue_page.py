@@ -55,7 +55,9 @@ LAYOUT = """
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The pages of the catalogue and of the laws, as the site has them."""
+    """The pages of the catalogue and of the laws, as the site has them: of a site built before, or built here."""
+    if "BUILT_SITE" in os.environ:
+        return ROOT / os.environ["BUILT_SITE"]
     builder = SITE_VENV / "bin" / "sphinx-build"
     if not builder.exists():
         pytest.skip(f"no {builder}: `make site` makes it; how the catalogue acts in a browser is not tested")

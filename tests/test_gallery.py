@@ -31,7 +31,7 @@ def test_the_page_has_every_kind() -> None:
 # one test, so that the results are made once
 @pytest.mark.slow
 def test_the_values_of_the_plots_are_fresh(cli: Run, tmp_path: Path) -> None:
-    gallery.write_results(tmp_path)
+    gallery.write_results(tmp_path, cli)
     stored = json.loads(NUMBERS.read_text(encoding="utf-8"))
     for entry in gallery.ENTRIES:
         data = f"{entry.kind}.csv"
