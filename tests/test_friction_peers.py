@@ -28,6 +28,7 @@ ANGLES, MUS, SPINS, STEPS, PHASES = (
     (12, 31, 1000),
     (0.125, 0.625),
 )
+# of codes that Python calls for each step
 STEPS_OF_PYTHON = (12, 31, 200)
 BALL: Values = {"v1": 1.0, "m1": 0.01, "R1": 0.05}
 MATERIAL = {"E": 1e9, "nu": 0.3, "rho": 1000.0}

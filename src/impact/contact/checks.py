@@ -245,7 +245,7 @@ def in_other_units(model: ForceModel, impacts: Impacts) -> Impacts:
 def _alone_differs(collided: Callable[[Impacts], list[Outputs]], impacts: Impacts, base: Outputs) -> int:
     """Count the impacts that have other bits when they are integrated alone."""
     differ = 0
-    for index in range(0, len(impacts), 13):
+    for index in range(0, len(impacts), 7):
         (alone,) = collided(impacts[np.array([index])])
         differ += any(base[name][[index]].tobytes() != alone[name].tobytes() for name in CENTRAL_OUTPUTS)
     return differ

@@ -56,8 +56,9 @@ ZERO_SPEED = 1e-10
 BOUND_EXPONENTS = (1.0, 1.25, 1.5, 2.0)
 BOUND_RATES = np.geomspace(1e-4, 1e4, 65)
 BOUND_INDENTATIONS = 10.0 ** -np.linspace(0.0, 40.0, 81)
-# rows that are written to, and the force at components y with params
+# rows of rates that are written to
 Rows = Array | Sequence[Any]
+# (components, params) -> force
 Force = Callable[[Array, Params], Array]
 # trajectories checked together in `never_separates`
 MAX_BOUND_BATCH = 4096
@@ -280,12 +281,12 @@ def rates_writer(law: MotionLaw, *, unloads: bool = False) -> Callable[[Rows, Ar
 
     The last rows may be missing, and that of W may be None.
     """
-    p, move = law.model.coordinate_power, _formula_of_motion(law, unloads)
+    p, evaluate = law.model.coordinate_power, _formula_of_motion(law, unloads)
     # as an array: NumPy converts a number on every call
     power_factor = np.array(float(p))
 
     def write(rows: Rows, y: Array, params: Params) -> None:
-        v, elastic, force = move(y, params)
+        v, elastic, force = evaluate(y, params)
         n_rows, strength = len(rows), law.strength(params)
         weight = np.multiply(integer_power(y[0], p - 1), power_factor, rows[2] if n_rows > 2 else None)
         np.copyto(rows[0], v)
@@ -302,10 +303,10 @@ def rates_writer(law: MotionLaw, *, unloads: bool = False) -> Callable[[Rows, Ar
 
 def force_of(law: MotionLaw, *, unloads: bool = False) -> Force:
     """Make the function of components and params that computes the force of a phase alone."""
-    move = _formula_of_motion(law, unloads)
+    evaluate = _formula_of_motion(law, unloads)
 
     def force(y: Array, params: Params) -> Array:
-        return law.coordinate.force(y, move(y, params)[2], law.strength(params))
+        return law.coordinate.force(y, evaluate(y, params)[2], law.strength(params))
 
     return force
 
@@ -318,14 +319,14 @@ def _formula_of_motion(
     formula, extra = branch or law.model.force, UNLOADING_PARAMS if branch else ()
     names, n_law_params = {*argument_names(formula)}, len(law.names)
 
-    def move(y: Array, params: Params) -> tuple[Array, Array | None, Array]:
+    def evaluate(y: Array, params: Params) -> tuple[Array, Array | None, Array]:
         arguments = _formula_arguments(law, names, extra, y, params)
         force = law.call(formula, params[:n_law_params], arguments)
         if force.shape != y[0].shape and force.shape != ():
             raise ModelError(f"{law.model.key}: the force has shape {force.shape}, expected {y[0].shape}")
         return arguments["v"], arguments.get("elastic"), force
 
-    return move
+    return evaluate
 
 
 # ---- damping so strong that the balls separate at zero speed, or never

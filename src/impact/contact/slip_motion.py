@@ -339,7 +339,7 @@ class SlipPhase:
         form, columns, n = self.form, self.columns(params), y.shape[1]
         rows = form.quadratures
         out = np.empty((TIME_ROW + len(rows) + 1, n)) if out is None else out
-        # the joint rates that are missing in `out` are needed here
+        # the rates need both, also where `out` has no rows for them
         weight = out[TIME_ROW] if len(out) > TIME_ROW else np.empty(n)
         force = out[-1] if len(out) > TIME_ROW + len(rows) else np.empty(n)
         self._write_normal((out[0], out[1], weight, None, force), y[:2], params)
