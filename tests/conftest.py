@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 import xarray as xr
+from filelock import FileLock
 from hypothesis import settings
 
 import impact
@@ -260,6 +261,16 @@ def cli(request: pytest.FixtureRequest) -> Run:
         )
 
     return run
+
+
+def make_once(factory: pytest.TempPathFactory, name: str, make: Callable[[], str]) -> str:
+    """Return a text that takes seconds to make, which the processes of a pool share as a file."""
+    folder = factory.getbasetemp()
+    path = (folder.parent if "PYTEST_XDIST_WORKER" in os.environ else folder) / name
+    with FileLock(f"{path}.lock"):
+        if not path.exists():
+            path.write_text(make(), encoding="utf-8")
+        return path.read_text(encoding="utf-8")
 
 
 @pytest.fixture(scope="session")

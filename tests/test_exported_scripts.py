@@ -99,13 +99,21 @@ def code_and_version(name: str, key: str) -> tuple[Code, str, str]:
     """A code, the program that runs its scripts, and its version; skips the test where it has no such law."""
     code = CODES[name]
     try:
-        assert code.program is not None
-        program, version = choose_version(code, PROGRAMS.get(code.program.name), None, verify=True)
+        program, version = program_and_version(name)
         law_of_code(code, key, version)
     except UsageError as error:
         pytest.skip(str(error))
-    assert program is not None
     return code, program, version
+
+
+@cache
+def program_and_version(name: str) -> tuple[str, str]:
+    """A program is asked for its version once: many take as long to say it as to run a script."""
+    code = CODES[name]
+    assert code.program is not None
+    program, version = choose_version(code, PROGRAMS.get(code.program.name), None, verify=True)
+    assert program is not None
+    return program, version
 
 
 def with_wall(collision: Values) -> Values:

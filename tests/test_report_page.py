@@ -31,7 +31,7 @@ from impact.plots.kinds import KINDS, find_kind
 from impact.results.ranking import recommend
 from impact.results.replay_command import describe_point
 
-from .conftest import ROOT, Run
+from .conftest import ROOT, Run, make_once
 
 # whole pages, some of them in a browser: `make test-faults` runs them
 pytestmark = pytest.mark.slow
@@ -123,8 +123,14 @@ def many() -> xr.Dataset:
 
 
 @pytest.fixture(scope="session")
-def pages(figure6: xr.Dataset, wide: xr.Dataset, many: xr.Dataset) -> dict[str, str]:
-    return {"figure 6": build(figure6), "wide": build(wide), "many": build(many)}
+def pages(
+    tmp_path_factory: pytest.TempPathFactory, figure6: xr.Dataset, wide: xr.Dataset, many: xr.Dataset
+) -> dict[str, str]:
+    datasets = {"figure 6": figure6, "wide": wide, "many": many}
+    return {
+        name: make_once(tmp_path_factory, f"{name}.html", lambda dataset=dataset: build(dataset))
+        for name, dataset in datasets.items()
+    }
 
 
 def test_every_page_is_well_formed_and_has_its_sections_in_order(pages: dict[str, str]) -> None:
@@ -725,15 +731,22 @@ def measured(dumped: str) -> Iterator[dict[str, object]]:
     yield from json.loads(html.unescape(dumped.partition("<body>")[2].partition("</body>")[0]))
 
 
-@pytest.mark.parametrize(("scheme", "is_dark"), [("0", True), ("1", False)])
-def test_a_page_fits_a_phone_and_a_desktop(
-    browser: Browser, pages: dict[str, str], wide: xr.Dataset, scheme: str, is_dark: bool
-) -> None:
+@pytest.fixture(scope="session")
+def wide_texts(tmp_path_factory: pytest.TempPathFactory, wide: xr.Dataset) -> str:
+    """A page with words that are wider than a phone."""
     long = "w" * 500
     words = dict.fromkeys(("title", "config", "fingerprint", "reason", "impact_version"), long)
     about = {name: ("model", [long] * wide.sizes["model"]) for name in ("reference", "equation", "doi")}
+    dataset = wide.assign_attrs(words).assign_coords(about)
+    return make_once(tmp_path_factory, "wide texts.html", lambda: build(dataset))
+
+
+@pytest.mark.parametrize(("scheme", "is_dark"), [("0", True), ("1", False)])
+def test_a_page_fits_a_phone_and_a_desktop(
+    browser: Browser, pages: dict[str, str], wide_texts: str, scheme: str, is_dark: bool
+) -> None:
     failures = build(impact.load(ROOT / "tests" / "data" / "failures.h5"))
-    texts = [*pages.values(), failures, build(wide.assign_attrs(words).assign_coords(about))]
+    texts = [*pages.values(), failures, wide_texts]
     shown, _ = browser(framed(texts, WINDOWS), f"--blink-settings=preferredColorScheme={scheme}")
     windows = list(measured(shown))
     assert [window["window"] for window in windows] == len(texts) * list(WINDOWS)
