@@ -163,6 +163,7 @@ def test_a_stiffness_may_be_a_parameter_of_a_law() -> None:
     assert result.sel(model="hertz")["stiffness"].values.tolist() == [6e9, 6e9]
 
 
+@pytest.mark.slow
 def test_a_model_that_closes_over_values_is_never_the_same_as_another(tmp_path: Path) -> None:
     closed = [_mine(chi=lambda e, c=c: c * (1 - e)) for c in (1.0, 2.0)]
     partly = _mine(chi=functools.partial(lambda e, c: c * (1 - e), c=1.0))

@@ -86,12 +86,14 @@ def test_the_estimate_of_a_constant_is_the_mean() -> None:
     assert fit["upper"] == pytest.approx(0.5 + half, abs=1e-7)
 
 
+@pytest.mark.slow
 def test_one_point_more_than_parameters_is_enough_for_a_reduced_chi2() -> None:
     for values, expected in (([0.49, 0.51], 2.0), ([0.5], np.nan)):
         fit = impact.calibrate(LINEAR | {"data": {"columns": {"e_out": values}, "sigma": 0.01}, "solver": QUICK})
         assert fit["chi2_reduced"].item() == pytest.approx(expected, rel=1e-3, nan_ok=True)
 
 
+@pytest.mark.slow
 def test_measured_beads_have_the_statistics_that_their_authors_print() -> None:
     """Mean 0.8217, standard deviation 0.0155, and 0.0044 on both sides of the interval."""
     fit = impact.calibrate(FOLDER / "hdpe.toml", overrides=[ONE_LAW[1]]).sel(
@@ -137,6 +139,7 @@ ELASTIC: dict[str, Any] = {
 }
 
 
+@pytest.mark.slow
 def test_a_law_at_a_limit_of_the_physics_is_ranked_by_its_criterion(tmp_path: Path) -> None:
     """e = 1 is the end of the allowed values: the interval ends there, and the best config is of that law."""
     fit = impact.calibrate(ELASTIC, best=tmp_path / "best.toml")

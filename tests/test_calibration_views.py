@@ -44,6 +44,7 @@ def test_the_picture_has_measured_values_curves_bands_and_residuals(drops: xr.Da
     np.testing.assert_allclose(drawn.get_ydata(), expected)
 
 
+@pytest.mark.slow
 def test_the_axes_are_logarithmic_as_asked_or_as_the_input_is_spaced(drops: xr.Dataset) -> None:
     def scales(fit: xr.Dataset, **options: str) -> list[tuple[str, str]]:
         return [(axes.get_xscale(), axes.get_yscale()) for axes in impact.plot(fit, **options).axes]
@@ -62,6 +63,7 @@ def test_the_axes_are_logarithmic_as_asked_or_as_the_input_is_spaced(drops: xr.D
     assert scales(even, log="y") == [(linear, log), (linear, linear)]
 
 
+@pytest.mark.slow
 def test_without_a_varied_input_the_values_are_over_their_number() -> None:
     fit = impact.calibrate(FOLDER / "hdpe.toml", overrides=['models=["anagnostopoulos-1988"]', *QUICK])
     values, residuals = impact.plot(fit).axes
@@ -117,6 +119,7 @@ def test_a_calibration_has_one_kind_of_picture(drops: xr.Dataset, kind: str) -> 
         )
 
 
+@pytest.mark.slow
 def test_a_report_shows_the_picture(drops: xr.Dataset) -> None:
     page = impact.report(drops)
     assert "2 laws, 12 measured values, noise given" in page

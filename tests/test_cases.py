@@ -293,6 +293,7 @@ def test_a_failed_point_is_named_without_parameters_of_other_models(tmp_path: Pa
         assert failure["replay"].count("--at") == 2
 
 
+@pytest.mark.slow
 def test_a_ranking_takes_the_best_parameters_of_each_model(
     ten: tuple[Plan, xr.Dataset], results_alone: dict[str, xr.Dataset]
 ) -> None:

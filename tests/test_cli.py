@@ -669,6 +669,7 @@ def test_closed_streams_are_no_error(stored: Path) -> None:
         assert (done.returncode, done.stderr) == (0, ""), line
 
 
+@pytest.mark.slow
 def test_a_closed_pipe_is_no_error(forked: ForkServer, stored: Path, tmp_path: Path) -> None:
     with abandoned_pipe(tmp_path) as pipe:
         done = forked("plot", stored, "-o", tmp_path / "x.png", "--json", stdout=pipe)
@@ -731,6 +732,7 @@ sink._publish = signalled
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "code"), [("SIGINT", 130), ("SIGTERM", 143)])
 def test_a_signal_while_storing_is_not_lost(
     forked: ForkServer, small: Path, tmp_path: Path, name: str, code: int
@@ -806,6 +808,7 @@ def test_help_of_a_command_and_the_version(cli: Run) -> None:
     assert (wrong.returncode, wrong.stderr) == (2, cli("swep").stderr)
 
 
+@pytest.mark.slow
 def test_flags_are_shown_without_a_type(cli: Run) -> None:
     for words in (["--help"], ["sweep", "--help"], ["models", "--help"], ["help", "bless"]):
         assert "bool" not in cli(*words).stdout

@@ -176,6 +176,7 @@ def test_a_zip_group_is_matched_by_all_its_columns(wide: xr.Dataset) -> None:
     assert impact.compare(unzipped, wide, subset=True).equal
 
 
+@pytest.mark.slow
 def test_an_axis_of_length_one_equals_a_single_value(wide: xr.Dataset) -> None:
     for name, index in (("v1", 1), ("material2", 0), ("m1", 1), ("e", 2), ("model", 3)):
         axis, single = wide.isel({name: [index]}), wide.isel({name: index})

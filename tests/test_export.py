@@ -396,6 +396,7 @@ def test_the_export_to_kratos_says_what_its_friction_follows_from(friction: str 
         assert any(words in line for line in header) is (is_of_friction == bool(friction))
 
 
+@pytest.mark.slow
 def test_mujoco_gets_a_damping_ratio_and_a_constant_impedance() -> None:
     export = impact.export("mujoco", at={"e": 0.6})
     timeconst, dampratio = map(float, str(export.parameters["solref"]).split())
@@ -452,6 +453,7 @@ def test_what_is_delivered_at_dt_is_that_of_timestep() -> None:
     assert export.at_dt.as_dict(False) == row.as_dict(False)
 
 
+@pytest.mark.slow
 def test_an_unstable_step_delivers_no_restitution(cli: Run) -> None:
     """The scheme then gives an e of thousands."""
     done = cli("export", "--to", "lammps", "--at", "e=0.6", "--dt", "0.1", "--code-version", "22Jul2025")
@@ -486,6 +488,7 @@ def test_the_default_step_is_a_fiftieth_of_the_contact_time(cli: Run) -> None:
     assert data["e_at_dt"]["dt"] == pytest.approx(data["contact_time"] / 50)
 
 
+@pytest.mark.slow
 def test_the_output_is_a_file_that_is_not_replaced_silently(cli: Run, tmp_path: Path) -> None:
     words = ("export", "--to", "lammps", "--script", "-o", tmp_path / "in.balls")
     first = cli(*words)
@@ -714,6 +717,7 @@ def test_verify_exits_with_0_for_the_predicted_restitutions_and_with_1_for_other
     assert [row.split()[-1] for row in (first, second, third, fourth)] == ["0", "0", "1e-08", "0"]
 
 
+@pytest.mark.slow
 def test_without_slip_the_header_has_no_beta() -> None:
     export = impact.export("newton", friction="coulomb-1785", at={"e": 0.6, "mu": 0.2, "angle": 0.0})
     assert "friction: coulomb-1785, no beta without slip" in export.header
@@ -1132,6 +1136,7 @@ def test_scripts_have_solid_balls() -> None:
                       code_version="3.8.0", script=True)  # fmt: skip
 
 
+@pytest.mark.slow
 def test_friction_that_a_code_does_not_have_is_refused_or_left_out_with_a_warning() -> None:
     at = {**OBLIQUE, "K": 1e7}
     with pytest.raises(

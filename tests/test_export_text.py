@@ -271,6 +271,7 @@ def test_the_header_says_which_damping_was_solved_for() -> None:
     assert f"C = {export.solved['C']!r} gives the e that is wanted" in export.header
 
 
+@pytest.mark.slow
 def test_the_header_says_what_the_step_delivers_and_recommends_no_longer_one_than_needed() -> None:
     balls = {"K": 1e8, "m1": 0.1, "m2": 0.1, "R1": 0.01, "R2": 0.01, "v1": 1.0, "e": 0.8}
     source = {

@@ -236,6 +236,7 @@ def test_an_extension_does_not_change_a_material(stored_sweep: StoredSweep, chan
     assert_refused(stored_sweep(DASHPOT), overrides, expected)
 
 
+@pytest.mark.slow
 def test_an_extension_does_not_change_a_law_of_the_user(tmp_path: Path) -> None:
     laws = [impact.hysteresis(**MINE, chi=chi) for chi in (lambda e: 1 - e, lambda e: 2 - 2 * e)]
     impact.sweep_to_file({"models": "mine-2026", "sweep": BALLS}, tmp_path / "r.h5", plugins=laws[:1])

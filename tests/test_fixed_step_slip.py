@@ -320,6 +320,7 @@ def test_a_scheme_refuses_friction_of_which_no_code_was_run(scheme: str, frictio
         sweep(models.get(scheme, "kelvin-voigt-no-tension"), friction, {}, HOOKE | STEP, scheme)
 
 
+@pytest.mark.slow
 def test_timestep_has_the_tangential_restitution_of_a_sweep_over_the_phases() -> None:
     inputs = {**HOOKE, "v1": 1.0, "mu": 0.3, "angle": "45 deg", "friction.cundall-strack-1979.k_t": 3e5}
     friction = "cundall-strack-1979"

@@ -79,6 +79,7 @@ def test_a_jump_of_a_law_is_not_smoothed() -> None:
     np.testing.assert_allclose(computed, expected, rtol=0, atol=1e-10)
 
 
+@pytest.mark.slow
 def test_values_do_not_depend_on_what_was_asked_for_before() -> None:
     model, values = find("kuwabara-kono-1987"), np.geomspace(1e-3, 2.0, 30)
     once, compute = delivered(model, "A", values, 1.5, compute=interpolated(model)), interpolated(model)

@@ -250,6 +250,7 @@ def test_the_figures_of_a_report_are_at_a_point_that_did_not_fail(big: tuple[xr.
         assert BIG["m1"][7_000] <= choice.sel["m1"] <= BIG["m1"][last]
 
 
+@pytest.mark.slow
 def test_a_lazy_e_over_many_axes_is_read_only_at_the_different_points(
     small: xr.Dataset, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -437,6 +437,7 @@ def test_a_map_of_many_points_is_stored_as_an_image(many: xr.Dataset, tmp_path: 
         assert (tmp_path / f"large.{form}").stat().st_size < 400_000
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("legend", ["full", "short", "keys"])
 def test_names_above_panels_have_two_lines_within_them_and_letters_of_one_size(legend: str) -> None:
     sweep = {"v1": [1.0, 2.0], "e": [0.5, 0.9], "m1": 1.0, "m2": 1.0, "K": 6e9}

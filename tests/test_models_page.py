@@ -150,6 +150,7 @@ def test_the_examples_of_docstrings() -> None:
     assert all(doctest.testmod(module).failed == 0 for module in (models_page, models_tables))
 
 
+@pytest.mark.slow
 def test_what_the_catalogue_is_filtered_by_follows_from_the_laws() -> None:
     adhesive = {model.key for model in models_restitution.distinct_models() if law_properties.is_adhesive(model)}
     assert adhesive == {"luding-2008", "jkr-1971", "liggghts-edinburgh"}

@@ -485,6 +485,7 @@ def test_each_pair_has_a_study_and_one_without_meaning_has_not_failed() -> None:
     assert "0 sticks" not in figure.texts[0].get_text()
 
 
+@pytest.mark.slow
 def test_an_uncertain_angle_is_described_in_degrees() -> None:
     source = config(frictions="coulomb-1785", friction={}, design={"n": 2})
     for angle, text in (

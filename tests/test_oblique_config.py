@@ -295,6 +295,7 @@ def test_a_speed_and_an_angle_give_both_velocities() -> None:
     assert result["u1_post"].values.ravel() == pytest.approx([0.0, 1.5 * math.sqrt(3.0)], rel=1e-15, abs=0.0)
 
 
+@pytest.mark.slow
 def test_parameters_of_friction_laws_are_axes_as_those_of_models_are() -> None:
     law = "cundall-strack-1979"
     sweep = {"e": 1.0, "m1": 1.0, "m2": 1.0, "K": 1e6, "n": 1.0, "v1": 1.0, "u1": 1.0, "mu": 0.3}

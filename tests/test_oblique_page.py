@@ -28,6 +28,7 @@ def one_ball(models: list[str], friction: str, parameters: dict[str, float], **s
     return impact.sweep(config | ({"friction": {friction: parameters}} if parameters else {})).squeeze("friction")
 
 
+@pytest.mark.slow
 def test_the_config_of_the_page_has_all_points() -> None:
     (toml,) = code_blocks((ROOT / "docs" / "oblique.md").read_text(encoding="utf-8"), "toml")
     result = impact.sweep(tomllib.loads(toml))

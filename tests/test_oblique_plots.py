@@ -291,6 +291,7 @@ def test_more_pairs_than_can_be_told_apart_are_drawn_on_request(beads: xr.Datase
     assert len(of_pairs(curves_of(many, "beta", frictions=[COULOMB, MINDLIN]))) == 10
 
 
+@pytest.mark.slow
 def test_slips_are_those_of_maw_barber_and_fawcett() -> None:
     names = ["beta", "psi1", "psi2"]
     slips = sweep(
@@ -369,6 +370,7 @@ def test_other_pictures_do_not_depend_on_friction(beads: xr.Dataset) -> None:
     assert [panel.key for panel in plane.panels] == list(MODELS)
 
 
+@pytest.mark.slow
 def test_a_map_of_friction_has_a_panel_for_each_pair(beads: xr.Dataset) -> None:
     plane = get_plot_data(beads, "map", Choice(variable="beta", models=[TSUJI], frictions=[COULOMB, MINDLIN]))
     assert isinstance(plane, MapData)

@@ -119,6 +119,7 @@ def test_a_million_points_need_a_trajectory_for_each_scaled_slip() -> None:
     }
 
 
+@pytest.mark.slow
 def test_slips_of_both_directions_and_by_any_input_share_a_trajectory() -> None:
     # slips by spin, in units of R1 times 40 rad/s, over mu: 0, 1, 2, 4 and 0, 1/2, 1, 2
     source = oblique(v1=1.0, omega1=[-40.0, 0.0, 40.0, 80.0, -160.0], omega2=0.0, mu=[0.25, 0.5])
@@ -143,6 +144,7 @@ def test_angle_mu_and_spin_over_one_speed_need_one_normal_trajectory() -> None:
     }
 
 
+@pytest.mark.slow
 def test_a_law_that_depends_on_the_speed_has_a_trajectory_for_each_angle_of_a_resultant() -> None:
     source = oblique(speed=2.0, angle={"linspace": ["10 deg", "60 deg", 6]}, mu=[0.1, 0.2, 0.3])
     source |= {"models": ["kuwabara-kono-1987"], "model": {"kuwabara-kono-1987": {"A": 1e-6}}}

@@ -71,6 +71,7 @@ def sweep_with_notes(text: str, path: Path, *overrides: str) -> tuple[list[str],
     return [*notes, *result_notes(outcome.summary)], outcome.summary.points
 
 
+@pytest.mark.slow
 def test_the_command_prints_notes_unless_it_is_quiet(cli: Run, tmp_path: Path) -> None:
     (tmp_path / "config.toml").write_text(SWEEP, encoding="utf-8")
     words = ("sweep", "config.toml", "--set", "materials.steel.E=2.1e14", "--set", "sweep.v1=-1", "--overwrite")
@@ -125,6 +126,7 @@ def test_the_configs_of_the_project_give_no_note(tmp_path: Path) -> None:
         assert sweep_with_notes(text, tmp_path / f"{config.stem}.h5", "solver.rtol=1e-4")[0] == []
 
 
+@pytest.mark.slow
 def test_the_report_has_the_notes() -> None:
     sweep = {"e": [0.2, 0.8], "v1": -1.0, "m1": 1.0, "m2": 2.0, "material": "steel"}
     materials = {"steel": {"E": 210.0, "nu": 0.3, "rho": 7850.0}}

@@ -976,6 +976,7 @@ def test_an_existing_plot_is_replaced_on_request_only(cli: Run, coarse_file: Pat
     assert (tmp_path / "a.csv").read_text("utf-8").startswith("e,")
 
 
+@pytest.mark.slow
 def test_kinds_that_do_not_apply_are_reported_and_others_drawn(
     cli: Run, coarse_file: Path, tmp_path: Path
 ) -> None:

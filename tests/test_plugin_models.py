@@ -112,6 +112,7 @@ REASONS = [
 ]
 
 
+@pytest.mark.slow
 def test_the_check_of_a_law_that_raises_gives_the_line_and_the_text(cli: Run, tmp_path: Path) -> None:
     path = tmp_path / "raising.py"
     path.write_text(RAISING, encoding="utf-8")

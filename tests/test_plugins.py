@@ -272,6 +272,7 @@ def test_a_run_of_a_result_needs_the_plug_in_of_the_sweep(forked: ForkServer, fo
     assert json.loads(changed.stdout)["outputs"]["e_out"] != float(stored["e_out"])
 
 
+@pytest.mark.slow
 def test_a_run_of_a_result_needs_the_python_value_of_the_sweep(forked: ForkServer, folder: Path) -> None:
     path = folder / "results.h5"
     impact.save(impact.sweep(folder / "config.toml", plugins=[_value()]), path)

@@ -332,6 +332,7 @@ def test_the_text_of_a_result_has_100_columns() -> None:
         assert 90 < max(map(cell_len, text.splitlines())) <= 100
 
 
+@pytest.mark.slow
 def test_a_result_at_a_prompt_is_its_text(result: xr.Dataset) -> None:
     results = impact.run(model="hertz"), impact.recommend(result), impact.compare(result, result)
     described = impact.cite("hertz"), impact.info(result), impact.check_model(impact.models()["hertz"])

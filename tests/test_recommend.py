@@ -342,6 +342,7 @@ def test_a_point_is_shown_in_degrees_and_words_and_selected_by_them() -> None:
     assert f"{name} is abs, positive" in refused(result, sel={name: "all"})
 
 
+@pytest.mark.slow
 def test_a_missing_number_is_null(cli: Run, tmp_path: Path) -> None:
     result = swept("exact-hysteresis", e=None, alpha=[2.0, 3.0], m2=[1.0, math.inf])
     done = cli("recommend", stored(tmp_path, result), "--json")

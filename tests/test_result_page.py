@@ -93,6 +93,7 @@ def test_the_script_and_the_template_are_short() -> None:
     assert sum(lines) < 400
 
 
+@pytest.mark.slow
 def test_a_dataset_of_the_user_stays_open(results: dict[str, xr.Dataset], tmp_path: Path) -> None:
     impact.save(results["part"], tmp_path / "part.h5")
     # what `impact.load` returns of a large file
@@ -120,6 +121,7 @@ def test_laws_and_sliders_have_values_with_prefixes(viscosity: object, label: st
     assert [axis["texts"] for axis in content["axes"][1:]] == ([] if label else [["1 µs", "2 µs"]])
 
 
+@pytest.mark.slow
 def test_the_command_writes_a_page(results: dict[str, xr.Dataset], cli: Run, tmp_path: Path) -> None:
     impact.save(results["part"], tmp_path / "part.h5")
     done = cli("page", "part.h5", "--model", "bilinear", cwd=tmp_path)

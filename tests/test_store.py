@@ -365,6 +365,7 @@ ctypes.CDLL(None).capset((ctypes.c_uint32 * 2)(0x20080522, 0), (ctypes.c_uint32 
 """
 
 
+@pytest.mark.slow
 def test_a_result_is_written_to_a_folder_without_read_permission(forked: ForkServer, tmp_path: Path) -> None:
     folder = tmp_path / "folder"
     folder.mkdir()
@@ -514,6 +515,7 @@ LARGE = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 def test_values_that_exceed_the_memory_are_refused_before_they_are_computed(tmp_path: Path) -> None:
     sweep_into(tmp_path / "large.h5", read_plan(LARGE, run=SweepRun(max_points=10**13)))
     with open_result(tmp_path / "large.h5") as opened:

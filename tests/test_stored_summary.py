@@ -69,6 +69,7 @@ def test_the_summary_in_a_file_is_the_summary_of_its_points(large: Path, without
         assert described(stored) == described(computed)
 
 
+@pytest.mark.slow
 def test_info_prints_the_summary_in_the_file(large: Path, tmp_path: Path) -> None:
     def change(attrs: h5py.AttributeManager) -> None:
         summary = json.loads(attrs["summary"])

@@ -184,6 +184,7 @@ def test_a_progress_bar_on_a_terminal(forked: ForkServer, blocks: Path) -> None:
     assert printed.rstrip().endswith("limit)")
 
 
+@pytest.mark.slow
 def test_a_sensitivity_study_shows_its_progress_unless_it_is_quiet(forked: ForkServer, tmp_path: Path) -> None:
     balls = "v1.uniform = [1, 2]\ne = 0.5\nm1 = 1\nm2 = 1\nK = 1e6\n"
     text = f'models = ["hertz", "tsuji-1992"]\ndesign.n = 2\n[sweep]\n{balls}'
@@ -488,6 +489,7 @@ def test_a_file_with_a_high_compression_ratio_can_be_read(tmp_path: Path) -> Non
         assert loaded["e_out"].min() == loaded["e_out"].max() > 0.999
 
 
+@pytest.mark.slow
 def test_an_executor_is_entered_only_if_there_is_something_to_integrate(tmp_path: Path) -> None:
     @contextmanager
     def refuse() -> Iterator[ExecutorSpec]:

@@ -162,6 +162,7 @@ def test_a_step_has_the_status_and_the_failures_of_a_sweep(steps: float) -> None
     assert row.e_mean == pytest.approx(swept["e_out"].mean("phase", skipna=False).item(), rel=1e-9, nan_ok=True)
 
 
+@pytest.mark.slow
 def test_a_step_that_is_too_long_is_no_restitution_and_ends_with_exit_code_3(cli: Run) -> None:
     words = ("timestep", "--model", LINEAR, "--at", "e=0.5", "--steps-per-contact", "1", "--tol", "1%")
     table, printed = cli(*words), cli(*words, "--json")
@@ -411,6 +412,7 @@ def test_a_parameter_that_does_not_set_the_time_scale_is_refused(cli: Run) -> No
     assert (refused.returncode, refused.stderr) == (2, '--dt: got "2 m", expected a unit of s, such as "1 s"\n')
 
 
+@pytest.mark.slow
 def test_a_step_longer_than_the_contact_is_a_warning(cli: Run) -> None:
     done = cli("timestep", "--model", LINEAR, "--at", "e=0.5", "--dt", "1 ms", "--dt", "1 us", "--phases", "9")
     expected = "warning: dt = 0.001 s: longer than the contact of 0.000290209 s"

@@ -235,6 +235,7 @@ def test_several_outputs_of_one_run_have_the_studies_of_each(cli: Run, tmp_path:
     assert not (tmp_path / "s.h5").exists()
 
 
+@pytest.mark.slow
 def test_mean_and_quantiles_of_a_study_are_those_of_the_samples() -> None:
     study = impact.sensitivity(hertz(n=2**12), of="peak_force").isel(model=0)
     exact = MEAN_FACTOR["peak_force"] * math.prod(
@@ -299,6 +300,7 @@ def test_samples_have_their_distribution_and_are_not_correlated(method: str, lar
     assert np.abs(correlations - np.eye(len(DISTRIBUTIONS))).max() < largest_correlation
 
 
+@pytest.mark.slow
 def test_empirical_values_come_from_a_file_with_a_unit(tmp_path: Path) -> None:
     (tmp_path / "speeds.csv").write_text("v1 [km/h], other\n3.6, 1\n7.2, 2\n18, 3\n")
     text = TEXT.replace('{ normal = ["1 m/s", 0.05] }', '{ empirical = "speeds.csv" }')
