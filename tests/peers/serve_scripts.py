@@ -1,6 +1,6 @@
 """Run scripts in forks of a process that has imported what they import: `PROGRAM serve_scripts.py MODULES`.
 
-The program is Python, or YADE, whose own threads only wait. test_exported_scripts.py is the client.
+`tests.fork_server.run_script_in_fork` is the client.
 """
 
 # what YADE has for its scripts; in Python, none
@@ -10,7 +10,8 @@ import sys  # noqa: E402
 from importlib import import_module  # noqa: E402
 from pathlib import Path  # noqa: E402
 
-sys.path.insert(0, str(Path(sys.argv[0]).absolute().parents[2]))
+folder = Path(sys.argv[0]).absolute().parent
+sys.path[:0] = [str(folder), str(folder.parents[1])]
 from tests.fork_server import serve  # noqa: E402
 
 for module in sys.argv[1:]:
