@@ -511,10 +511,10 @@ def test_every_law_of_a_code_is_in_the_list(cli: Run) -> None:
         (("--to", "lamps"), '--to: no code "lamps"; did you mean "lammps"?'),
         (("--to", "isaac"), '--to: no code "isaac"; did you mean "physx"?'),
         (("--to", "mujoco", "--model", "hertz"), 'MuJoCo has no law "hertz"; known: mujoco-solref'),
-        (("--to", "lammps", "--script", "--at", "m1=inf"), "--script: m1: got inf, expected m2 = inf for a wall"),
+        (("--to", "lammps", "--script", "--at", "m1=inf"), "a script: m1: got inf, expected m2 = inf for a wall"),
         (
             ("--to", "lammps", "--script", "--at", "m2=inf", "--at", "R2=1"),
-            "--script: m2: got inf, expected a finite value, or m2 = R2 = inf for a wall",
+            "a script: m2: got inf, expected a finite value, or m2 = R2 = inf for a wall",
         ),
         (("--to", "lammps", "--dt", "0"), "--dt: got 0.0, expected a number > 0 s"),
         (("--to", "lammps", "--code-version", "new"), '--code-version: got "new", expected the date of a release'),

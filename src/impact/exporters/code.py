@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 from ..contact.model import ForceModel
 from ..errors import UsageError
-from ..formatting import argument, number
+from ..formatting import number
 from .programs import Program
 
 Parameters = Mapping[str, float | str]
@@ -91,7 +91,7 @@ class Collision:
         for name in ("m1", "R1") if self.has_wall else ("m1", "m2", "R1", "R2"):
             if not math.isfinite(self[name]):
                 expected = "m2 = inf for a wall" if name == "m1" else "a finite value, or m2 = R2 = inf for a wall"
-                raise UsageError(f"{argument('script')}: {name}: got {number(self[name])}, expected {expected}")
+                raise UsageError(f"a script: {name}: got {number(self[name])}, expected {expected}")
         v1, v2 = (self["v0"], 0.0) if self.has_wall else (self["v1"], self["v2"])
         rim2 = 0.0 if self.has_wall else self["R2"]
         values = {
@@ -116,13 +116,11 @@ class Collision:
             for ball in ("1",) if self.has_wall else ("1", "2"):
                 if self[f"inertia_factor{ball}"] != SOLID:
                     found = f"inertia_factor{ball}: got {number(self[f'inertia_factor{ball}'])}"
-                    raise UsageError(
-                        f"{argument('script')}: {found}, expected {SOLID}: balls of scripts are solid"
-                    )
+                    raise UsageError(f"a script: {found}, expected {SOLID}: balls of scripts are solid")
             u1, u2 = (self["u1"] - self["u2"], 0.0) if self.has_wall else (self["u1"], self["u2"])
             slip = u1 + self["R1"] * self["omega1"] - u2 + rim2 * self["omega2"]
             if slip == 0.0:
-                raise UsageError(f"{argument('script')}: there is no slip before the impact, and so no beta")
+                raise UsageError("a script: there is no slip before the impact, and so no beta")
             values |= {"u1": u1, "u2": u2, "rim2": rim2, "slip": slip}
             values["reach"] += 4.0 * (abs(u1) + abs(u2)) * (self.steps * self.dt + self.gap / self["v0"])
             # so that the normal is along x at the first touch
