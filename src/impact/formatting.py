@@ -32,6 +32,8 @@ OPTIONS = {
     "plugins": "plugin",
     "sections": "section",
 }
+# between the keys of a model and a friction law in the name of a pair
+WITH = " with "
 _is_command_line = False
 
 
@@ -39,6 +41,24 @@ def name_options() -> None:
     """Name arguments as options from now on, for a process that is the command line."""
     global _is_command_line
     _is_command_line = True
+
+
+def law_name(model: str, friction: str = "") -> str:
+    """Name a model, a friction law or a pair of both, by their keys or by their titles.
+
+    >>> law_name("hertz"), law_name("hertz", "coulomb-1785")
+    ('hertz', 'hertz with coulomb-1785')
+    """
+    return WITH.join(filter(None, (model, friction)))
+
+
+def law_keys(name: str) -> list[str]:
+    """Find the keys in the name of a law.
+
+    >>> law_keys("hertz with coulomb-1785")
+    ['hertz', 'coulomb-1785']
+    """
+    return name.split(WITH)
 
 
 def argument(name: str, value: object = None, *, key: str = "") -> str:

@@ -13,6 +13,7 @@ from ..config.grid import MAX_POINTS
 from ..contact.model import ForceModel
 from ..engine.plan import Plan
 from ..engine.plugins import Plugins, read_plugins
+from ..formatting import law_keys
 from ..results.kinds import kind_of, require_sweep
 from ..results.provenance import config_of_part, stored_config
 from ..results.replay_command import command_start
@@ -63,7 +64,7 @@ def rerun(
     stored = load(result)
     plugin_set = read_plugins(plugins)
     # laws by key, because "all" may include new ones; a calibration has pairs, MODEL with FRICTION, along `model`
-    keys = [key.split(" with ") for key in stored["model"].values.tolist()] if "model" in stored.dims else [[]]
+    keys = [law_keys(key) for key in stored["model"].values.tolist()] if "model" in stored.dims else [[]]
     laws = zip(("models", "frictions"), map(dict.fromkeys, zip(*keys, strict=True)), strict=False)
     changes = [f"{name}={json.dumps(list(table))}" for name, table in laws]
     changes += [f"solver.{name}={stored.attrs.get(name)}" for name in ("rtol", "max_steps")]

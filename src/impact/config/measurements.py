@@ -15,7 +15,7 @@ from ..contact.friction import FrictionLaw
 from ..contact.model import ForceModel, with_base_quantities
 from ..contact.variables import OUTPUTS
 from ..errors import ConfigError
-from ..formatting import number, quantity, safe_text
+from ..formatting import law_name, number, quantity, safe_text
 from .columns import (
     Columns,
     also,
@@ -590,7 +590,7 @@ def count_problems(
     """Check that there are as many measured values as parameters of a law."""
     n_values = len(measurements.lines) * len(measurements.outputs)
     counts = {
-        " with ".join(law.key for law in (model, friction) if law): len(fitted_parameters(fits, model, friction))
+        law_name(*(law.key for law in (model, friction) if law)): len(fitted_parameters(fits, model, friction))
         for model in models
         for friction in frictions or (None,)
     }

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from ..array_types import Array, Mask
 from ..errors import ModelError
+from ..formatting import law_name
 from . import fixed_step_slip
 from .closed_forms.dashpot import gap_damping
 from .dimensionless import LawValues, dimensionless_values, with_coefficients, with_units
@@ -115,7 +116,7 @@ class Pair:
     @property
     def key(self) -> str:
         """Its name in messages, such as "hertz with coulomb-1785"."""
-        return f"{self.model.key} with {self.friction.key}"
+        return law_name(self.model.key, self.friction.key)
 
     def form(self, n: float) -> TangentialForm:
         """Find the form of its tangential problems at an exponent n."""

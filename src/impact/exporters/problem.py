@@ -17,7 +17,7 @@ from ..engine.build_impacts import build_impacts
 from ..engine.plan import Plan
 from ..engine.plugins import Plugins
 from ..errors import UsageError, did_you_mean
-from ..formatting import argument, number, quantity
+from ..formatting import argument, law_keys, number, quantity
 from ..inverse.solve import PointWithE, point_with_e, warn_of_point
 from ..inverse.timestep import FixedStepLaw, ObliqueLaw, fixed_step_law
 from ..results.calibration import position_of_law, unidentified_notes
@@ -234,7 +234,7 @@ def _fit_notes(code: Code, version: str, key: str, calibration: Calibration) -> 
         f"{law}, weight {number(weight, 3)}" if has_weights else law
         for law, weight in zip(laws, weights, strict=True)
     ]
-    is_in_code = [has_law(code, law.split(" with ")[0], version) for law in laws]
+    is_in_code = [has_law(code, law_keys(law)[0], version) for law in laws]
     notes = [f"{calibration.name}: {named[chosen]}, law {chosen + 1} of {len(laws)}{' by AICc' * has_weights}"]
     others = [name for position, name in enumerate(named) if is_in_code[position] and position != chosen]
     if others:

@@ -35,7 +35,7 @@ from ..engine.plan import Plan
 from ..engine.plugins import Plugins, read_plugins
 from ..engine.trajectories import PlanLaw, model_of
 from ..errors import UsageError, warn
-from ..formatting import argument
+from ..formatting import argument, law_keys
 from ..results.calibration import calibration_template, fitted_config, position_of_law
 from ..results.describe import describe
 from ..results.schema import FIT_STATUSES
@@ -207,7 +207,7 @@ def _fit_remotely(key: str, text: str, overrides: Sequence[str], context: Worker
     """Fit the law of a key, in any process, with a config given by its text and overrides."""
     models = models_of_context(context)
     plugins = [models[name] for name, _ in context.hashes]
-    law = dict(zip(("models", "frictions"), key.split(" with "), strict=False))
+    law = dict(zip(("models", "frictions"), law_keys(key), strict=False))
     selection = [override_text((name,), [law_key]) for name, law_key in law.items()]
     return fit_laws(parse_config(text, [*overrides, *selection], plugins, "", purpose="calibrate"))[key]
 

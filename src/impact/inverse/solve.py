@@ -43,7 +43,7 @@ from ..engine.inputs import Inputs
 from ..engine.plan import Plan
 from ..engine.plugins import read_plugins
 from ..errors import UsageError, did_you_mean, warn
-from ..formatting import argument, number, prefixed, quantity, safe_text
+from ..formatting import argument, law_name, number, prefixed, quantity, safe_text
 from ..results.plausibility import depth_notes
 from ..results.ranking import only_target, target_value
 from ..results.single_impact import (
@@ -154,11 +154,7 @@ class SolveResult(Displayed):
         if not self.roots:
             smallest, largest = map(written, self.attainable)
             attained = f"{variable} is from {smallest} to {largest}"
-            yield f"{_laws(self.model, self.friction)}: no value of {self.name} gives {target}; {attained}"
-
-
-def _laws(model: str, friction: str) -> str:
-    return f"{model} with {friction}" if friction else model
+            yield f"{law_name(self.model, self.friction)}: no value of {self.name} gives {target}; {attained}"
 
 
 def solve(
@@ -253,7 +249,7 @@ def unknown_of(model: ForceModel, name: str, friction: FrictionLaw | None = None
     if "e" in model.quantities or (friction is not None and friction.may_use_e):
         unknowns["e"] = Parameter("e", "1", "restitution to enter", default=0.5, least=0.0, most=1.0)
     if name not in unknowns:
-        laws = _laws(model.key, friction.key if friction else "")
+        laws = law_name(model.key, friction.key if friction else "")
         needs_friction = friction is None and (name == "mu" or InputName.parse(name).friction)
         hint = f"expected {argument('friction', 'KEY')}" if needs_friction else did_you_mean(name, list(unknowns))
         raise UsageError(f'{argument("name")}: {laws} has no parameter "{name}"; {hint}')
@@ -410,7 +406,7 @@ class SolveProblem:
         # of balls whose contact points do not slip before the impact beta is 0/0
         is_undefined = status == Status.OK
         reason = f"{variable.equation or 'it'} has no value at these inputs" if is_undefined else status.meaning
-        laws = _laws(self.model.key, self.friction)
+        laws = law_name(self.model.key, self.friction)
         raise UsageError(f"{laws}: no {self.variable} at any value of {self.unknown.name}: {reason}")
 
     def scan_values(self, per_decade: int = SCAN_PER_DECADE, between_bounds: int = SCAN_BETWEEN_BOUNDS) -> Array:

@@ -55,7 +55,7 @@ from ..engine.build_impacts import build_impacts, build_oblique, rayleigh_time_a
 from ..engine.plan import Plan
 from ..engine.plugins import read_plugins
 from ..errors import ModelError, UsageError
-from ..formatting import argument, decimals, number, quantity, rounded
+from ..formatting import argument, decimals, law_name, number, quantity, rounded
 from ..results.single_impact import open_source
 from .solve import PointWithE, config_name, point_with_e, solve_damping, unknown_of, warn_of_point
 
@@ -252,10 +252,9 @@ class TimestepResult(Displayed):
         e = f"e = {number(self.e)}, " if self.e == self.e else ""
         e = "".join(f"{name} = {value!r}, " for name, value in self.solved.items()) if self.solved else e
         contact_time = quantity(self.contact_time, "s")
-        laws, beta = self.model, ""
-        if self.friction:
-            laws, beta = f"{laws} with {self.friction}", f", beta = {number(self.beta_continuous)}"
-        yield f"{laws}: {e}e_out = {number(self.e_continuous)}{beta} in a contact time of {contact_time}"
+        beta = f", beta = {number(self.beta_continuous)}" if self.friction else ""
+        law = law_name(self.model, self.friction)
+        yield f"{law}: {e}e_out = {number(self.e_continuous)}{beta} in a contact time of {contact_time}"
         yield f"scheme: {self.scheme}"
         yield ""
         headings = ["steps per contact", "dt [s]", "e mean", "e least", "e largest", "e to enter"]

@@ -11,7 +11,7 @@ from ..array_types import Array
 from ..config.measurements import SIGMA
 from ..contact.variables import OUTPUTS
 from ..errors import UsageError
-from ..formatting import argument, decimals, safe_text
+from ..formatting import argument, decimals, law_name, safe_text
 from ..results.calibration import calibration_title, fit_status
 from ..results.kinds import kind_of
 from ..results.selection import chosen_laws
@@ -20,7 +20,7 @@ from .data import Points
 from .kinds import Choice, Kind
 from .labels import friction_text, model_label
 from .slices import conditions_of, scalars_of, units_of
-from .style import is_geometric, law_name
+from .style import is_geometric
 
 # laws that are drawn unless the user names them
 MAX_LAWS = 5

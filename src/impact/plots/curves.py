@@ -20,11 +20,11 @@ from numpy.typing import ArrayLike
 
 from ..config.measurements import SIGMA
 from ..errors import UsageError
-from ..formatting import NO_BREAK, heading
+from ..formatting import NO_BREAK, heading, law_name
 from .data import MEASURED, LegendEntries, Points
 from .labels import LawPart, annotate_right_edge, label_axis, pretty_conditions, symbol, words_of
 from .slices import unit_of
-from .style import FAINT, SOFT, is_geometric, law_name, model_styles, tint
+from .style import FAINT, SOFT, is_geometric, model_styles, tint
 
 # the colour of distances from zero, and its shares in those that are shaded, the widest first, and in lines
 BAND_COLOUR, BAND_SHARES, BAND_LINE_SHARE = "#0072B2", (0.08, 0.2), 0.65

@@ -20,9 +20,19 @@ from ..contact.frictions import frictions
 from ..contact.models import catalogue
 from ..contact.variables import HISTORY, OUTPUTS
 from ..errors import UsageError
-from ..formatting import NO_BREAK, argument, safe_text, scaled_unit, typographic, with_year
+from ..formatting import (
+    NO_BREAK,
+    WITH,
+    argument,
+    law_keys,
+    law_name,
+    safe_text,
+    scaled_unit,
+    typographic,
+    with_year,
+)
 from .slices import parameter_text, scalars_of, units_of
-from .style import SOFT, WITH, law_name, tint
+from .style import SOFT, tint
 
 GREEK = "alpha|beta|gamma|delta|epsilon|zeta|eta|theta|kappa|lambda|mu|nu|xi|rho|sigma|tau|phi|chi|psi|omega"
 # symbols of the paper for names that are words; v_post and abs_e_error are each a label of several variables
@@ -155,7 +165,7 @@ def legend_labels(laws: Collection[str], legend: str) -> dict[str, str]:
     """
     if legend not in ("keys", "short"):
         return {}
-    keys = {law: law.split(WITH) for law in laws}
+    keys = {law: law_keys(law) for law in laws}
     if len({model for model, *_ in keys.values()}) == 1:
         keys = {law: friction or [model] for law, (model, *friction) in keys.items()}
 
@@ -165,7 +175,7 @@ def legend_labels(laws: Collection[str], legend: str) -> dict[str, str]:
         return key if law is None else re.sub(THREE_AUTHORS, r"\1 et al.", with_year(law.title, law.year))
 
     write = str if legend == "keys" else short
-    return {law: escape_mathtext(safe_text(WITH.join(map(write, parts)), 80)) for law, parts in keys.items()}
+    return {law: escape_mathtext(safe_text(law_name(*map(write, parts)), 80)) for law, parts in keys.items()}
 
 
 def parameters_of_laws(laws: Mapping[str, str], names: Mapping[str, str]) -> str:
@@ -177,7 +187,7 @@ def parameters_of_laws(laws: Mapping[str, str], names: Mapping[str, str]) -> str
     """
     owners: dict[str, dict[str, None]] = {}
     for pair, label in laws.items():
-        keys = pair.split(WITH)
+        keys = law_keys(pair)
         parts = label.rsplit(WITH, len(keys) - 1)
         # the label of a pair may lack its model, which then is in the conditions
         for law, part in zip(keys[-len(parts) :], parts, strict=True):
@@ -199,7 +209,7 @@ class LawPart(NamedTuple):
 
     @property
     def key(self) -> str:
-        """Its name in a picture, see `impact.plots.style.law_name`."""
+        """Its name in a picture, see `impact.formatting.law_name`."""
         return law_name(self.model, self.friction)
 
 

@@ -23,7 +23,7 @@ from matplotlib.patheffects import withStroke
 
 from ..array_types import Array, Mask
 from ..errors import UsageError, did_you_mean
-from ..formatting import argument, heading, percentage, safe_text
+from ..formatting import argument, heading, law_name, percentage, safe_text
 from ..results.ranking import error_floor
 from .data import LegendEntries, Points
 from .kinds import Choice, Kind
@@ -39,7 +39,7 @@ from .labels import (
 )
 from .layout import Picture
 from .slices import choose_plane, conditions_of, not_a_sweep, read, take_plane, unit_of
-from .style import is_geometric, law_name, model_styles, tint
+from .style import is_geometric, model_styles, tint
 
 # a value at each y and x
 Plane = tuple[tuple[float, ...], ...]

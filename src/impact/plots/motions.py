@@ -11,14 +11,13 @@ import xarray as xr
 
 from ..config.input_names import InputName
 from ..contact.models import catalogue
-from ..formatting import safe_text
+from ..formatting import law_name, safe_text
 from ..results.attributes import read_attribute
 from ..results.schema import exponent_text
 from .curves import Curve, CurveData, Mark, Panel, curve_of
 from .kinds import Choice, Kind
 from .labels import REFERENCE, friction_text, law_text, words_of
 from .slices import choose_line, described_inputs, parameter_text, unit_of
-from .style import law_name
 
 # a permanent indentation is marked above this fraction of the largest one
 MIN_MARKED_INDENTATION = 0.02

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from ..contact.variables import OUTPUTS
 from ..errors import UsageError
-from ..formatting import heading
+from ..formatting import heading, law_name
 from ..results.kinds import kind_of
 from ..results.selection import select, select_laws
 from ..results.sensitivity import distribution_texts
@@ -30,7 +30,7 @@ from .labels import (
     with_model,
 )
 from .slices import conditions_of
-from .style import law_name, tint
+from .style import tint
 
 # bars of an input, and their colours
 BARS = {"first": "First-order index", "total": "Total index"}
@@ -54,7 +54,7 @@ class BarPanel:
 
     @property
     def law(self) -> str:
-        """Its name in the picture, see `impact.plots.style.law_name`."""
+        """Its name in the picture, see `impact.formatting.law_name`."""
         return law_name(self.model, self.friction)
 
 

@@ -24,7 +24,7 @@ from ..atomic import write_file
 from ..contact.frictions import frictions
 from ..contact.models import catalogue
 from ..errors import UsageError
-from ..formatting import argument
+from ..formatting import argument, law_keys
 from .kinds import WIDTHS
 
 # the colours of Okabe and Ito without yellow, which is invisible on white; the number of markers is coprime to
@@ -33,8 +33,6 @@ COLOURS = ("#7F4F24", "#009E73", "#56B4E9", "#CC79A7", "#D55E00", "#E69F00", "#0
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "*", "p")
 DASHES = ("-", (0, (6, 1.5)), (0, (3, 1.2)), (0, (6, 1.5, 1, 1.5)), (0, (1.2, 1.2)))
 HATCHES = ("", "////", "....", "\\\\\\\\", "xxxx", "----", "oo", "||||")
-# between the names of a model and a friction law
-WITH = " with "
 STYLE_SHEET = files(__package__) / "impact.mplstyle"
 # without dates in the metadata a picture has the same bytes each time
 METADATA: dict[str, dict[str, None]] = {
@@ -103,28 +101,19 @@ def default_size() -> tuple[float, float | None]:
     return width, height
 
 
-def law_name(model: str, friction: str) -> str:
-    """Name a model, a friction law or a pair of both, by their keys or by their titles.
-
-    >>> law_name("hertz", ""), law_name("hertz", "coulomb-1785")
-    ('hertz', 'hertz with coulomb-1785')
-    """
-    return WITH.join(filter(None, (model, friction)))
-
-
 def model_styles(models: Sequence[str]) -> dict[str, dict[str, Any]]:
     """Choose colour, marker, dashes and hatch of each model, or pair, of a picture; no two are alike.
 
     The style of a model follows from its index in the catalogue, so that it is the same in most pictures; if
     another model of the picture has that style already, the next free one is used. Plug-ins follow the catalogue.
     """
-    keys = list(dict.fromkeys([*catalogue(), *(key.partition(WITH)[0] for key in models)]))
+    keys = list(dict.fromkeys([*catalogue(), *(law_keys(name)[0] for name in models)]))
     friction_index = {key: index for index, key in enumerate(frictions())}
     styles_by_model: dict[str, dict[str, Any]] = {}
     used: dict[str, Counter[Any]] = {"color": Counter(), "marker": Counter(), "hatch": Counter()}
     for model in dict.fromkeys(models):
-        key, _, friction = model.partition(WITH)
-        index = keys.index(key) + friction_index.get(friction, 0)
+        key, *friction = law_keys(model)
+        index = keys.index(key) + sum(friction_index.get(name, 0) for name in friction)
         color = _next_free(COLOURS, index, used["color"])
         alike = [style for style in styles_by_model.values() if style["color"] == color]
         styles_by_model[model] = {

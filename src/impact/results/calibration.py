@@ -23,7 +23,7 @@ from ..engine.plan import Plan
 from ..engine.plugins import Plugins
 from ..engine.trajectories import PlanLaw, keys_of, model_of
 from ..errors import UsageError, did_you_mean
-from ..formatting import decimals, number, safe_text
+from ..formatting import decimals, law_keys, law_name, number, safe_text
 from . import schema
 
 # probability of chi2 below which a law is called rejected
@@ -63,8 +63,8 @@ def fit_rows(dataset: xr.Dataset) -> list[tuple[str, ...]]:
 
 def _own_name(law: str, name: str) -> str:
     """Write the config name of a parameter without the key of the law, or of a law of the pair."""
-    model, _, friction = law.partition(" with ")
-    return name.removeprefix(f"{model}.").removeprefix(f"friction.{friction}.")
+    model, *friction = law_keys(law)
+    return name.removeprefix(f"{model}.").removeprefix(f"friction.{''.join(friction)}.")
 
 
 def _estimate_texts(parameter: xr.Dataset) -> tuple[str, str]:
@@ -254,10 +254,10 @@ def position_of_law(laws: Sequence[str], wanted: str, origin: str) -> int:
     >>> position_of_law(["hertz", "tsuji-1992 with coulomb-1785"], "liggghts-hertz", "--model")
     1
     """
-    model, _, friction = wanted.partition(" with ")
+    model, *friction = law_keys(wanted)
     for position, law in enumerate(laws):
-        key, _, other = law.partition(" with ")
-        if original_key(key) == original_key(model) and friction in ("", other):
+        key, *other = law_keys(law)
+        if original_key(key) == original_key(model) and friction in ([], other):
             return position
     raise UsageError(f'{origin}: no fit of "{wanted}"; {did_you_mean(wanted, list(laws))}')
 
@@ -265,11 +265,11 @@ def position_of_law(laws: Sequence[str], wanted: str, origin: str) -> int:
 def fitted_config(config: Config, law: xr.Dataset) -> str:
     """Write a config of its own in SI units with one fitted law; inputs that vary in the data are axes."""
     assert config.data is not None
-    keys = tuple(str(law["model"].item()).split(" with "))
+    keys = law_keys(str(law["model"].item()))
     fitted = law.isel(parameter=law["identifiable"].values >= 0)
     estimates = dict(zip(map(str, fitted["parameter"].values), fitted["estimate"].values.tolist(), strict=True))
     if any(value != value for value in estimates.values()):
-        raise UsageError(f"{' with '.join(keys)}: the fit has no estimate, its status is {fit_status(law)}")
+        raise UsageError(f"{law_name(*keys)}: the fit has no estimate, its status is {fit_status(law)}")
     columns = {name: sorted(set(column)) for name, column in config.data.inputs.items()}
     laws = {name: [key] for name, key in zip(("models", "frictions"), keys, strict=False)}
     tables: dict[KeyPath, dict[str, object]] = {(): {**laws, "title": config.title}, ("sweep",): {}}

@@ -18,6 +18,7 @@ from ..contact.model import ForceModel
 from ..display import LATEX_CHARACTERS, Block, Displayed
 from ..engine.model_catalogue import models
 from ..errors import UsageError
+from ..formatting import law_keys
 from .selection import chosen_laws
 from .xarray_backend import load
 
@@ -119,7 +120,7 @@ def cite(*laws: str | Path | xr.Dataset | ForceModel | FrictionLaw, plugins: Seq
             result = item if isinstance(item, xr.Dataset) else load(item)
             names = [*chosen_laws(None, result), *chosen_laws(None, result, "friction")]
             # the laws of a calibration with friction are pairs
-            keys = [key for name in names for key in name.split(" with ")]
+            keys = [key for name in names for key in law_keys(name)]
         chosen |= {key: look_up(known, key, "law") for key in keys}
     return Citations(Citation(key, bibtex(law), dict(vars(law.evidence))) for key, law in chosen.items())
 

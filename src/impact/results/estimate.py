@@ -24,6 +24,7 @@ from ..engine.plan import Plan
 from ..engine.run import Run
 from ..engine.trajectories import RANGE_TRAJECTORIES, TrajectoryMap, keys_of
 from ..errors import warn
+from ..formatting import law_name
 from .layouts import LAYOUTS
 from .schema import dataset_template, stored_variables
 from .sweep import read_plan
@@ -220,5 +221,5 @@ def _model_counts(plan: Plan, trajectory_map: TrajectoryMap) -> ModelCounts:
     if not plan.config.solver.collapse:
         within = "not"
     return ModelCounts(
-        " with ".join(keys), plan.inputs.points_of(*keys), trajectory_map.cells, trajectory_map.count, axes, within
+        law_name(*keys), plan.inputs.points_of(*keys), trajectory_map.cells, trajectory_map.count, axes, within
     )

@@ -23,7 +23,7 @@ from ..contact.units import names_in
 from ..contact.variables import LAW_DIMS, OUTPUTS
 from ..display import Block, Displayed, Table, html_of
 from ..errors import UsageError, did_you_mean
-from ..formatting import argument, percentage, prefixed, safe_text
+from ..formatting import argument, law_name, percentage, prefixed, safe_text
 from .kinds import require_sweep
 from .replay_command import describe_point
 from .schema import columns_along, plain_unit
@@ -124,7 +124,7 @@ class Ranked:
             f"{path.rpartition('.')[2]} = {prefixed(value, self.units.get(path, '1'), 6)}"
             for path, value in with_words(self.parameters).items()
         )
-        return " with ".join(filter(None, [self.model, ", ".join(filter(None, [self.friction, *chosen]))]))
+        return law_name(self.model, ", ".join(filter(None, [self.friction, *chosen])))
 
     @property
     def record(self) -> dict[str, Any]:
@@ -245,7 +245,7 @@ class Ranking(Displayed, Sequence[Ranked]):
             "headline": self.headline,
             "tol": self.tol,
             **({"target": target} if target else {}),
-            "best": [" with ".join(filter(None, [row.model, row.friction])) for row in self.best],
+            "best": [law_name(row.model, row.friction) for row in self.best],
             "models": self.records(),
         }
 
@@ -489,7 +489,7 @@ def _best_parameters(
     evaluated, _ = over_varying_dims(law_data, criterion.names, *parameter_dims, *of_e)
     shape = tuple(evaluated.sizes[dim] for dim in parameter_dims)
     if math.prod(shape) > MAX_PARAMETER_COMBINATIONS:
-        law = " with ".join(filter(None, _keys(law_data)))
+        law = law_name(*_keys(law_data))
         raise UsageError(
             f"got {math.prod(shape):,} combinations of parameters of {law}, expected at "
             f"most {MAX_PARAMETER_COMBINATIONS:,}; select values of them"

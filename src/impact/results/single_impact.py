@@ -53,7 +53,7 @@ from ..engine.build_impacts import build_impacts, build_oblique, fixed_steps_at
 from ..engine.plan import Plan
 from ..engine.plugins import Plugins, read_plugins
 from ..errors import ConfigError, UsageError, did_you_mean, warn
-from ..formatting import argument, number, prefixed, safe_text
+from ..formatting import argument, law_keys, law_name, number, prefixed, safe_text
 from .calibration import fitted_config, position_of_law
 from .kinds import kind_of, require_result, require_sweep
 from .plausibility import depth_notes, input_notes
@@ -550,8 +550,7 @@ class Calibration:
 
     def law(self, model: str, friction: str = "") -> xr.Dataset:
         """Find the fit of a law, by whatever name."""
-        key = f"{model} with {friction}" if friction else model
-        return self.dataset.isel(model=position_of_law(self.laws, key, self.name))
+        return self.dataset.isel(model=position_of_law(self.laws, law_name(model, friction), self.name))
 
     def draft(self, law: xr.Dataset, model: str, plugins: Plugins) -> Draft:
         """Open the config of a fitted law, under the name of a model."""
@@ -585,7 +584,7 @@ class PointSource:
     def models(self) -> tuple[str, ...]:
         """Keys of the selected models, or none; other values of the config need not be valid yet."""
         if self.calibration is not None:
-            return tuple(dict.fromkeys(law.split(" with ")[0] for law in self.calibration.laws))
+            return tuple(dict.fromkeys(law_keys(law)[0] for law in self.calibration.laws))
         draft = self.config_draft
         if not self.has_selection or "models" not in draft.data:
             return ()
