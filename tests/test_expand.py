@@ -188,6 +188,15 @@ def test_a_factored_file_holds_the_values_of_a_full_one(tmp_path: Path, config: 
 
 
 @pytest.mark.slow
+def test_a_few_of_many_trajectories_are_read_in_any_order(tmp_path: Path) -> None:
+    # the trajectories that were read last, which are kept, are those of the second law
+    many = SMALL | {"sweep": {"e": {"linspace": [0.3, 0.9, 300]}, "v1": 1.0, "m1": 1.0, "m2": 2.0, "K": 1e9}}
+    result = impact.sweep(many, output=tmp_path / "factored.h5", overrides=['output.layout="factored"'])
+    with xr.open_dataset(tmp_path / "factored.h5", engine="impact") as lazy:
+        assert_same_array(lazy["e_out"].isel(e=[271, 3]), result["e_out"].isel(e=[271, 3]))
+
+
+@pytest.mark.slow
 def test_a_factored_file_of_a_plugin_is_read_without_the_plugin(tmp_path: Path) -> None:
     (tmp_path / "stiff.py").write_text(STIFF, encoding="utf-8")
     sweep = {"e": [0.1, 0.5], "v1": [1.0, 2.0, 4.0], "m1": [1.0, 3.0], "m2": [1.0, float("inf")], "n": [1.0, 1.5]}

@@ -854,6 +854,20 @@ def test_a_code_without_a_scheme_that_measures_no_number_differs(tmp_path: Path)
     assert verification.not_numbers.startswith("at the phase 0.125 of dt")
 
 
+def test_a_code_without_a_scheme_that_measures_another_restitution_differs(tmp_path: Path) -> None:
+    """The stand-in of a Python with openseespy; a restitution at every step has no uncertainty."""
+    python = write_program(tmp_path / "python", 'case $1 in -c) echo 3.7.1.2;; *) echo "e_out = 0.9";; esac')
+    export = impact.export("opensees", at={"e": 0.6, "v1": 1.0}, verify=True, program=str(python))
+    assert export.verification is not None
+    assert (export.verification.measured, export.verification.agrees) == ((0.9,), False)
+    # a number of the first run alone is not extrapolated
+    first = f'[ -e {tmp_path}/ran ] && echo "e_out = nan" || {{ touch {tmp_path}/ran; echo "e_out = 0.6"; }}'
+    write_program(python, f"case $1 in -c) echo 3.7.1.2;; *) {first};; esac")
+    export = impact.export("opensees", at={"e": 0.6, "v1": 1.0}, verify=True, program=str(python))
+    assert export.verification is not None
+    assert len(export.verification.measured) == 12
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("run", "message"),

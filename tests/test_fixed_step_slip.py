@@ -361,3 +361,9 @@ def test_timestep_without_friction_is_smooth_and_refuses_what_its_scheme_does_no
     assert row.beta_mean == -1.0
     with pytest.raises(UsageError, match='scheme "kick-drift" does not take the friction law drake-regularized'):
         impact.timestep("hertz", at={"mu": 0.3, "angle": "45 deg"}, friction="drake-regularized")
+
+
+def test_a_contact_at_fixed_steps_sticks_slips_or_does_both() -> None:
+    inputs = {"k": STIFF**2, "b": 0.2 * STIFF, "mu": [0.1, 0.6, 5.0], "u1": -3.0}
+    result = sweep(SOLREF, CONE, {}, inputs | STEP, "mujoco-cone")
+    assert result["contact_regime"].values.ravel().tolist() == [2, 3, 1]
