@@ -156,6 +156,24 @@ def test_a_parameter_at_a_bound_is_reported(values: Array, status: str) -> None:
     assert (result.lower[0] == 0.05) == (status == "at_bound")
 
 
+@pytest.mark.parametrize(("mean", "lower", "upper"), [(0.001, 0.0, 0.00538), (0.999, 0.99462, 1.0)])
+def test_an_interval_that_reaches_a_bound_ends_there(mean: float, lower: float, upper: float) -> None:
+    """Its half-width is 1.96 standard errors of 0.01/sqrt(20)."""
+    result = fit("constant", [0.0], [1.0], np.full(20, mean), 0.01)
+    assert result.estimate[0] == pytest.approx(mean, abs=1e-9)
+    assert (result.lower[0], result.upper[0]) == pytest.approx((lower, upper), abs=5e-6)
+    assert (result.lower[0] == 0.0, result.upper[0] == 1.0) == (lower == 0.0, upper == 1.0)
+
+
+def test_a_law_without_a_prediction_determines_no_parameter() -> None:
+    data = DataPoints(np.full(20, 0.5), np.full(20, 0.01), "given")
+    problem = FitProblem("none", Bounds(np.zeros(1), np.ones(1)), data)
+    (result,) = fit_all([problem], {"none": lambda rows: np.full((len(rows), 20), np.nan)})
+    assert result.status == "no_prediction"
+    assert not result.identifiable.any()
+    assert np.isnan([result.lower, result.upper, result.covariance[0]]).all()
+
+
 @pytest.mark.parametrize(("least", "most", "value", "bound"), [(0.05, 0.9, 0.99, 0.05), (0.01, 0.1, 0.5, 0.1)])
 def test_the_derivative_at_a_bound_is_that_of_the_prediction(
     least: float, most: float, value: float, bound: float
@@ -218,6 +236,13 @@ def test_specimens_have_the_interval_and_the_likelihood_of_their_means() -> None
     assert result.aicc == pytest.approx(2 * 2 - 2 * likelihood + 2 * 2 * 3 / (20 - 3), rel=1e-8)
 
 
+def test_the_deviation_between_specimens_has_the_unit_of_the_values() -> None:
+    y = specimens_with_deviations(0.03, 0.01, 1)
+    of_one = fit("constant", [0.0], [1.0], y, 0.01, "excess", specimens=SPECIMENS)
+    of_many = fit("constant", [0.0], [1e6], 1e6 * y, 1e4, "excess", specimens=SPECIMENS)
+    assert of_many.excess == pytest.approx(1e6 * of_one.excess, rel=1e-8)
+
+
 def test_a_slope_within_specimens_has_the_interval_of_the_noise_alone() -> None:
     """What specimens share does not change it; the mean has the three degrees of freedom of four specimens."""
     y = specimens_with_deviations(0.03, 0.01, 2) + 0.05 * CENTRED
@@ -266,10 +291,18 @@ def test_a_robust_loss_resists_an_outlier(loss: str) -> None:
     assert robust.lower[0] < 0.7 < robust.upper[0]
 
 
-def test_a_robust_loss_of_two_values_has_the_standard_error_of_their_mean() -> None:
+def test_a_huber_loss_of_two_values_has_the_standard_error_of_their_mean() -> None:
     """Half their difference, since neither is an outlier."""
     result = fit("pair", [0.0], [2.0], np.array([0.69, 0.71]), 0.02, loss="huber")
     np.testing.assert_allclose(np.sqrt(result.covariance), 0.01, rtol=1e-6)
+
+
+def test_a_cauchy_loss_of_two_values_has_the_standard_error_of_the_closed_form() -> None:
+    """At half a deviation from 0.7, half the first derivative is 0.5/1.25 and half the second 0.75/1.25²."""
+    result = fit("pair", [0.0], [2.0], np.array([0.69, 0.71]), 0.02, loss="cauchy")
+    assert result.estimate[0] == pytest.approx(0.7, abs=1e-9)
+    factor = 2.0 * (0.5 / 1.25) ** 2 / (0.75 / 1.25**2) ** 2
+    np.testing.assert_allclose(np.sqrt(result.covariance), 0.02 * np.sqrt(factor / 2.0), rtol=1e-6)
 
 
 def test_the_interval_of_a_huber_loss_beside_an_outlier_is_that_of_the_closed_form() -> None:
