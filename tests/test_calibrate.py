@@ -19,7 +19,7 @@ from impact.contact.models import find
 from impact.errors import UsageError
 from impact.inverse.calibrate import determined_groups
 from impact.inverse.fit import Bounds, DataPoints, FitProblem, fit_all
-from impact.results.calibration import fit_rows
+from impact.results.calibration import fit_rows, unidentified_notes
 
 from .conftest import ROOT, Run
 
@@ -376,6 +376,26 @@ def test_what_is_determined_has_no_dimension_at_every_exponent_of_the_data(
     assert determined_groups(config, find(key), names, fit) == [expected]
 
 
+def test_what_is_determined_of_a_parameter_that_may_be_zero_is_no_product() -> None:
+    """The law depends on d/sqrt(K), but d has no logarithm from 0 on."""
+    key = "modelica-elastogap"
+    config = read_config(
+        {
+            "models": key,
+            "sweep": {"v1": 1.0, "m1": 1.0, "m2": 1.0, "K": {"fit": [1e4, 1e8]}, "n": 1.0},
+            "model": {key: {"d": {"fit": [0.0, 1e5]}}},
+            "data": {"columns": {"e_out": [0.9, 0.9, 0.9]}},
+        },
+        purpose="calibrate",
+    )
+    names = ["K", f"{key}.d"]
+    bounds = Bounds(*np.transpose([config.fits[name] for name in names]))
+    problem = FitProblem(key, bounds, DataPoints(np.full(3, 1.0), np.full(3, 1e-2), "given"))
+    (fit,) = fit_all([problem], {key: lambda rows: np.repeat(rows[:, 1:] / np.sqrt(rows[:, :1]), 3, axis=1)})
+    assert not fit.identifiable.any()
+    assert determined_groups(config, find(key), names, fit) == []
+
+
 def test_what_is_determined_of_a_law_with_exponents_in_its_units_has_no_dimension() -> None:
     """With p = 2 the unit of c, N s^p/m^(n + p), is that of K/v0²."""
     key = "recurdyn-exponents"
@@ -386,7 +406,10 @@ def test_what_is_determined_of_a_law_with_exponents_in_its_units_has_no_dimensio
         "data": {"columns": {"e_out": [0.49, 0.5, 0.51], "sigma": [0.01, 0.01, 0.01]}},
         "solver": {"rtol": 1e-4},
     }
-    assert impact.calibrate(config)["determined"].values.tolist() == ["(v0^2 c)/K"]
+    result = impact.calibrate(config)
+    assert result["determined"].values.tolist() == ["(v0^2 c)/K"]
+    # a parameter is named without its law, as in the table
+    assert unidentified_notes(result) == [f"{key}: K, c: only (v0^2 c)/K is determined"]
 
 
 @pytest.mark.slow
