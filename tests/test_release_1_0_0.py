@@ -14,6 +14,7 @@ import pytest
 import xarray as xr
 
 import impact
+from impact.results.calibration import fit_rows, largest_residuals
 
 from .conftest import ROOT
 
@@ -113,3 +114,14 @@ def test_a_file_of_the_release_is_used_in_place(tmp_path: Path) -> None:
     assert impact.info(path)["status"] == {"ok": 16}
     assert impact.expand(path, tmp_path / "part.h5", sel={"v1": 1.0}) == 12
     assert impact.recommend(impact.load(path)).models[0].model == "bilinear"
+
+
+def test_a_calibration_without_the_variables_added_since_is_read_and_repeated(tmp_path: Path) -> None:
+    old = impact.load(FOLDER / "calibration.h5").drop_vars(["p_value", "loo_residual"])
+    impact.save(old, tmp_path / "old.h5")
+    stored = impact.load(tmp_path / "old.h5")
+    assert not {"p_value", "loo_residual"} & set(stored.variables)
+    assert [row[5] for row in fit_rows(stored)] == ["–"]
+    assert largest_residuals(stored) == []
+    verdict = impact.rerun(tmp_path / "old.h5")
+    assert verdict.equal, str(verdict)
