@@ -116,6 +116,7 @@ def test_a_file_of_the_release_is_used_in_place(tmp_path: Path) -> None:
     assert impact.recommend(impact.load(path)).models[0].model == "bilinear"
 
 
+@pytest.mark.slow
 def test_a_calibration_without_the_variables_added_since_is_read_and_repeated(tmp_path: Path) -> None:
     old = impact.load(FOLDER / "calibration.h5").drop_vars(["p_value", "loo_residual"])
     impact.save(old, tmp_path / "old.h5")

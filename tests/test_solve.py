@@ -150,6 +150,7 @@ def test_with_a_fixed_step_the_least_value_lies_between_two_values_of_the_scan()
     assert result.attainable[0] == pytest.approx(least, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_roots_beside_a_minimum_that_is_not_the_least_are_found_halfway_between_two_values_of_the_scan() -> None:
     """The minimum is at 1.0125, as far from 1.005 as from 1.02; the least value is at 3."""
     law = law_of(lambda p: 0.5 - 20.0 * np.minimum(np.abs(p - 1.0125), 0.1) ** 2 + np.maximum(p - 2.0, 0.0))
@@ -158,6 +159,7 @@ def test_roots_beside_a_minimum_that_is_not_the_least_are_found_halfway_between_
     assert [root.value for root in result.roots][:2] == pytest.approx([1.0085, 1.0165], abs=1e-6)
 
 
+@pytest.mark.slow
 def test_roots_beside_a_peak_over_the_whole_range_are_found_beyond_the_values_of_the_scan() -> None:
     """Only one of these, 1.005, is on the peak, which is at 1.0075."""
     law = law_of(lambda p: 0.5 - 8.0 * np.maximum(0.01 - np.abs(p - 1.0075), 0.0))
@@ -228,6 +230,7 @@ def test_the_best_value_over_a_range_is_that_of_the_best_of_several_basins() -> 
     assert result.attainable == pytest.approx((1.0, 1.0), abs=1e-6)
 
 
+@pytest.mark.slow
 def test_the_best_value_over_a_range_may_be_the_largest_of_the_allowed_values() -> None:
     law = law_of(lambda p: 0.4 - 0.1 * p)
     result = impact.solve(
