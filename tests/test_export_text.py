@@ -407,6 +407,11 @@ def test_the_lines_of_modelica_give_the_law(n: float) -> None:
     assert export.e_continuous == pytest.approx(0.6, abs=1e-8)
 
 
+def test_the_contact_of_modelica_begins_where_the_flanges_meet() -> None:
+    export = impact.export("modelica", "modelica-elastogap", at={"d": 1e3})
+    assert arguments(export.lines, r"s_rel0 = #") == [0.0]
+
+
 # ---- Adams: IMPACT and STEP, in mm
 
 

@@ -363,6 +363,13 @@ def test_timestep_without_friction_is_smooth_and_refuses_what_its_scheme_does_no
         impact.timestep("hertz", at={"mu": 0.3, "angle": "45 deg"}, friction="drake-regularized")
 
 
+def test_timestep_says_what_a_friction_law_lacks_with_a_contact_force() -> None:
+    inputs = {**HOOKE, "mu": 0.3, "angle": "45 deg"}
+    message = rf"{LINEAR} with lammps-mindlin: 8 G\* a needs a contact force of n = 1.5; set k_t"
+    with pytest.raises(ConfigError, match=message):
+        impact.timestep(LINEAR, at=inputs, friction="lammps-mindlin")
+
+
 def test_a_contact_at_fixed_steps_sticks_slips_or_does_both() -> None:
     inputs = {"k": STIFF**2, "b": 0.2 * STIFF, "mu": [0.1, 0.6, 5.0], "u1": -3.0}
     result = sweep(SOLREF, CONE, {}, inputs | STEP, "mujoco-cone")
