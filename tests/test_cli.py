@@ -25,6 +25,7 @@ from rich.cells import cell_len
 import impact
 from impact.cli import exits
 from impact.cli.execution import Execution
+from impact.cli.main import COMMANDS, load_command
 from impact.errors import UsageError
 from impact.plots.data import read_points
 
@@ -525,8 +526,6 @@ def test_the_schema_is_printed_or_written(cli: Run, tmp_path: Path) -> None:
 
 
 def test_no_switch_is_on_unless_it_is_given() -> None:
-    from impact.cli.main import COMMANDS, load_command
-
     switches = {
         (name, option.name): option.default
         for name in COMMANDS
@@ -796,6 +795,11 @@ def test_every_paragraph_of_help_fills_its_lines(cli: Run) -> None:
     *full, _ = paragraph[1].splitlines()
     width = max(map(len, map(str.strip, full)))
     assert all(len(line.strip()) > width - 20 for line in full)
+
+
+def test_help_shows_the_value_of_every_option_as_one_word() -> None:
+    options = [option for name in COMMANDS for option in load_command(name).params]
+    assert {option.metavar for option in options if " " in (option.metavar or "")} == set()
 
 
 def test_help_of_a_command_and_the_version(cli: Run) -> None:

@@ -116,6 +116,23 @@ def test_a_dry_run_estimates_transferred_bytes_and_the_useful_number_of_workers(
     assert estimate["seconds"] == seconds[1] == max(seconds.values())
 
 
+@pytest.mark.parametrize(
+    ("name", "code", "word"), [("SIGINT", 130, "interrupted"), ("SIGTERM", 143, "terminated")]
+)
+def test_a_dry_run_that_a_signal_reaches_exits_as_an_interrupted_command(
+    forked: ForkServer, blocks: Path, name: str, code: int, word: str
+) -> None:
+    # the signal comes when the estimate reads the plug-in
+    plugin = blocks.parent / "plugin.py"
+    plugin.write_text(
+        f"import signal\nsignal.raise_signal(signal.{name})\n" + PLUGIN.format(chi="1 - e"), encoding="utf-8"
+    )
+    words = ("sweep", blocks, "--plugin", plugin, "--dry-run", "--set", "sweep.e=0.5")
+    done = forked(*words, cwd=blocks.parent)
+    assert (done.returncode, done.stderr) == (code, f"{word}; nothing was written\n")
+    assert {path.name for path in blocks.parent.iterdir()} == {"blocks.toml", "plugin.py"}
+
+
 @pytest.mark.slow
 def test_a_dry_run_reports_where_trajectories_are_not_deduplicated(cli: Run, blocks: Path) -> None:
     words = ("sweep", "--dry-run", "--set", 'solver.core="numpy"')
