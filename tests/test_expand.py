@@ -196,6 +196,17 @@ def test_a_few_of_many_trajectories_are_read_in_any_order(tmp_path: Path) -> Non
         assert_same_array(lazy["e_out"].isel(e=[271, 3]), result["e_out"].isel(e=[271, 3]))
 
 
+def test_a_computed_output_names_the_axes_along_which_it_or_its_status_varies(tmp_path: Path) -> None:
+    sweep = {"v1": [-1.0, 1.0], "m1": [1.0, 3.0], "m2": 2.0, "K": 1e9}
+    impact.sweep(
+        {"models": "hertz", "sweep": sweep, "output": {"layout": "factored"}}, output=tmp_path / "factored.h5"
+    )
+    with xr.open_dataset(tmp_path / "factored.h5", engine="impact") as lazy:
+        along = {name: lazy[name].encoding["varies_along"]["hertz"] for name in ("e_out", "status", "v1_post")}
+    # an elastic ball has one restitution, but none where it does not come to the other one
+    assert along == {"e_out": ("v1",), "status": ("v1",), "v1_post": ("v1", "m1")}
+
+
 @pytest.mark.slow
 def test_a_factored_file_of_a_plugin_is_read_without_the_plugin(tmp_path: Path) -> None:
     (tmp_path / "stiff.py").write_text(STIFF, encoding="utf-8")

@@ -15,6 +15,7 @@ from impact.contact.interpolant import Interpolant, InterpolatedCollisions, moti
 from impact.contact.models import find
 from impact.contact.output_formulas import collide
 from impact.contact.simulate import simulate
+from impact.contact.status import Status
 
 from .conftest import new_law
 
@@ -119,6 +120,23 @@ def test_an_interval_that_is_not_needed_is_not_divided() -> None:
         lambda x: np.abs(x - 0.3)[:, None], [0.1, 1.0], np.ones(1), is_needed=lambda values: values.min() > 0.5
     )
     assert np.isnan(interpolant(np.array([0.11, 0.99]))).all()
+
+
+def test_a_value_for_which_a_law_raises_has_a_status_and_leaves_the_others_their_polynomials() -> None:
+    def force(K: Array, x: Array, v: Array, p: Array) -> Array:
+        if (p > 0.3).any():
+            raise ValueError("no such material")
+        return K * x + p * v
+
+    parameter = impact.Parameter("p", "1", "a number", default=0.5, least=0.0)
+    model = new_law("raising", force, parameters=(parameter,), exponent=1.0)
+    values = np.array([0.002, 0.05, 0.2, 0.31, 0.9])
+    compute = interpolated(model)
+    computed = delivered(model, "p", values, 1.0, compute=compute)
+    assert computed[1].tolist() == [*[Status.OK] * 3, *[Status.MODEL_ERROR] * 2]
+    np.testing.assert_allclose(computed, delivered(model, "p", values, 1.0), rtol=0, atol=1e-10)
+    assert compute.group is not None
+    assert any(interval.is_accurate for interval in compute.group[1].intervals)
 
 
 def test_laws_of_the_same_motion_share_their_polynomials() -> None:
