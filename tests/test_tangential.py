@@ -353,6 +353,18 @@ def test_agrees_with_the_independent_solver(key: str, form: TangentialForm) -> N
         assert (result.status[i] == FrictionStatus.SLOW_LIMIT) == expected.slow
 
 
+@pytest.mark.parametrize("form", [spring(), spring(cap="both"), TangentialForm("dashpot")])
+def test_a_slip_is_the_same_on_both_sides_of_the_damping_from_which_on_it_counts_as_strong(
+    form: TangentialForm,
+) -> None:
+    """The normal motion is integrated in v up to C = 2, and in a coordinate for strong damping from there."""
+    g0 = np.array([0.2, 1.0, 3.0])
+    weak, strong = (simulate(BOUNCY, form, g0, C=C, k=M_T, c=0.3) for C in (2.0, np.nextafter(2.0, 3.0)))
+    assert (strong.steps != weak.steps).all()
+    np.testing.assert_allclose(strong.slip, weak.slip, rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(strong.sliding_impulse, weak.sliding_impulse, rtol=1e-9)
+
+
 def test_impacts_without_slip_or_friction_are_not_integrated() -> None:
     with np.errstate(divide="ignore"):
         result = simulate("hertz", spring(), [0.0, 1.0, 1.0], n=1.0, k=M_T, mu=[0.3, 0.0, 0.3])
