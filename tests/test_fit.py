@@ -238,9 +238,9 @@ def test_specimens_have_the_interval_and_the_likelihood_of_their_means() -> None
 
 def test_the_deviation_between_specimens_has_the_unit_of_the_values() -> None:
     y = specimens_with_deviations(0.03, 0.01, 1)
-    of_one = fit("constant", [0.0], [1.0], y, 0.01, "excess", specimens=SPECIMENS)
-    of_many = fit("constant", [0.0], [1e6], 1e6 * y, 1e4, "excess", specimens=SPECIMENS)
-    assert of_many.excess == pytest.approx(1e6 * of_one.excess, rel=1e-8)
+    metres = fit("constant", [0.0], [1.0], y, 0.01, "excess", specimens=SPECIMENS)
+    micrometres = fit("constant", [0.0], [1e6], 1e6 * y, 1e4, "excess", specimens=SPECIMENS)
+    assert micrometres.excess == pytest.approx(1e6 * metres.excess, rel=1e-8)
 
 
 def test_a_slope_within_specimens_has_the_interval_of_the_noise_alone() -> None:

@@ -134,6 +134,13 @@ def law_of(damping: Callable[[Array], Array]) -> impact.ForceModel:
     )
 
 
+def roots_at_fixed_steps(law: impact.ForceModel, p: float) -> list[float]:
+    """The values of p with the e_out that the law delivers at this one."""
+    target = impact.run(AT_FIXED_STEPS, at={"damped.p": p}, plugins=[law]).values["e_out"]
+    result = impact.solve("damped", "p", {"e_out": target}, source=AT_FIXED_STEPS, plugins=[law])
+    return [root.value for root in result.roots]
+
+
 def test_a_root_is_right_to_more_digits_than_the_polynomial_that_finds_it() -> None:
     """A polynomial may be wrong by 1e-10, which hides a ripple of the damping."""
     law, target = law_of(lambda p: 0.3 * p + 3e-11 * np.cos(300.0 * (p - 0.5))), linear_restitution(0.075)
@@ -154,27 +161,21 @@ def test_with_a_fixed_step_the_least_value_lies_between_two_values_of_the_scan()
 def test_roots_beside_a_minimum_that_is_not_the_least_are_found_halfway_between_two_values_of_the_scan() -> None:
     """The minimum is at 1.0125, as far from 1.005 as from 1.02; the least value is at 3."""
     law = law_of(lambda p: 0.5 - 20.0 * np.minimum(np.abs(p - 1.0125), 0.1) ** 2 + np.maximum(p - 2.0, 0.0))
-    target = impact.run(AT_FIXED_STEPS, at={"damped.p": 1.0085}, plugins=[law]).values["e_out"]
-    result = impact.solve("damped", "p", {"e_out": target}, source=AT_FIXED_STEPS, plugins=[law])
-    assert [root.value for root in result.roots][:2] == pytest.approx([1.0085, 1.0165], abs=1e-6)
+    assert roots_at_fixed_steps(law, 1.0085)[:2] == pytest.approx([1.0085, 1.0165], abs=1e-6)
 
 
 @pytest.mark.slow
 def test_roots_beside_a_peak_over_the_whole_range_are_found_beyond_the_values_of_the_scan() -> None:
     """Only one of these, 1.005, is on the peak, which is at 1.0075."""
     law = law_of(lambda p: 0.5 - 8.0 * np.maximum(0.01 - np.abs(p - 1.0075), 0.0))
-    target = impact.run(AT_FIXED_STEPS, at={"damped.p": 1.006}, plugins=[law]).values["e_out"]
-    result = impact.solve("damped", "p", {"e_out": target}, source=AT_FIXED_STEPS, plugins=[law])
-    assert [root.value for root in result.roots] == pytest.approx([1.006, 1.009], abs=1e-6)
+    assert roots_at_fixed_steps(law, 1.006) == pytest.approx([1.006, 1.009], abs=1e-6)
 
 
 @pytest.mark.slow
 def test_roots_between_two_powers_of_ten_of_the_scan_are_found_by_its_even_steps_between_the_bounds() -> None:
     """The damping is less from 2.55 to 2.65 only."""
     law = law_of(lambda p: 0.5 - 8.0 * np.maximum(0.05 - np.abs(p - 2.6), 0.0))
-    target = impact.run(AT_FIXED_STEPS, at={"damped.p": 2.575}, plugins=[law]).values["e_out"]
-    result = impact.solve("damped", "p", {"e_out": target}, source=AT_FIXED_STEPS, plugins=[law])
-    assert [root.value for root in result.roots] == pytest.approx([2.575, 2.625], abs=1e-6)
+    assert roots_at_fixed_steps(law, 2.575) == pytest.approx([2.575, 2.625], abs=1e-6)
 
 
 @pytest.mark.slow
