@@ -16,6 +16,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal, NoReturn, TypeAlias
 
@@ -320,12 +321,17 @@ def solve_damping(config: Config, e: float) -> Config:
     unknown = unknown_of(law, law.damping)
     # the e of the continuous law, which friction does not change
     problem = SolveProblem(replace(config, frictions=()), unknown, "e_out")
-    roots, _ = _roots_and_values(problem, target_value("e_out", e), with_range=False)
-    if not roots:
-        lower, upper = map(number, _all_roots(problem, e).attainable)
-        asked = argument("at", number(e), key="e")
-        raise UsageError(f"{asked}: {law.key} delivers {lower} to {upper} at any {law.damping}")
-    return replace(config, scalars={**config.scalars, config_name(law, unknown): roots[0]})
+    size, wanted = problem.natural_size(), target_value("e_out", e)
+    # the least value counts, and impacts under weak damping take fewer steps
+    inner = [size] if unknown.least < size < unknown.most else []
+    for least, most in pairwise([unknown.least, *inner, unknown.most]):
+        part = replace(problem, unknown=replace(unknown, least=least, most=most))
+        roots, _ = _roots_and_values(part, wanted, with_range=False)
+        if roots:
+            return replace(config, scalars={**config.scalars, config_name(law, unknown): roots[0]})
+    lower, upper = map(number, _all_roots(problem, e).attainable)
+    asked = argument("at", number(e), key="e")
+    raise UsageError(f"{asked}: {law.key} delivers {lower} to {upper} at any {law.damping}")
 
 
 def solve_input(config: Config, unknown: Parameter, target: Mapping[str, object]) -> SolveResult:
@@ -498,6 +504,8 @@ class SolveProblem:
 def _all_roots(problem: SolveProblem, target: float) -> SolveResult:
     """Find all values that give the target, and the range of the output."""
     roots, values = _roots_and_values(problem, target)
+    if not values.size:
+        problem.raise_failure()
     e_out = problem.evaluate(np.array(roots))["e_out"].tolist() if roots else []
     status: SolveStatus = "no_root" if not roots else "several_roots" if len(roots) > 1 else "ok"
     if status == "ok" and roots[0] in (problem.unknown.least, problem.unknown.most):
@@ -508,7 +516,7 @@ def _all_roots(problem: SolveProblem, target: float) -> SolveResult:
 def _roots_and_values(
     problem: SolveProblem, target: float, *, with_range: bool = True
 ) -> tuple[list[float], Array]:
-    """Find all values that give the target, ascending, and values of the output.
+    """Find all values that give the target, ascending, and values of the output; none if all integrations fail.
 
     Without the range of the output no work is spent on values far from the target.
     """
@@ -523,7 +531,7 @@ def _roots_and_values(
     # a value at which the integration fails, often for want of steps, hides no root between its neighbours
     scan, values = scan[~np.isnan(values)], values[~np.isnan(values)]
     if not scan.size + known_scan.size:
-        problem.raise_failure()
+        return [], scan
     scale = 1.0 if problem.is_of_order_one else abs(target) or float(np.abs(np.append(values, known_values)).max())
     tolerance = TARGET_TOLERANCE * problem.config.solver.rtol * scale
     is_exact = np.abs(values - target) <= SCAN_TOLERANCE * scale
