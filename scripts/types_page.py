@@ -40,7 +40,7 @@ in SI, or the dataset, give; "–" is one that an `impact.UsageError` refuses, w
 
 {results}
 """
-unit = pint.UnitRegistry()
+unit = pint.get_application_registry()
 LAW = "kuwabara-kono-1987"
 # solved in a tenth of the time of others
 QUICK = "gharib-hurmuzlu-2012"

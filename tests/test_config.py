@@ -10,7 +10,6 @@ import tomllib
 from fractions import Fraction
 from pathlib import Path
 
-import jsonschema
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
@@ -25,7 +24,7 @@ from impact.errors import ConfigError
 from impact.formatting import escape_controls, safe_text
 
 from .conftest import ROOT, new_law, problems_of
-from .test_schema_agrees import SCHEMA
+from .test_schema_agrees import schema_of_configs, validator_of_configs
 
 # what a user of the command line reads
 pytestmark = pytest.mark.usefixtures("command_line_words")
@@ -624,7 +623,7 @@ def test_a_density_is_required_only_where_a_radius_is_derived_from_it() -> None:
     for line, ball, key in (("R1 = 0.1", 2, "hertz"), ("R2 = 0.1", 1, "hertz"), ("K = 1e9", 1, "test-radius")):
         text = bare.replace("e = 0.5", f"e = 0.5\n{line}").replace("lankarani-nikravesh-1990", key)
         assert problems(text) == [needs.format(ball, key)]
-    validator = jsonschema.Draft202012Validator(SCHEMA)
+    validator = validator_of_configs()
     assert validator.is_valid(tomllib.loads(bare))
 
 
@@ -725,13 +724,13 @@ def test_a_file_with_byte_order_mark_and_crlf_is_read(tmp_path: Path) -> None:
 
 
 def test_the_schema_is_valid_and_accepts_the_configs() -> None:
-    validator = jsonschema.Draft202012Validator(SCHEMA)
-    validator.check_schema(SCHEMA)
+    validator = validator_of_configs()
+    validator.check_schema(schema_of_configs())
     for text in (FIGURE6.read_text(), STARTER.read_text(), EXAMPLE, GOOD):
         validator.validate(tomllib.loads(text))
     for text in ('"all"', '"family:hysteresis"', '["hertz", "lankarani-*"]'):
         validator.validate(tomllib.loads(changed('["lankarani-nikravesh-1990"]', text)))
-    assert json.loads(json.dumps(SCHEMA, allow_nan=False)) == SCHEMA
+    assert json.loads(json.dumps(schema_of_configs(), allow_nan=False)) == schema_of_configs()
 
 
 @pytest.mark.parametrize(
@@ -759,7 +758,7 @@ def test_the_schema_is_valid_and_accepts_the_configs() -> None:
 def test_the_schema_refuses(old: str, new: str) -> None:
     text = changed(old, new)
     assert problems(text)
-    assert not jsonschema.Draft202012Validator(SCHEMA).is_valid(tomllib.loads(text))
+    assert not validator_of_configs().is_valid(tomllib.loads(text))
 
 
 @pytest.mark.parametrize(
@@ -784,14 +783,14 @@ def test_the_schema_accepts_the_models_that_the_reader_accepts(models: str, acce
     data = tomllib.loads(changed('["lankarani-nikravesh-1990"]', models))
     faults = expand_models(data["models"], catalogue())[1]
     assert (not faults) is accepted
-    assert jsonschema.Draft202012Validator(SCHEMA).is_valid(data) is accepted
+    assert validator_of_configs().is_valid(data) is accepted
 
 
 def test_the_schema_names_every_key_with_its_unit() -> None:
-    sweep = SCHEMA["$defs"]["Sweep"]["properties"]  # type: ignore[index]
+    sweep = schema_of_configs()["$defs"]["Sweep"]["properties"]  # type: ignore[index]
     assert sweep["alpha"]["description"].endswith("e = 1 - alpha v0 [s/m]")
     assert all(entry["description"] for entry in sweep.values())
-    models = SCHEMA["properties"]["models"]["anyOf"][0]["enum"]  # type: ignore[index]
+    models = schema_of_configs()["properties"]["models"]["anyOf"][0]["enum"]  # type: ignore[index]
     assert {*catalogue(), "all", "family:hysteresis"} <= set(models)
 
 

@@ -13,7 +13,7 @@ import pytest
 import impact
 from impact.contact.interpolant import CHECK_TOLERANCE
 
-unit = pint.UnitRegistry()
+unit = pint.get_application_registry()
 BALLS: dict[str, Any] = {"v1": 1.0, "m1": 1.0, "m2": 2.0, "R1": 0.01, "R2": 0.02, "K": 1e9, "e": 0.5}
 FRICTION = {"models": "hertz", "frictions": "coulomb-1785", "sweep": {**BALLS, "u1": 0.3, "mu": 0.2}}
 # inputs that vary, for laws whose motion depends on one, two and no dimensionless numbers

@@ -21,7 +21,7 @@ import impact
 
 from .conftest import ROOT, Run, assert_same_bits
 
-unit = pint.UnitRegistry()
+unit = pint.get_application_registry()
 BASE = {
     "models": ["hertz", "tsuji-1992"],
     "sweep": {"e": [0.25, 0.5], "v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 6e9},

@@ -10,6 +10,7 @@ from __future__ import annotations
 import copy
 import json
 import re
+from functools import cache
 from typing import Any
 
 import jsonschema
@@ -21,8 +22,6 @@ from impact.config.load import parse_config, read_config
 from impact.config.quantities import DISTRIBUTION_FORMS
 from impact.errors import ConfigError
 
-SCHEMA: dict[str, Any] = impact.schema()
-VALIDATOR = jsonschema.Draft202012Validator(SCHEMA)
 GOOD: dict[str, Any] = {
     "models": ["lankarani-nikravesh-1990"],
     "sweep": {"e": 0.5, "v1": 1.0, "m1": 1.0, "m2": 2.0, "R1": 0.1, "R2": 0.1, "material": "block"},
@@ -57,6 +56,17 @@ ANYTHING = st.one_of(
     ),
     st.tuples(NUMBERS, NUMBERS, NUMBERS).map(lambda ends: {"linspace": list(ends)}),
 )
+
+
+# not at import: it takes as long as the collection of many tests
+@cache
+def schema_of_configs() -> dict[str, Any]:
+    return impact.schema()
+
+
+@cache
+def validator_of_configs() -> jsonschema.Draft202012Validator:
+    return jsonschema.Draft202012Validator(schema_of_configs())
 
 
 def values(schema: dict[str, Any], definitions: dict[str, Any]) -> st.SearchStrategy[Any]:
@@ -99,13 +109,11 @@ def values(schema: dict[str, Any], definitions: dict[str, Any]) -> st.SearchStra
 def part(key: str) -> dict[str, Any]:
     """The schema of a key, with the definitions that it refers to."""
     table, _, name = key.rpartition(".")
-    definition = (
-        SCHEMA["$defs"][TABLES.get(table, table.removeprefix("model.").replace("friction.", "friction_"))]
-        if table
-        else SCHEMA
-    )
-    schema = definition["properties"][name]
-    definitions = {used: SCHEMA["$defs"][used] for used in re.findall(r"#/\$defs/([^']*)'", str(schema))}
+    whole = schema_of_configs()
+    by_name = whole["$defs"]
+    table = TABLES.get(table, table.removeprefix("model.").replace("friction.", "friction_"))
+    schema = (by_name[table] if table else whole)["properties"][name]
+    definitions = {used: by_name[used] for used in re.findall(r"#/\$defs/([^']*)'", str(schema))}
     return {**schema, "$defs": definitions}
 
 
@@ -140,7 +148,7 @@ def test_reader_and_schema_agree_on_a_key(key: str, tmp_path: Any, monkeypatch: 
     validator = jsonschema.Draft202012Validator(schema)
 
     @settings(max_examples=12, deadline=None, suppress_health_check=list(HealthCheck))
-    @given(values(schema, SCHEMA["$defs"]) | ANYTHING)
+    @given(values(schema, schema_of_configs()["$defs"]) | ANYTHING)
     def check(value: object) -> None:
         data = with_value(key, value)
         faults = faults_at(key, data)
@@ -160,7 +168,7 @@ def test_reader_and_schema_agree_on_a_key(key: str, tmp_path: Any, monkeypatch: 
 def test_an_unknown_key_is_refused_by_both(table: str) -> None:
     key = f"{table}.x9" if table else "x9"
     data = with_value(key, 1)
-    assert not VALIDATOR.is_valid(data)
+    assert not validator_of_configs().is_valid(data)
     assert any("x9: unknown key" in line for line in faults_at(key, data))
 
 
@@ -173,7 +181,7 @@ def test_schema_requires_what_the_reader_requires() -> None:
         for step in tables:
             table = table[step]
         del table[name]
-        assert not VALIDATOR.is_valid(data), key
+        assert not validator_of_configs().is_valid(data), key
         with pytest.raises(ConfigError, match=f"{key}: missing|models: got nothing"):
             read_config(data)
 
@@ -182,7 +190,7 @@ def test_a_stored_table_of_cases_is_in_the_schema() -> None:
     data = copy.deepcopy(GOOD)
     data["sweep"] |= {"cases": {"v1": [1.0, 2.0], "m1": ["1 g", "2 g"]}}
     del data["sweep"]["v1"], data["sweep"]["m1"]
-    assert VALIDATOR.is_valid(data)
+    assert validator_of_configs().is_valid(data)
     config = read_config(data)
     assert parse_config(config.text, config.overrides) == config
 
@@ -244,7 +252,7 @@ def test_reader_and_schema_agree_on_a_calibration(key: str) -> None:
             parse_config(json.dumps(config), purpose="calibrate")
         except ConfigError as error:
             problems = list(error.problems)
-        if VALIDATOR.is_valid(config):
+        if validator_of_configs().is_valid(config):
             unexpected = [line for line in problems if not any(text in line for text in BEYOND_DATA)]
             assert not unexpected, "the reader refuses what the schema accepts"
         else:
@@ -256,6 +264,6 @@ def test_reader_and_schema_agree_on_a_calibration(key: str) -> None:
 def test_schema_requires_the_speed_of_a_sweep_but_not_of_measurements() -> None:
     sweep = {"e": 0.5, "m1": 1.0, "m2": 1.0, "material": "steel"}
     config: dict[str, Any] = {"models": "hertz", "sweep": sweep}
-    assert not VALIDATOR.is_valid(config)
-    assert VALIDATOR.is_valid({**config, "data": {"file": "drops.csv"}})
-    assert not VALIDATOR.is_valid({**config, "data": {"noise": "scale"}})
+    assert not validator_of_configs().is_valid(config)
+    assert validator_of_configs().is_valid({**config, "data": {"file": "drops.csv"}})
+    assert not validator_of_configs().is_valid({**config, "data": {"noise": "scale"}})
