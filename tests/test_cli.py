@@ -275,6 +275,9 @@ def test_run_repeats_a_point_of_a_result(cli: Run, tmp_path: Path) -> None:
         (["info", "absent.h5"], "absent.h5: does not exist"),
         (["info", "pyproject.toml"], "pyproject.toml: is a TOML file, not a result"),
         (["plot", "absent.h5"], "absent.h5: does not exist"),
+        (["plot", "absent.h5", "--label", "e=Asked"], "absent.h5: does not exist"),
+        (["plot", "absent.h5", "--label", "e="], "--label: got e=, expected KEY=TEXT, such as "),
+        (["plot", "absent.h5", "--label", "=e"], "--label: got =e, expected KEY=TEXT, such as "),
         (["init", "README.md"], "README.md: exists; give another name, or overwrite it (--overwrite)"),
         (["swep"], "impact: No such command 'swep'. Did you mean 'sweep'?; see impact -h"),
         (["sweep"], "impact sweep: Missing argument 'config'; see impact sweep -h"),
@@ -495,6 +498,15 @@ def test_common_materials_are_listed_with_units_and_sources(cli: Run) -> None:
     assert json.loads(cli("materials", "glass", "--json").stdout) == {"glass": impact.materials()["glass"]}
     refused = cli("materials", "glas")
     assert (refused.returncode, refused.stderr) == (2, 'no material "glas"; did you mean "glass"?\n')
+
+
+def test_texts_in_the_list_of_materials_begin_below_their_headings(cli: Run) -> None:
+    headings, *rows = cli("materials").stdout.splitlines()
+    what, source = headings.index("what"), headings.index("source")
+    for name, record in impact.materials().items():
+        (row,) = (row for row in rows if row.startswith(f"{name} "))
+        # a long text is broken
+        assert (row[what : what + 5], row[source : source + 5]) == (record["about"][:5], record["source"][:5])
 
 
 def test_info(cli: Run, stored: Path) -> None:
