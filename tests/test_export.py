@@ -1087,6 +1087,7 @@ def test_drake_takes_coulomb_friction_with_tamsi() -> None:
         impact.export("drake", key, at=at, friction="drake-regularized", code_version=version)
     straight = {name: value for name, value in at.items() if name not in ("mu", "angle")}
     central = impact.export("drake", key, at=straight, code_version=version)
+    assert "    friction=CoulombFriction(0.0, 0.0)," in central.lines
     assert not any("stiction" in line for line in central.lines)
 
 
