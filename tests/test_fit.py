@@ -243,6 +243,15 @@ def test_the_deviation_between_specimens_has_the_unit_of_the_values() -> None:
     assert micrometres.excess == pytest.approx(1e6 * metres.excess, rel=1e-8)
 
 
+def test_the_deviation_between_specimens_does_not_depend_on_the_width_of_the_bounds() -> None:
+    y = specimens_with_deviations(0.03, 0.01, 1)
+    wide, narrow = (
+        fit("constant", [y.mean() - width], [y.mean() + width], y, 0.01, "excess", specimens=SPECIMENS)
+        for width in (0.5, 1e-9)
+    )
+    assert narrow.excess == pytest.approx(wide.excess, rel=1e-6)
+
+
 def test_a_slope_within_specimens_has_the_interval_of_the_noise_alone() -> None:
     """What specimens share does not change it; the mean has the three degrees of freedom of four specimens."""
     y = specimens_with_deviations(0.03, 0.01, 2) + 0.05 * CENTRED

@@ -485,6 +485,18 @@ def test_each_pair_has_a_study_and_one_without_meaning_has_not_failed() -> None:
     assert "0 sticks" not in figure.texts[0].get_text()
 
 
+def test_no_sample_of_a_pair_without_meaning_has_failed_whatever_the_order_of_the_laws() -> None:
+    source = config(
+        models=["lankarani-nikravesh-1994", "hertz"],
+        mu={"uniform": [0.01, 0.05]},
+        friction={"lammps-mindlin": {"kt_over_kn": 0.8}},
+        design={"n": 2},
+    )
+    study = impact.sensitivity(source, of="beta")
+    assert study["failed"].values.tolist() == [[0, 0], [0, 0]]
+    assert np.isnan(study["mean"]).values.tolist() == [[False, True], [False, False]]
+
+
 @pytest.mark.slow
 def test_an_uncertain_angle_is_described_in_degrees() -> None:
     source = config(frictions="coulomb-1785", friction={}, design={"n": 2})
