@@ -7,6 +7,7 @@ import math
 import re
 import shlex
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -139,6 +140,13 @@ def roots_at_fixed_steps(law: impact.ForceModel, p: float) -> list[float]:
     target = impact.run(AT_FIXED_STEPS, at={"damped.p": p}, plugins=[law]).values["e_out"]
     result = impact.solve("damped", "p", {"e_out": target}, source=AT_FIXED_STEPS, plugins=[law])
     return [root.value for root in result.roots]
+
+
+def test_a_parameter_without_a_least_value_is_solved_for() -> None:
+    law = law_of(lambda p: 0.3 + 0.2 * np.tanh(p))
+    law = replace(law, parameters=(impact.Parameter("p", "1", "a number"),))
+    (root,) = impact.solve("damped", "p", {"e_out": linear_restitution(0.1)}, plugins=[law]).roots
+    assert root.value == pytest.approx(-math.atanh(0.5), abs=1e-6)
 
 
 def test_a_root_is_right_to_more_digits_than_the_polynomial_that_finds_it() -> None:
