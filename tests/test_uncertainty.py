@@ -111,6 +111,20 @@ def test_an_input_that_matters_in_some_samples_alone_has_indices() -> None:
     assert float(impact.sensitivity(config)["total"].squeeze()) > 0.5
 
 
+def test_an_input_that_changes_the_output_by_errors_of_the_integration_has_an_index_of_zero() -> None:
+    """The restitution of this law does not depend on n; its smallest sample is far below the others."""
+    config = {
+        "models": "exact-hysteresis",
+        "design": {"n": 16},
+        "sweep": {"v1": 1.0, "R1": 0.01, "R2": 0.01, "material": "steel"}
+        | {"e": {"uniform": [1e-6, 1.0]}, "n": {"uniform": [1.0, 2.0]}},
+        "solver": {"rtol": 1e-4},
+    }
+    study = impact.sensitivity(config).isel(model=0)
+    of_e, of_n = study["total"].values
+    assert (of_e > 0.5, of_n) == (True, 0.0)
+
+
 SIMBODY_ENDS = {"c": (0.01, 3.0), "v1": (0.05, 3.0)}
 
 
