@@ -91,6 +91,10 @@ def test_a_model_from_python_is_run_and_recorded() -> None:
         impact.sweep({"models": ["mine-2026"], "sweep": SWEEP, "solver": COARSE})
 
 
+def test_the_force_of_a_hysteresis_law_is_that_of_its_formula_at_any_closing_speed() -> None:
+    assert _mine().force(elastic=3.0, v=0.5, v0=2.0, chi=0.8) == pytest.approx(3.0 * (1.0 + 0.8 * 0.5 / 2.0))
+
+
 def test_a_changed_model_has_another_fingerprint() -> None:
     def fingerprint(model: impact.ForceModel) -> str:
         return impact.sweep({"models": [model.key], "sweep": SWEEP, "solver": COARSE}, plugins=[model]).attrs[
