@@ -272,6 +272,22 @@ def test_a_run_of_a_result_needs_the_plug_in_of_the_sweep(forked: ForkServer, fo
     assert json.loads(changed.stdout)["outputs"]["e_out"] != float(stored["e_out"])
 
 
+def test_a_run_of_a_calibration_with_a_changed_plug_in_has_a_warning(folder: Path) -> None:
+    config = {
+        "models": "mine-2026",
+        "solver": {"rtol": 1e-4},
+        "sweep": {"e": {"fit": [0.1, 1.0]}, "v1": 1.0, "m1": 1.0, "m2": 2.0, "K": 1e6},
+        "data": {"columns": {"e_out": [0.5, 0.52]}},
+    }
+    plugin, path = folder / "my_model.py", folder / "fit.h5"
+    impact.calibrate(config, plugins=[plugin], output=path)
+    assert impact.run(path, plugins=[plugin]).e_kinematic == pytest.approx(0.51, abs=1e-3)
+    _write(plugin, "1 - e")
+    with pytest.warns(UserWarning, match=r"fit\.h5: was made with another version of my_model\.py: its SHA"):
+        changed = impact.run(path, plugins=[plugin])
+    assert changed.e_kinematic > 0.6
+
+
 @pytest.mark.slow
 def test_a_run_of_a_result_needs_the_python_value_of_the_sweep(forked: ForkServer, folder: Path) -> None:
     path = folder / "results.h5"
