@@ -162,6 +162,7 @@ def test_too_many_points_are_refused_before_memory_or_a_file_is_used(forked: For
     for override, message in messages.items():
         completed = forked("sweep", blocks, *sets, "--set", override, cwd=blocks.parent, limit=10.0)
         assert (completed.returncode, len(completed.stderr.splitlines())) == (2, 1)
+        assert completed.stderr.startswith(f"{blocks}:")
         assert f"sweep: {message}" in completed.stderr
         assert completed.memory < 300e6
     completed = forked("sweep", blocks, "--max-points", "159999", "--set", full, cwd=blocks.parent)
