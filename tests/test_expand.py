@@ -41,6 +41,7 @@ SMALL = {
     "solver": {"rtol": 1e-4},
     "sweep": {"e": [0.3, 0.6], "v1": [1.0, 2.0], "m1": 1.0, "m2": 2.0, "K": 1e9},
 }
+MANY = SMALL | {"sweep": {"e": {"linspace": [0.3, 0.9, 300]}, "v1": 1.0, "m1": 1.0, "m2": 2.0, "K": 1e9}}
 EVERYTHING = [*CENTRAL_OUTPUTS]
 VALUES: dict[str, list[object]] = {
     "e": [0.0, 0.1, 0.5, 1.0], "v1": [-1.0, 0.5, 1.0, 2.0, 1e-200, 1e200], "v2": [0.0, -1.0, 1.0],
@@ -190,10 +191,14 @@ def test_a_factored_file_holds_the_values_of_a_full_one(tmp_path: Path, config: 
 @pytest.mark.slow
 def test_a_few_of_many_trajectories_are_read_in_any_order(tmp_path: Path) -> None:
     # the trajectories that were read last, which are kept, are those of the second law
-    many = SMALL | {"sweep": {"e": {"linspace": [0.3, 0.9, 300]}, "v1": 1.0, "m1": 1.0, "m2": 2.0, "K": 1e9}}
-    result = impact.sweep(many, output=tmp_path / "factored.h5", overrides=['output.layout="factored"'])
+    result = impact.sweep(MANY, output=tmp_path / "factored.h5", overrides=['output.layout="factored"'])
     with xr.open_dataset(tmp_path / "factored.h5", engine="impact") as lazy:
         assert_same_array(lazy["e_out"].isel(e=[271, 3]), result["e_out"].isel(e=[271, 3]))
+
+
+def test_a_few_of_many_trajectories_of_a_result_without_a_file_are_read_in_any_order() -> None:
+    lazy, full = lazy_and_full(MANY)
+    assert_same_array(lazy["e_out"].isel(e=[271, 3]), full["e_out"].isel(e=[271, 3]))
 
 
 def test_a_computed_output_names_the_axes_along_which_it_or_its_status_varies(tmp_path: Path) -> None:
