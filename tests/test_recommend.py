@@ -165,6 +165,14 @@ def test_a_model_is_named_with_its_best_parameters_and_their_units() -> None:
     assert "units" not in row.record
 
 
+def test_a_law_without_e_is_ranked_by_a_target_with_its_best_parameter() -> None:
+    sweep = {"v1": [0.5, 1.0], "m1": 1.0, "m2": 1.0, "K": 1e6, "n": 1.0}
+    parameters = {"kelvin-voigt": {"C": [100.0, 300.0, 900.0]}}
+    result = impact.sweep({"models": "kelvin-voigt", "sweep": sweep, "model": parameters})
+    (ranked,) = impact.recommend(result, target={"e_out": 0.6}, tol=0.1).models
+    assert (ranked.parameters, ranked.points, ranked.within) == ({"model.kelvin-voigt.C": 300.0}, 2, 2)
+
+
 def test_models_are_ranked_by_share_then_by_error() -> None:
     ranking = impact.recommend(swept(["hertz", *FAIR, "bilinear"], rtol=1e-10), tol=0.01)
     assert [ranked.model for ranked in ranking.models] == ["bilinear", *reversed(FAIR), "hertz"]
