@@ -14,7 +14,8 @@ import pytest
 from .conftest import ROOT
 
 EXAMPLES = sorted((ROOT / "docs" / "examples").glob("*.py"))
-# pandas has types if pandas-stubs is installed; those of clusters and notebooks are large, and no script meets them
+# pandas has types if pandas-stubs is installed; those of clusters and notebooks are many, and no script meets
+# them
 CONFIG = """\
 [mypy]
 strict = true
