@@ -415,6 +415,22 @@ def test_a_fit_at_a_speed_has_no_v1_which_follows_from_the_measured_angle() -> N
     assert "v1" not in coordinates
 
 
+@pytest.mark.parametrize(
+    "velocities", [{"speed": 2.0}, {"v1": 2.0, "u2": 0.5}], ids=["a speed", "a sideways velocity of ball 2"]
+)
+def test_the_best_config_of_an_oblique_fit_repeats_the_predictions(
+    velocities: dict[str, float], tmp_path: Path
+) -> None:
+    """With a speed both sideways velocities follow from it, and neither is in the config."""
+    sweep = {"e": 0.8, "m1": 0.1, "m2": 0.2, "R1": 0.01, "K": 1e7, "mu": {"fit": [0.05, 0.06]}} | velocities
+    columns = {"angle": [0.9, 1.0], "beta": [-0.8, -0.9]}
+    source = {"models": "hertz", "frictions": "coulomb-1785", "sweep": sweep, "data": {"columns": columns}}
+    result = impact.calibrate({**source, "solver": {"rtol": 1e-4}}, best=tmp_path / "best.toml")
+    again = impact.sweep(tmp_path / "best.toml")
+    assert {name: again[name].item() for name in velocities} == velocities
+    np.testing.assert_allclose(again["beta"].values.ravel(), result["predicted"].values.ravel(), atol=1e-3)
+
+
 @pytest.fixture(scope="module")
 def fitted() -> xr.Dataset:
     """A calibration of a pair of laws by two measured values."""
