@@ -156,10 +156,16 @@ def test_a_root_is_right_to_more_digits_than_the_polynomial_that_finds_it() -> N
     assert root.e_out == pytest.approx(target, rel=1e-12)
 
 
-@pytest.mark.parametrize("place", [1.0075, 2.9875])
-def test_with_a_fixed_step_the_least_value_lies_between_two_values_of_the_scan(place: float) -> None:
-    """These are at 1.005 and 1.02, and at 2.985 and 3, its last ones."""
-    law = law_of(lambda p: 0.5 - 20.0 * np.minimum(np.abs(p - place), 0.1) ** 2)
+@pytest.mark.parametrize(
+    ("place", "half_width"),
+    [(1.0075, 0.1), (2.9875, 0.1), (2.5025, 0.02)],
+    ids=["inside", "beside the last value", "narrow"],
+)
+def test_with_a_fixed_step_the_least_value_lies_between_two_values_of_the_scan(
+    place: float, half_width: float
+) -> None:
+    """These are at multiples of 0.015 up to 3; a polynomial would miss the narrow minimum."""
+    law = law_of(lambda p: 0.5 - 0.2 * np.minimum(np.abs(p - place) / half_width, 1.0) ** 2)
     result = impact.solve("damped", "p", {"e_out": 0.3}, source=AT_FIXED_STEPS, plugins=[law])
     least = impact.run(AT_FIXED_STEPS, at={"damped.p": place}, plugins=[law]).values["e_out"]
     assert result.status == "no_root"
