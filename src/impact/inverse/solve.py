@@ -322,7 +322,7 @@ def solve_damping(config: Config, e: float) -> Config:
     # the e of the continuous law, which friction does not change
     problem = SolveProblem(replace(config, frictions=()), unknown, "e_out")
     size, wanted = problem.natural_size(), target_value("e_out", e)
-    # the least value counts, and impacts under weak damping take fewer steps
+    # the least of several values is wanted, and impacts under weak damping take fewer steps
     inner = [size] if unknown.least < size < unknown.most else []
     for least, most in pairwise([unknown.least, *inner, unknown.most]):
         part = replace(problem, unknown=replace(unknown, least=least, most=most))
