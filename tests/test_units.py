@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 
+from impact.contact.model import Parameter
 from impact.contact.units import dimension
+from impact.errors import ModelError
+
+from .conftest import new_law
 
 UNITS = {
     "m^(-n)": (0.0, -1.5, 0.0),
@@ -21,3 +27,9 @@ UNITS = {
 @pytest.mark.parametrize("unit", UNITS)
 def test_dimension(unit: str) -> None:
     assert dimension(unit, {"n": 1.5, "p": 2.0}) == UNITS[unit]
+
+
+@pytest.mark.parametrize("unit", ["lb", "N/ft^n", "N+m"])
+def test_a_unit_of_a_parameter_that_is_no_product_of_powers_of_si_units_is_refused(unit: str) -> None:
+    with pytest.raises(ModelError, match=re.escape(f'unit "{unit}": expected powers of 1, rad, kg')):
+        new_law("dashpot", lambda elastic, v, c: elastic + c * v, parameters=(Parameter("c", unit, "damping"),))
