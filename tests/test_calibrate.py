@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -175,6 +176,8 @@ def test_the_best_config_has_the_law_that_fits_best_at_a_bound_too(tmp_path: Pat
     assert fit["fit_status"].attrs["flag_meanings"].split()[int(first["fit_status"])] == "at_bound"
     assert first["aicc"] < fit["aicc"][1]
     assert impact.sweep(tmp_path / "best.toml")["model"].item() == first["model"].item() == "tsuji-1992"
+    # no parameter of the other law
+    assert "model" not in tomllib.loads((tmp_path / "best.toml").read_text(encoding="utf-8"))
 
 
 @pytest.mark.slow

@@ -199,7 +199,6 @@ def test_liggghts_hooke_remarks_on_its_characteristic_velocity_and_on_attraction
     assert "limitForce on: the force is never negative" in limited
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("moduli", "expected"),
     [

@@ -120,5 +120,5 @@ def test_a_file_of_the_release_is_used_in_place(tmp_path: Path) -> None:
 def test_a_calibration_without_the_variables_added_since_is_read() -> None:
     stored = impact.load(FOLDER / "calibration.h5")
     assert not {"p_value", "loo_residual"} & set(stored.variables)
-    assert [row[5] for row in fit_rows(stored)] == ["–"]
+    assert [(row[2], row[5]) for row in fit_rows(stored)] == [("0.5", "–")]
     assert largest_residuals(stored) == []
