@@ -63,6 +63,14 @@ def test_the_axes_are_logarithmic_as_asked_or_as_the_input_is_spaced(drops: xr.D
     assert scales(even, log="y") == [(linear, log), (linear, linear)]
 
 
+@pytest.mark.parametrize(("speeds", "scale"), [([0.1, 0.3, 0.9, 2.7], "log"), ([0.1, 1.0, 1.8, 2.7], "linear")])
+def test_the_axis_of_an_input_has_the_scale_of_its_values(speeds: list[float], scale: str) -> None:
+    sweep = {"m1": 1.0, "m2": 1.0, "K": 1e6, "n": 1.0, "e": {"fit": [0.1, 1.0]}}
+    data = {"columns": {"v1": speeds, "e_out": [0.5, 0.51, 0.49, 0.5]}}
+    fit = impact.calibrate({"models": "anagnostopoulos-1988", "sweep": sweep, "data": data}, overrides=QUICK)
+    assert [axes.get_xscale() for axes in impact.plot(fit).axes] == [scale, scale]
+
+
 def test_without_a_varied_input_the_values_are_over_their_number() -> None:
     sweep = {"v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 1e6, "n": 1.0, "e": {"fit": [0.1, 1.0]}}
     data = {"noise": "scale", "columns": {"e_out": [0.49, 0.5, 0.52]}}

@@ -839,6 +839,10 @@ def test_models_by_words_of_their_title_or_reference(cli: Run) -> None:
     assert (none.returncode, none.stderr.count("\n")) == (2, 1)
 
 
+def test_the_list_of_laws_says_how_one_law_is_described(cli: Run) -> None:
+    assert "`impact models KEY` describes one model in full." in cli("models", "tsuji-*").stdout
+
+
 def test_models_by_a_pattern(cli: Run) -> None:
     keys = [record["key"] for record in json.loads(cli("models", "lammps-t*", "--json").stdout)]
     assert keys == [key for key in impact.models() if key.startswith("lammps-t")]

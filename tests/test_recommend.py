@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -365,6 +366,13 @@ def test_a_missing_number_is_null(cli: Run, tmp_path: Path) -> None:
     lines = cli("recommend", tmp_path / "results.h5").stdout.splitlines()
     assert lines[0] == "no model gives e within 0.01 at any of 4 points"
     assert lines[-1].split() == ["exact-hysteresis", "0%", "–", "–", "4", "–", "nowhere"]
+
+
+def test_the_number_of_laws_that_a_table_leaves_out_is_printed() -> None:
+    ranking = impact.recommend(swept("hertz", m2=1.0, e=[0.5, 1.0]))
+    for count, last in ((31, "and 1 more (--json has all)"), (30, "hertz ")):
+        many = replace(ranking, models=ranking.models * count)
+        assert str(many).splitlines()[-1].startswith(last)
 
 
 @pytest.mark.slow
