@@ -19,8 +19,8 @@ from .state import RUNNING, State, TrialStep, put_columns
 # within the larger part, if the rate of the margin is known: a step of order two bridges it
 SWITCH_RTOL, SWITCH_ATOL, NEAR_SWITCH = 1e-8, 3e-10, 1e-4
 # a step ends at the least value of a margin in its inside if that is less than this part of those at its ends, and
-# not as near to the start as the second number, in steps
-LOW_MARGIN, NEAR_START = 0.05, 0.01
+# not as near to an end of the step as the second number, in steps: there is no change at a minimum above zero
+LOW_MARGIN, NEAR_END = 0.05, 0.01
 # the rates of a margin are computed at both ends of a step over which it changes by more than this part
 LARGE_CHANGE = 0.5
 # a margin of unknown rate has changed much if it is above this multiple of the one before
@@ -94,14 +94,9 @@ def _locate(
     slopes = np.where(goes_on, slopes, np.fmin(slopes, 0.0))
     turns = (slopes_before < 0.0) & (slopes > 0.0)
     falls = (is_event_ahead(margins, slopes, h_ahead) | turns).any(axis=0)
-    # the secant of a step that was shortened before has half the height at its start, so that steps across a
-    # zero do not approach it from beyond for ever (the Illinois rule)
-    height = np.where(state.h_free[positions] > 0.0, 0.5, 1.0) * before
-    height = np.where(unknown, height, np.nan)
-    which, offset = _first_zero(margins, slopes, before, slopes_before, h, height)
-    picked = which, np.arange(which.size)
-    rtol = np.where(unknown[picked] | turns[picked], SWITCH_RTOL, NEAR_SWITCH)
-    near = rtol * (h + state.h_last[positions]) + SWITCH_ATOL
+    is_again = state.h_free[positions] > 0.0
+    which, offset, is_smooth = _first_zero(margins, slopes, before, slopes_before, h, unknown, is_again)
+    near = np.where(is_smooth, NEAR_SWITCH, SWITCH_RTOL) * (h + state.h_last[positions]) + SWITCH_ATOL
     reached = falls & (np.abs(offset) <= near) & goes_on
     crossed = falls & (offset < -near) & ~reached
     is_ahead = falls & (offset > near) & (offset < h_ahead)
@@ -110,16 +105,17 @@ def _locate(
 
 
 def _first_zero(
-    g: Array, dg: Array, g_before: Array, dg_before: Array, h: Array, height: Array
-) -> tuple[NDArray[np.intp], Array]:
-    """Find the margin that vanishes first, and the offset from the end of the step, shape (n,).
+    g: Array, dg: Array, g_before: Array, dg_before: Array, h: Array, unknown: Mask, is_again: Mask
+) -> tuple[NDArray[np.intp], Array, Mask]:
+    """Find the margin that vanishes first, the offset from the end of the step, and if it is that of a cubic.
 
-    `height` is the value at the start for the secant of margins with unknown rates, and NaN for the others.
+    The arrays have the shape (margins, n), `h` and `is_again`, whether the step was shortened before, have (n,).
     """
     offset, certain = event_offset(g, dg, g_before, dg_before, h)
-    inside = (offset < 0.0) & (offset > -h) & np.isnan(height)
-    start = np.where(np.isnan(height), g_before, height)
-    crossing = np.where(start > 0.0, -h * g / (g - start), -h * (1.0 - NEAR_START))
+    inside = (offset < 0.0) & (offset > -h) & ~unknown
+    crossing = np.where(g_before > 0.0, -h * g / (g - g_before), -h * (1.0 - NEAR_END))
+    # secants across a jump, or onto a constant part, would approach the zero from beyond for ever
+    crossing = np.where(is_again, -0.5 * h, crossing)
     crossing = np.where(inside, offset, crossing)
     ahead = np.where(certain & (offset >= 0.0), offset, np.inf)
     turns = (dg_before < 0.0) & (dg > 0.0)
@@ -128,7 +124,8 @@ def _first_zero(
         ahead[turns] = _low_minimum(*(values[turns] for values in (g, dg, g_before, dg_before, steps)))
     offset = np.where(g < 0.0, crossing, ahead)
     which = offset.argmin(axis=0)
-    return which, offset[which, np.arange(which.size)]
+    first = which, np.arange(which.size)
+    return which, offset[first], (inside | ((g >= 0.0) & ~unknown))[first]
 
 
 def _low_minimum(g: Array, dg: Array, g_before: Array, dg_before: Array, h: Array) -> Array:
@@ -138,7 +135,7 @@ def _low_minimum(g: Array, dg: Array, g_before: Array, dg_before: Array, h: Arra
     # the root of the derivative at which it grows
     theta = -first / (square + np.sqrt(square * square - 3.0 * cubic * first))
     least = g_before + theta * (first + theta * (square + theta * cubic))
-    is_low = (least < LOW_MARGIN * np.maximum(g, g_before)) & (theta > NEAR_START) & (theta < 1.0)
+    is_low = (least < LOW_MARGIN * np.maximum(g, g_before)) & (theta > NEAR_END) & (theta < 1.0 - NEAR_END)
     return np.where(is_low, (theta - 1.0) * h, np.inf)
 
 
@@ -165,7 +162,10 @@ def _change_modes(
     which: NDArray[np.intp],
     offset: Array,
 ) -> None:
-    """Change the modes of trajectories next to the ends of their steps; they go on with the step of before."""
+    """Change the modes of trajectories next to the ends of their steps.
+
+    They go on with the step of before they were shortened, or to the next zero.
+    """
     params = tuple(column[positions] for column in state.params)
     y, k = step_of_order_two(problem, trial.y.take(positions, 1), trial.k.take(positions, 1), offset, params)
     y, params = switch.change(which, y, k, params)
@@ -174,7 +174,11 @@ def _change_modes(
     k = problem.rates(y[: problem.n_components], params)
     put_columns(trial.y, positions, y)
     put_columns(trial.k, positions, k)
-    trial.h_next[positions] = np.fmax(trial.h_next[positions], state.h_free[positions])
-    state.h_free[positions] = 0.0
-    for rows, values in zip(state.margins, switch.margins(y, k, params), strict=True):
+    margins, rates = switch.margins(y, k, params)
+    for rows, values in zip(state.margins, (margins, rates), strict=True):
         put_columns(rows, positions, values)
+    h_next = np.fmax(trial.h_next[positions], state.h_free[positions])
+    # a margin that begins near zero and falls may grow again within the step of before
+    zero = np.where(rates < 0.0, -margins / rates, np.inf).min(axis=0)
+    trial.h_next[positions] = np.clip(zero, NEAR_END * h_next, h_next)
+    state.h_free[positions] = np.where(zero < h_next, h_next, 0.0)
