@@ -25,7 +25,7 @@ ORDER = [part for parts in FLOORS.values() for part in parts]
 # where each library may be imported
 LIBRARIES = {
     "typer": {"cli"}, "rich": {"display", "progress_display"}, "matplotlib": {"plots"},
-    "pandas": {"display", "plots"}, "ipywidgets": {"plots"}, "jinja2": {"exporters", "reporting"},
+    "pandas": {"display", "inverse", "plots"}, "ipywidgets": {"plots"}, "jinja2": {"exporters", "reporting"},
     "markupsafe": {"reporting"},
     "xarray": {"results", "comparison", "inverse", "uncertainty", "plots", "reporting", "pytest_plugin"},
     "h5py": {"results"}, "h5netcdf": {"results"}, "tomllib": {"config"}, "pydantic": {"config", "results"},

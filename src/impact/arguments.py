@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import ast
-import builtins
 import inspect
 import numbers
 import operator
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, fields, is_dataclass
 from functools import wraps
 from types import FunctionType, UnionType
-from typing import Any, ParamSpec, TypeVar, get_origin
+from typing import Any, ParamSpec, TypeVar, get_args, get_origin
 
 from .errors import ImpactError, UsageError
 from .formatting import argument, type_of
@@ -21,7 +19,7 @@ P = ParamSpec("P")
 T = TypeVar("T")
 
 # a number of another library is one as well
-ABSTRACT = {"float": numbers.Real, "int": numbers.Integral, "Any": object, "None": type(None)}
+ABSTRACT: Mapping[object, type] = {float: numbers.Real, int: numbers.Integral, Any: object}
 
 # keywords of public functions for objects that are not public
 DEPRECATED = {
@@ -107,59 +105,34 @@ def type_problem(function: Callable[..., object], args: Any, kwargs: Any) -> str
         for item in value if parameter.kind is parameter.VAR_POSITIONAL else [value]:
             # self has no annotation
             if parameter.annotation is not parameter.empty and (
-                wrong := _wrong_type(item, parameter.annotation, function.__globals__)
+                wrong := _wrong_type(item, eval(parameter.annotation, function.__globals__))
             ):
                 return f"{name}: got {wrong}, expected {parameter.annotation}"
     return ""
 
 
-def _wrong_type(value: object, annotation: str, names: dict[str, Any]) -> str:
+def _wrong_type(value: Any, annotation: Any) -> str:
     """Name the type of a value that is not of an annotation, with that of its first wrong element; else empty."""
     wrong = type_of(value)
-    for text in _alternatives(annotation):
-        if _is_of(value, text, names):
-            element = _wrong_element(value, text, names)
+    for alternative in get_args(annotation) if isinstance(annotation, UnionType) else [annotation]:
+        kind = get_origin(alternative) or alternative
+        # a type such as ArrayLike is for type checkers
+        if not isinstance(kind, type) or isinstance(value, ABSTRACT.get(kind, kind)):
+            element = _wrong_element(value, kind, get_args(alternative))
             if not element:
                 return ""
             wrong = f"{type_of(value)} with {element}"
     return wrong
 
 
-def _wrong_element(value: Any, text: str, names: dict[str, Any]) -> str:
+def _wrong_element(value: Any, kind: Any, annotations: Sequence[Any]) -> str:
     """Name the type of the first wrong element of a sequence, or key or value of a mapping."""
-    kind, _, inner = text.removesuffix("]").partition("[")
-    if kind not in ("Sequence", "Mapping"):
+    if kind not in (Sequence, Mapping):
         return ""
-    columns = (value,) if kind == "Sequence" else (value, value.values())
+    columns = (value,) if kind is Sequence else (value, value.values())
     wrong_types = (
-        _wrong_type(element, annotation, names)
-        for column, annotation in zip(columns, inner.split(", ", len(columns) - 1), strict=True)
+        _wrong_type(element, annotation)
+        for column, annotation in zip(columns, annotations, strict=True)
         for element in column
     )
     return next(filter(None, wrong_types), "")
-
-
-def _alternatives(annotation: str) -> list[str]:
-    """Split an annotation at each | that is not in brackets.
-
-    >>> _alternatives("str | Sequence[str | Path] | None")
-    ['str', 'Sequence[str | Path]', 'None']
-    """
-    union = ast.parse(annotation, mode="eval").body
-    if isinstance(union, ast.BinOp):
-        return [*_alternatives(ast.unparse(union.left)), ast.unparse(union.right)]
-    return [annotation]
-
-
-def _is_of(value: object, text: str, names: dict[str, Any]) -> bool:
-    """Check a value against one alternative of an annotation, but not the elements of the value."""
-    name, _, attribute = text.split("[")[0].partition(".")
-    kind: Any = ABSTRACT.get(name) or names.get(name) or getattr(builtins, name, None)
-    if kind is None:
-        # a class that is imported for type checkers only is compared by its name
-        return type(value).__name__ == (attribute or name)
-    kind = getattr(kind, attribute) if attribute else kind
-    members = kind.__args__ if isinstance(kind, UnionType) else [kind]
-    classes = [get_origin(member) or member for member in members]
-    # a type such as ArrayLike is for type checkers
-    return any(not isinstance(member, type) or isinstance(value, member) for member in classes)

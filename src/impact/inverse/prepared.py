@@ -6,9 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 from numpy.typing import NDArray
 
@@ -35,9 +36,6 @@ from ..engine.trajectories import PlanLaw, model_of
 from ..errors import UsageError, did_you_mean, warn
 from ..results.selection import as_keys
 from ..results.single_impact import open_source, single_point
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 # inputs that a config may leave to others: masses and radii follow from each other, K from materials
 DERIVED = ("m1", "m2", "R1", "R2", "K")

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import xarray as xr
 
 from ..config.files import to_plain_value
 from ..config.grid import SAMPLE, Axis
@@ -34,7 +35,6 @@ from .slices import choose_line, unit_of
 from .style import DRAWING, is_geometric
 
 if TYPE_CHECKING:
-    import xarray as xr
     from ipywidgets import VBox
 
 # of a picture whose texts are legible at half of its size, on a phone; the largest width on a page

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 
 from ..contact.materials import sphere_mass
 from ..contact.status import Status
@@ -19,9 +19,6 @@ from .factored import read_inputs
 from .schema import parts_of_laws
 from .slabs import MAX_SUMMARY_POINTS, is_computed, over_varying_dims, slabs
 from .summary import MAX_SMALL_INDENTATION, Summary
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 # Young's moduli outside these limits are probably in another unit: gels have 1e3 Pa, diamond has 1e12 Pa
 MIN_MODULUS_PA, MAX_MODULUS_PA = 1e3, 1e13

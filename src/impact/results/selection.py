@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from ..array_types import Mask
@@ -16,10 +17,6 @@ from ..contact.variables import LAW_DIMS, OUTPUTS
 from ..errors import UsageError, did_you_mean
 from ..formatting import argument, prefixed, safe_text
 from .schema import plain_unit
-
-if TYPE_CHECKING:
-    import xarray as xr
-
 
 # relative tolerance by which a value from a user matches a computed label
 SELECTION_RTOL = 1e-9
