@@ -79,7 +79,7 @@ class Table:
         from rich.text import Text
 
         rows = [list(row) for row in self.rows]
-        texts = [[safe_text(_cell_text(cell), self.max_cell) for cell in row] for row in rows]
+        texts = [[safe_text(number(cell), self.max_cell) for cell in row] for row in rows]
         columns = list(itertools.zip_longest(self.headings, *texts, fillvalue=""))
         count, widths = len(columns), self._widths(columns, console.width)
         table = RichTable(box=None, pad_edge=False, header_style="bold", show_header=bool(self.headings))
@@ -124,7 +124,7 @@ class Table:
         """
 
         def cells(tag: str, texts: Sequence[object]) -> str:
-            shown = (escape(safe_text(_cell_text(text), 1000)) for text in texts)
+            shown = (escape(safe_text(number(text), 1000)) for text in texts)
             return "".join(f'<{tag} style="text-align:left">{text}</{tag}>' for text in shown)
 
         head = f"<thead><tr>{cells('th', self.headings)}</tr></thead>" if self.headings else ""
@@ -260,17 +260,12 @@ def _flat_cell(cell: object, decimal: str) -> object:
 
 def _latex(frame: pd.DataFrame, form: TableForm) -> str:
     """Write a tabular of booktabs, with an S column of siunitx for each column of numbers."""
-    formats, columns = "", []
-    for _, column in frame.items():
-        cells = column.tolist()
-        is_numeric = all(isinstance(cell, int | float) and not isinstance(cell, bool) for cell in cells)
-        texts = [_latex_cell(cell, form.digits or 6) for cell in cells]
-        columns.append(texts)
-        formats += _siunitx_column(texts, form.decimal) if is_numeric else "l"
-    rows = [[_latex_heading(str(name)) for name in frame.columns], *zip(*columns, strict=True)]
-    head, *body = (f"{' & '.join(row)} \\\\" for row in rows)
-    lines = [f"\\begin{{tabular}}{{{formats}}}", r"\toprule", head, r"\midrule", *body, r"\bottomrule"]
-    return "\n".join([*lines, r"\end{tabular}", ""])
+    texts, formats = frame.map(lambda cell: _latex_cell(cell, form.digits or 6)), ""
+    for (_, column), (_, shown) in zip(frame.items(), texts.items(), strict=True):
+        is_numeric = all(isinstance(cell, int | float) and not isinstance(cell, bool) for cell in column.tolist())
+        formats += _siunitx_column(shown.tolist(), form.decimal) if is_numeric else "l"
+    texts.columns = [_latex_heading(str(name)) for name in frame.columns]
+    return str(texts.to_latex(index=False, column_format=formats, escape=False))
 
 
 def _latex_heading(name: str) -> str:
@@ -386,10 +381,6 @@ def _console(stream: TextIO, width: int | None = None) -> Console:
 
     # in a notebook rich would not write to the stream
     return Console(file=stream, markup=False, highlight=False, emoji=False, width=width, force_jupyter=False)
-
-
-def _cell_text(value: object) -> str:
-    return str(value) if isinstance(value, Styled) else number(value)
 
 
 def dump(value: Any) -> str:
