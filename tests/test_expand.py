@@ -183,8 +183,8 @@ def test_a_factored_file_holds_the_values_of_a_full_one(tmp_path: Path, config: 
     assert distinct.points == whole.points == plans["full"].points
     # along an axis along which no status varies, only the first failed point is listed
     assert distinct.failed_at[:1] == whole.failed_at[:1]
-    for status, *at in distinct.failed_at:
-        assert full["status"].values[at[0], *at[1]] == status
+    for status, place, index in distinct.failed_at:
+        assert full["status"].values[*place, *index] == status
     assert surveys["factored"].trajectories == surveys["full"].trajectories
 
 

@@ -153,10 +153,10 @@ def test_the_summary_of_all_points_is_that_of_the_different_points(
     assert {Status.NO_IMPACT, Status.OK} < tally.counts.keys()
     assert tally.failed == WEIGHT * few.failed > 0
     np.testing.assert_equal(tally.worst, few.worst)
-    assert tally.failed_at == [(status, model, (0, *places, 0, 0)) for status, model, places in few.failed_at]
+    assert tally.failed_at == [(status, law, (0, *index, 0, 0)) for status, law, index in few.failed_at]
     # these are the first failed points along the axes along which the status varies
-    status, model, places = tally.failed_at[0]
-    assert dataset["status"][(model, *places)].item() == status >= FIRST_FAILURE
+    status, law, index = tally.failed_at[0]
+    assert dataset["status"][(*law, *index)].item() == status >= FIRST_FAILURE
 
 
 def test_variables_with_too_many_different_points_are_not_evaluated(

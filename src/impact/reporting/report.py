@@ -418,7 +418,7 @@ def _failures_section(dataset: xr.Dataset, summary: Summary) -> dict[str, Any]:
         sentences.append("No other point failed." if summary.not_counted else "No point failed.")
     axes = [dim for dim in dataset["status"].dims if dim != "model"]
     points = []
-    for status, model, index in summary.failed_at:
+    for status, (model,), index in summary.failed_at:
         point = dataset.isel({"model": model, **dict(zip(axes, index, strict=True))})
         key = str(point["model"].item())
         inputs = [name for name in varying_inputs(dataset) if InputName.parse(name).applies_to(key)]

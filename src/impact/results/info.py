@@ -18,7 +18,7 @@ from .kinds import STUDIES, kind_of
 from .outcome import error_table
 from .schema import count_points, exponents_of, plain_unit
 from .slabs import is_large
-from .summary import Extremes, Summary, counts_by_name, extremes_of, summarize, worst_by_model
+from .summary import Extremes, Summary, counts_by_name, extremes_of, summarize
 from .xarray_backend import open_result
 
 # attributes that are shown if they are set
@@ -106,7 +106,7 @@ def _describe(result: xr.Dataset, name: str = "") -> Info:
         "status": counts_by_name(summary.counts),
         **({"friction_status": counts_by_name(counts)} if (counts := summary.friction_counts) else {}),
         "not_evaluated": summary.not_counted,
-        "worst": worst_by_model(summary, result),
+        "worst": summary.worst,
         "attributes": {
             str(name): value if isinstance(value, str) else np.asarray(value).tolist()
             for name, value in result.attrs.items()

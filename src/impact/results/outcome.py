@@ -14,16 +14,7 @@ from ..display import Block, Displayed, Table, Wrapped
 from ..formatting import label, number
 from .plausibility import result_notes
 from .replay_command import command_start, inputs_at, replay_command
-from .summary import Summary, counts_by_name, counts_text, worst_by_model
-
-# headings of the largest errors, in the order of a table
-ERROR_HEADINGS = {
-    "e_error": "max |e_out − e|",
-    "v1_error": "max |v1 error|",
-    "v2_error": "max |v2 error|",
-    "closed_form_error": "max |e_out − exact|",
-    "energy_residual": "max |residual|",
-}
+from .summary import ERROR_HEADINGS, Summary, counts_by_name, counts_text
 
 
 @dataclass(frozen=True)
@@ -82,7 +73,7 @@ class SweepOutcome(Displayed):
         """The largest errors, the counts, the first failed points and what is implausible."""
         summary = self.summary
         if summary.worst:
-            yield error_table(worst_by_model(summary, self.dataset))
+            yield error_table(summary.worst)
         distinct = "" if self.trajectories is None else f" from {self.trajectories:,} trajectories"
         yield Wrapped(f"{self.output}: {summary.points:,} points{distinct} ({counts_text(summary.counts)})")
         if summary.friction_counts:

@@ -106,7 +106,7 @@ def with_depths(summary: Summary, dataset: xr.Dataset) -> Summary:
         # a part of a result, or one that was changed, may lack what the radii follow from
         return summary
     radius_dims = [axis.name for number, axis in enumerate(inputs.axes) if number in varied]
-    for place, part in parts_of_laws(dataset, ["model"]):
+    for _, part in parts_of_laws(dataset, ["model"]):
         points, weight = over_varying_dims(part, ["peak_indentation"], *radius_dims)
         dims = [axis.name for axis in inputs.axes if axis.name in points.dims]
         depth = points.variables["peak_indentation"].transpose(*dims)
@@ -115,8 +115,8 @@ def with_depths(summary: Summary, dataset: xr.Dataset) -> Summary:
         for slab in slabs(depth.sizes):
             radius = smaller_radius_at(inputs, inputs.index([slab.get(a.name, slice(1)) for a in inputs.axes]))
             absent = tuple(number for number, axis in enumerate(inputs.axes) if axis.name not in dims)
-            values = {"peak_indentation": depth.isel(slab).values}
-            summary.add(values, place, (), radius.squeeze(absent) if inputs.axes else radius, weight)
+            radius = radius.squeeze(absent) if inputs.axes else radius
+            summary.add_depths(depth.isel(slab).values, radius, weight)
     return summary
 
 

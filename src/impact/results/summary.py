@@ -18,21 +18,26 @@ from .schema import parts_of_laws, places_of_laws
 from .slabs import MAX_SUMMARY_POINTS, distinct_points, is_computed, slabs
 from .trajectory_table import ExpandedSlab, TrajectoryTable, computed_array, expand, table_of_result
 
-# variables of which the largest absolute value is reported
-ERROR_VARIABLES = ("e_error", "v1_error", "v2_error", "closed_form_error", "energy_residual")
+# variables of which the largest absolute value is reported, with the headings of a table
+ERROR_HEADINGS = {
+    "e_error": "max |e_out − e|",
+    "v1_error": "max |v1 error|",
+    "v2_error": "max |v2 error|",
+    "closed_form_error": "max |e_out − exact|",
+    "energy_residual": "max |residual|",
+}
 MAX_FAILED_AT = 3
 # limit of small indentations, as a fraction of the smaller radius
 MAX_SMALL_INDENTATION = 0.1
 S = TypeVar("S", Status, FrictionStatus)
-Place = TypeVar("Place", int, tuple[int, ...])
 
 
 @dataclass
 class Summary:
     """Counts and extremes of the points of a result.
 
-    worst : the largest absolute value by error variable and number of the model; NaN if all are NaN, missing if
-        not evaluated
+    worst : the largest absolute value by error variable and key of the model; NaN if all are NaN, missing if not
+        evaluated
     failed_at : the first points that failed: status, number of the model, and index along the axes
     friction_counts : numbers of points of pairs by friction status
     friction_failed_at : the first points of pairs that failed: friction status, numbers of the model and of the
@@ -43,8 +48,8 @@ class Summary:
 
     points: int = 0
     counts: dict[Status, int] = field(default_factory=dict)
-    worst: dict[str, dict[int, float]] = field(default_factory=dict)
-    failed_at: list[tuple[Status, int, tuple[int, ...]]] = field(default_factory=list)
+    worst: dict[str, dict[str, float]] = field(default_factory=dict)
+    failed_at: list[tuple[Status, tuple[int, ...], tuple[int, ...]]] = field(default_factory=list)
     max_failed_at: int = field(default=MAX_FAILED_AT, compare=False)
     not_counted: int = 0
     friction_counts: dict[FrictionStatus, int] = field(default_factory=dict)
@@ -75,35 +80,33 @@ class Summary:
         """List the first failed points of models, else of pairs: status variable, status, law and index."""
         if not self.failed_at:
             return [("friction_status", *failure) for failure in self.friction_failed_at]
-        return [("status", FrictionStatus(status), (model,), index) for status, model, index in self.failed_at]
+        return [("status", FrictionStatus(status), place, index) for status, place, index in self.failed_at]
 
     def add(
         self,
         values: Mapping[str, NDArray[Any]],
+        model: str,
         place: tuple[int, ...],
         start: Sequence[int],
-        radius: NDArray[Any] | None = None,
         weight: int = 1,
-    ) -> Summary:
-        """Add points from an index on, each `weight` times; the radius [m] is of the smaller ball.
+    ) -> None:
+        """Add points of a model from an index on, each `weight` times.
 
         `place` is the number of the model, or those of the model and the friction law of a pair.
         """
-        model = place[0]
         if "status" in values:
             self.points += weight * values["status"].size
-            self._count(values["status"], Status, self.counts, self.failed_at, model, start, weight)
+            self._count(values["status"], Status, self.counts, self.failed_at, place, start, weight)
         if "friction_status" in values:
             tally = self.friction_counts, self.friction_failed_at
             self._count(values["friction_status"], FrictionStatus, *tally, place, start, weight)
-        for name in ERROR_VARIABLES:
-            if name in values:
-                self._judge(name, model, values[name])
-        if radius is not None and "peak_indentation" in values:
-            self._measure(values["peak_indentation"], radius, weight)
-        return self
+        for name in (name for name in ERROR_HEADINGS if name in values):
+            largest = float(np.fmax.reduce(np.abs(values[name]), axis=None, initial=np.nan))
+            by_model = self.worst.setdefault(name, {})
+            by_model[model] = float(np.fmax(by_model.get(model, np.nan), largest))
 
-    def _measure(self, indentation: NDArray[Any], radius: NDArray[Any], weight: int) -> None:
+    def add_depths(self, indentation: NDArray[Any], radius: NDArray[Any], weight: int = 1) -> None:
+        """Add peak indentations [m], each `weight` times; the radius [m] is that of the smaller ball."""
         if np.isfinite(radius).any():
             share = indentation / (radius if indentation.shape else radius.reshape(()))
             self.deep += weight * int(np.count_nonzero(share > MAX_SMALL_INDENTATION))
@@ -114,8 +117,8 @@ class Summary:
         array: NDArray[np.int8],
         statuses: type[S],
         counts: dict[S, int],
-        failed_at: list[tuple[S, Place, tuple[int, ...]]],
-        place: Place,
+        failed_at: list[tuple[S, tuple[int, ...], tuple[int, ...]]],
+        place: tuple[int, ...],
         start: Sequence[int],
         weight: int,
     ) -> None:
@@ -131,21 +134,18 @@ class Summary:
                 index = tuple(map(operator.add, start, offsets))
                 failed_at.append((statuses(int(array[tuple(offsets)])), place, index))
 
-    def _judge(self, name: str, model: int, values: NDArray[Any]) -> None:
-        largest = float(np.fmax.reduce(np.abs(values), axis=None, initial=np.nan))
-        by_model = self.worst.setdefault(name, {})
-        by_model[model] = float(np.fmax(by_model.get(model, np.nan), largest))
-
 
 def add_slab(summary: Summary, table: TrajectoryTable, slab: ExpandedSlab) -> None:
     """Add the points of a slab; points that differ only by parameters of other models count once."""
-    axes = table.inputs.axes_of_law(*table.keys(slab.number))
+    keys = table.keys(slab.number)
+    axes = table.inputs.axes_of_law(*keys)
     if any(part.start > 0 for axis, part in enumerate(slab.region) if axis not in axes):
         return
     first = tuple(slice(None) if axis in axes else slice(1) for axis in range(len(slab.region)))
     counted = {name: array[first or ...] for name, array in slab.values.items()}
-    radius = np.fmin(slab.impacts.R1, slab.impacts.R2)
-    summary.add(counted, slab.place, [part.start for part in slab.region], radius)
+    summary.add(counted, keys[0], slab.place, [part.start for part in slab.region])
+    if "peak_indentation" in counted:
+        summary.add_depths(counted["peak_indentation"], np.fmin(slab.impacts.R1, slab.impacts.R2))
 
 
 def summarize(dataset: xr.Dataset, max_failed_at: int = MAX_FAILED_AT) -> Summary:
@@ -156,7 +156,7 @@ def summarize(dataset: xr.Dataset, max_failed_at: int = MAX_FAILED_AT) -> Summar
     not evaluated: the error is then missing from `worst`, or the points are `not_counted`. The first distinct
     failed points in C order are recorded, at the first position along each axis on which the status is constant.
     """
-    names = [name for name in ("status", *ERROR_VARIABLES) if name in dataset]
+    names = [name for name in ("status", *ERROR_HEADINGS) if name in dataset]
     table = table_of_result(dataset[names])
     record = None if table is None else table.summary
     # it lists all failures, or as many as required
@@ -167,12 +167,13 @@ def summarize(dataset: xr.Dataset, max_failed_at: int = MAX_FAILED_AT) -> Summar
     if "friction_status" in dataset:
         parts += [(["friction_status"], law) for law in parts_of_laws(dataset, ["model", "friction"])]
     for names_of_law, (place, part) in parts:
+        model = str(part["model"].item())
         for name in names_of_law:
             variable, weight = distinct_points(part, name)
             if variable.size <= MAX_SUMMARY_POINTS or not is_computed(variable):
                 for slab in slabs(variable.sizes):
                     start = [slab[dim].start for dim in variable.dims]
-                    summary.add({name: variable.isel(slab).values}, place, start, weight=weight)
+                    summary.add({name: variable.isel(slab).values}, model, place, start, weight)
             elif name == "status":
                 summary.points += weight * variable.size
                 summary.not_counted += weight * variable.size
@@ -188,15 +189,10 @@ class Extremes(NamedTuple):
 
     def add(self, values: NDArray[Any], weight: int) -> Extremes:
         """Add more values, each of which counts as often as `weight`."""
-        smallest, largest = values.min(), values.max()
-        missing = 0
-        if not (np.isfinite(smallest) and np.isfinite(largest)):
-            finite = values[np.isfinite(values)]
-            missing = weight * (values.size - finite.size)
-            smallest, largest = (finite.min(), finite.max()) if finite.size else (np.nan, np.nan)
-        return Extremes(
-            float(np.fmin(self.smallest, smallest)), float(np.fmax(self.largest, largest)), self.missing + missing
-        )
+        finite = values[np.isfinite(values)]
+        smallest, largest = (finite.min(), finite.max()) if finite.size else (np.nan, np.nan)
+        missing = self.missing + weight * (values.size - finite.size)
+        return Extremes(float(np.fmin(self.smallest, smallest)), float(np.fmax(self.largest, largest)), missing)
 
 
 def extremes_of(dataset: xr.Dataset, name: str) -> Extremes | None:
@@ -239,25 +235,26 @@ def summarize_table(dataset: xr.Dataset, table: TrajectoryTable) -> tuple[Summar
         dims = dataset[name].dims
         distinct = parts or [distinct_points(part, name) for _, part in parts_of_laws(dataset, {"model", *dims})]
         for model, (variable, weight) in enumerate(distinct, len(table.laws) if "friction" in dims else 0):
-            is_judged = name in ("status", "friction_status", *ERROR_VARIABLES)
+            is_judged = name in ("status", "friction_status", *ERROR_HEADINGS)
             if parts is not None or (is_judged and variable.size <= MAX_SUMMARY_POINTS):
                 sizes = tuple(variable.sizes[axis] for axis in axes)
                 groups.setdefault((model, sizes), (weight, []))[1].append(name)
             elif name == "status":
                 summary.points += weight * variable.size
                 summary.not_counted += weight * variable.size
-    for (model, shape), (weight, names) in sorted(groups.items(), key=lambda item: item[0]):
+    for (number, shape), (weight, names) in sorted(groups.items(), key=lambda item: item[0]):
         for slab in slabs(dict(enumerate(shape))):
             region = tuple(slab.values())
             size = tuple(part.stop - part.start for part in region)
-            for_names = expand(table, model, table.inputs.index(region), names)[1]
+            for_names = expand(table, number, table.inputs.index(region), names)[1]
             values = {}
             for name, array in for_names.items():
                 typed = np.asarray(array, dataset[name].dtype)
                 values[name] = np.broadcast_to(typed if region else typed.reshape(()), size)
                 so_far = extremes[name]
                 extremes[name] = so_far and so_far.add(values[name], weight)
-            summary.add(values, table.place(model), [part.start for part in region], weight=weight)
+            start = [part.start for part in region]
+            summary.add(values, table.keys(number)[0], table.place(number), start, weight)
     return summary, extremes
 
 
@@ -269,8 +266,8 @@ def summary_record(
     return SummaryRecord(
         status=counts_by_name(summary.counts),
         not_evaluated=summary.not_counted,
-        worst=worst_by_model(summary, dataset),
-        failed_at=[(status.name.lower(), keys[model], [*index]) for status, model, index in summary.failed_at],
+        worst=summary.worst,
+        failed_at=[(status.name.lower(), keys[model], [*index]) for status, (model,), index in summary.failed_at],
         extremes=dict(extremes),
         friction_status=counts_by_name(summary.friction_counts),
     )
@@ -283,32 +280,16 @@ def _stored_summary(
     keys = dataset["model"].values.tolist()
     counts = {Status[name.upper()]: count for name, count in record.status.items()}
     has_status = "status" in names
+    failed_at = record.failed_at[:max_failed_at] if has_status else []
     return Summary(
         points=has_status * (sum(counts.values()) + record.not_evaluated),
         counts=counts if has_status else {},
-        worst={
-            name: {keys.index(key): largest for key, largest in record.worst[name].items()}
-            for name in names
-            if name in record.worst
-        },
-        failed_at=[
-            (Status[name.upper()], keys.index(key), tuple(index))
-            for name, key, index in record.failed_at
-            if has_status
-        ][:max_failed_at],
+        worst={name: record.worst[name] for name in names if name in record.worst},
+        failed_at=[(Status[name.upper()], (keys.index(key),), tuple(index)) for name, key, index in failed_at],
         max_failed_at=max_failed_at,
         not_counted=has_status * record.not_evaluated,
         friction_counts={FrictionStatus[name.upper()]: count for name, count in record.friction_status.items()},
     )
-
-
-def worst_by_model(summary: Summary, dataset: xr.Dataset) -> dict[str, dict[str, float]]:
-    """List the largest absolute errors by variable and key of the model."""
-    keys = dataset["model"].values.tolist() if summary.worst else []
-    return {
-        name: {keys[model]: largest for model, largest in by_model.items()}
-        for name, by_model in summary.worst.items()
-    }
 
 
 def counts_text(counts: Mapping[Any, int]) -> str:
