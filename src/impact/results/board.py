@@ -195,13 +195,9 @@ def excess_of(name: str, asked: float, delivered: float) -> float:
 
 def _worst(checks: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
     """Choose the check that misses by most, one that is not a number before all."""
-
-    def excess(check: Mapping[str, Any]) -> float:
-        size = excess_of(check["check"], check["asked"], check["delivered"])
-        return float("inf") if size != size else size
-
     judged = [check for check in checks if check["status"] != "not_supported"]
-    return max(judged, key=excess, default=None)
+    excess = [excess_of(check["check"], check["asked"], check["delivered"]) for check in judged]
+    return judged[int(np.argmax(excess))] if judged else None
 
 
 def check_rows(engine: Mapping[str, Any]) -> list[tuple[str, ...]]:
