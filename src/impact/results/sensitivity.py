@@ -94,20 +94,16 @@ def index_rows(study: xr.Dataset) -> list[tuple[str, ...]]:
 
     def interval(row: xr.Dataset, name: str) -> str:
         lower, upper = (float(row[f"{name}_{end}"]) for end in ("lower", "upper"))
-        return "–" if lower != lower else f"{decimals(lower, 4)} to {decimals(upper, 4)}"
-
-    def shown(row: xr.Dataset, name: str) -> str:
-        value = float(row[name])
-        return "–" if value != value else decimals(value, 4)
+        return "–" if lower != lower else f"{decimals(lower)} to {decimals(upper)}"
 
     return [
         (
             str(row["input"].item()),
-            shown(row, "first"),
+            decimals(float(row["first"])),
             interval(row, "first"),
-            shown(row, "total"),
+            decimals(float(row["total"])),
             interval(row, "total"),
-            *(shown(row, name) for name in HALF),
+            *(decimals(float(row[name])) for name in HALF),
         )
         for row in (study.isel(input=int(position)) for position in order)
     ]
