@@ -39,7 +39,7 @@ from ..results.calibration import FIT_HEADINGS, calibration_title, describe_data
 from ..results.kinds import kind_of
 from ..results.plausibility import input_notes, inputs_of, result_notes, with_depths
 from ..results.provenance import stored_config
-from ..results.ranking import DEFAULT_TOL, Ranking, rank_models, rankable_parts
+from ..results.ranking import DEFAULT_TOL, Ranking, rank_laws
 from ..results.replay_command import describe_point
 from ..results.schema import FIT_STATUSES, count_points, exponents_of
 from ..results.selection import select_laws
@@ -403,7 +403,7 @@ def _number(value: object) -> str:
 def _rank_models(dataset: xr.Dataset) -> tuple[Ranking | None, str]:
     """Rank the models, if possible, and write the answer in a sentence."""
     try:
-        ranked = rank_models(rankable_parts(dataset, {}, None, max_points=MAX_SUMMARY_POINTS), DEFAULT_TOL)
+        ranked = rank_laws(dataset, DEFAULT_TOL, max_points=MAX_SUMMARY_POINTS)
     except UsageError as error:
         return None, f"The models are not ranked: {error}."
     return ranked, re.sub("^no ", "No ", f"{ranked.headline}.")

@@ -326,7 +326,7 @@ def recommend(
     if as_keys(frictions, "frictions") and not OUTPUTS[criterion.names[0]].of_friction:
         origin, of = argument("frictions"), argument("target")
         raise UsageError(f"{origin}: expected a {of} that depends on friction, such as beta=0.4")
-    return rank_models(rankable_parts(dataset, sel or {}, models, criterion, frictions), tol, criterion)
+    return rank_laws(dataset, tol, criterion, sel, models, frictions)
 
 
 def _criterion_of(target: Mapping[str, object]) -> Criterion:
@@ -352,17 +352,18 @@ def target_value(name: str, value: object) -> float:
     return read_number(value, Quantity(OUTPUTS[name].unit, OUTPUTS[name].meaning), argument("target", key=name))
 
 
-def rankable_parts(
+def rank_laws(
     dataset: xr.Dataset,
-    sel: Mapping[str, object],
-    models: Sequence[str] | None,
+    tol: float,
     criterion: Criterion = BY_ERROR,
+    sel: Mapping[str, object] | None = None,
+    models: Sequence[str] | None = None,
     frictions: Sequence[str] | None = None,
     max_points: int = MAX_RANKED_POINTS,
-) -> list[xr.Dataset]:
-    """Select the part of each law to rank; refuse a result that lacks a target or has too many points."""
+) -> Ranking:
+    """Rank the laws of a result; refuse one that lacks a target, or has too many points to rank or none."""
     _check_rankable(dataset, criterion)
-    selected = select_laws(select(dataset[list(criterion.names)], sel), models, frictions)
+    selected = select_laws(select(dataset[list(criterion.names)], sel or {}), models, frictions)
     dims = [dim for dim in LAW_DIMS if dim in selected.dims]
     parts = []
     for place in np.ndindex(*(selected.sizes[dim] for dim in dims)):
@@ -378,16 +379,11 @@ def rankable_parts(
         raise UsageError(
             f"got {points:,} different points to rank, expected at most {max_points:,}; select values of axes"
         )
-    return parts
-
-
-def rank_models(parts: Sequence[xr.Dataset], tol: float, criterion: Criterion = BY_ERROR) -> Ranking:
-    """Rank laws by their parts of a result; refuse parts without any point to rank."""
     ranked = [_rank_law(part, tol, criterion) for part in parts]
     if not any(law.points for law in ranked):
         wanted = "a requested e" if criterion.target is None else f"a value of {criterion.output}"
         raise UsageError(f"nothing to rank: no point has both {wanted} and an impact")
-    floor = error_floor(parts[0])
+    floor = error_floor(dataset)
     ranked.sort(key=lambda law: _rank_key(law, floor))
     return Ranking(tol, tuple(ranked), criterion, floor)
 
