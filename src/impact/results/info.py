@@ -16,7 +16,7 @@ from .attributes import read_attribute
 from .describe import describe
 from .kinds import STUDIES, kind_of
 from .outcome import error_table
-from .schema import count_points, exponents_of, plain_unit
+from .schema import MODEL_METADATA, count_points, exponents_of, plain_unit
 from .slabs import is_large
 from .summary import Extremes, Summary, counts_by_name, extremes_of, summarize
 from .xarray_backend import open_result
@@ -34,8 +34,6 @@ SHOWN_ATTRIBUTES = (
     "reason",
     "design",
 )
-# coordinates of the laws, which are not shown
-HIDDEN_COORDINATES = ("title", "equation", "reference", "doi", "year")
 # longer lists of numbers are abbreviated
 MAX_LISTED_NUMBERS = 4
 
@@ -123,7 +121,7 @@ def _tables(result: xr.Dataset, name: str, description: Mapping[str, Any]) -> li
     rows |= {"title": attributes.get("title", ""), "dimensions": sizes, "points": f"{description['points']:,}"}
     rows |= {key: description[key] for key in ("layout", "seal") if description[key] is not None}
     for coordinate in result.coords.values():
-        if coordinate.name not in HIDDEN_COORDINATES:
+        if coordinate.name not in MODEL_METADATA:
             rows[str(coordinate.name)] = _values_text(result, str(coordinate.name))
     rows |= {key: attributes[key] for key in SHOWN_ATTRIBUTES if attributes.get(key, "{}") != "{}"}
     if read_attribute(attributes, "config_set"):
@@ -175,11 +173,6 @@ def _values_text(dataset: xr.Dataset, name: str) -> str:
 
 def _count_points(dataset: xr.Dataset) -> int:
     """Count the points of a sweep, the measured values of a calibration, the studies of a study, or the checks."""
-    match kind_of(dataset):
-        case "calibration":
-            return dataset.sizes["point"]
-        case "sensitivity study":
-            return int(dataset["mean"].size)
-        case "board":
-            return int(dataset["check_status"].size)
-    return count_points(dataset)
+    counted = {"calibration": "measured", "sensitivity study": "mean", "board": "check_status"}
+    kind = kind_of(dataset)
+    return int(dataset[counted[kind]].size) if kind in counted else count_points(dataset)

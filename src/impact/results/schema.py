@@ -34,8 +34,7 @@ SCHEMA_VERSION = 2
 # longer lists of models with another exponent are abbreviated
 MAX_EXPONENT_LETTERS = 48
 # coordinates along `model` with metadata of the models
-MODEL_METADATA = ("title", "year", "equation", "reference", "doi")
-
+MODEL_METADATA = ("title", "equation", "reference", "doi", "year")
 
 # the outcomes of a fit
 FIT_STATUSES = {
@@ -294,10 +293,9 @@ def plan_coordinates(plan: Plan) -> xr.Coordinates:
     coordinates: dict[str, object] = {
         "model": ("model", [model.key for model in models], {"long_name": "contact force model"}),
         **{
-            key: ("model", [str(getattr(model, key)) for model in models], {"long_name": f"{key} of the model"})
-            for key in ("title", "equation", "reference", "doi")
+            key: ("model", [getattr(model, key) for model in models], {"long_name": f"{key} of the model"})
+            for key in MODEL_METADATA
         },
-        "year": ("model", [model.year for model in models], {"long_name": "year of the model"}),
     }
     if plan.frictions:
         keys = [friction.key for friction in plan.frictions]
