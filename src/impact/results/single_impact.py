@@ -21,7 +21,6 @@ from ..config.draft import (
     Draft,
     Overrides,
     Setting,
-    listed_names,
     open_config,
     open_text,
     reject_law_key,
@@ -569,16 +568,15 @@ class PointSource:
     config_draft: Draft
     plugins: Plugins
     labels: Mapping[str, float | str] = field(default_factory=dict)  # at which a part of a result was selected
-    has_selection: bool = True  # selects models, unlike the starter config
-    is_starter: bool = False
+    is_starter: bool = False  # whose models and e are not chosen by the user, unless a setting does
     at_name: str = "at"  # the argument with the values of the point, for messages
     calibration: Calibration | None = None
 
     @property
     def has_own_e(self) -> bool:
         """Whether the user chose the e of the config: that of the starter config is a default."""
-        chosen = [setting for setting in self.config_draft.settings if setting.path[:2] == ("sweep", "e")]
-        return len(chosen) > 1 if self.is_starter else "e" in self.config_draft.table("sweep")
+        chosen = (path[:2] == ("sweep", "e") for path in self.config_draft.origins)
+        return any(chosen) if self.is_starter else "e" in self.config_draft.table("sweep")
 
     @property
     def models(self) -> tuple[str, ...]:
@@ -586,7 +584,8 @@ class PointSource:
         if self.calibration is not None:
             return tuple(dict.fromkeys(law_keys(law)[0] for law in self.calibration.laws))
         draft = self.config_draft
-        if not self.has_selection or "models" not in draft.data:
+        is_chosen = ("models",) in draft.origins if self.is_starter else "models" in draft.data
+        if not is_chosen:
             return ()
         _, problems = expand_models(draft.data["models"], draft.known_models)
         return tuple(model.key for model in (build(draft).models if problems else draft.models))
@@ -614,7 +613,7 @@ def open_source(source: ConfigSource, overrides: Overrides, plugins: Plugins) ->
         starter = open_config(None, plugins.models).with_settings([Setting.parse(STARTER_E)])
         # that setting is no input of the user
         draft = replace(starter, origins={}).with_settings(settings_of(overrides))
-        return PointSource(draft, plugins, has_selection=("models",) in draft.origins, is_starter=True)
+        return PointSource(draft, plugins, is_starter=True)
     reject_law_key(source, "model", plugins.models)
     draft = open_config(source, plugins.models)
     return PointSource(draft.with_settings(settings_of(overrides)), plugins)
@@ -712,10 +711,8 @@ def input_name(name: str, model: ForceModel | None, friction: FrictionLaw | None
 
 def _joint_inputs(draft: Draft) -> set[str]:
     """Name the inputs that vary together: in zip groups and in a table of cases."""
-    sweep = draft.table("sweep")
-    groups = sweep.get("zip")
-    zipped = [name for group in groups for name in listed_names(group)] if isinstance(groups, list) else []
-    return {str(InputName.parse(name)) for name in (*zipped, *as_table(sweep.get("cases")))}
+    zipped = [name for group in draft.zip_groups for name in group]
+    return {str(InputName.parse(name)) for name in (*zipped, *as_table(draft.table("sweep").get("cases")))}
 
 
 def _setting_at(draft: Draft, name: str, value: float | str, law: ForceModel | None, at_name: str) -> Setting:
