@@ -92,12 +92,13 @@ class ImpactWarning(UserWarning):
     """An input or a result is probably not what was intended."""
 
 
-def warn(text: str) -> None:
-    """Warn at the line outside of this package that called it."""
+def warn(*texts: str) -> None:
+    """Warn of each text, at the line outside of this package that called it."""
     frame, level = sys._getframe(1), 2
     while frame.f_back is not None and frame.f_code.co_filename.startswith(PACKAGE):
         frame, level = frame.f_back, level + 1
-    warnings.warn(escape_controls(text), ImpactWarning, stacklevel=level)
+    for text in texts:
+        warnings.warn(escape_controls(text), ImpactWarning, stacklevel=level)
 
 
 class Interruption(BaseException):

@@ -163,8 +163,7 @@ def _check_clauses(model: ForceModel) -> Iterator[ClauseResult]:
         errors: dict[str, str] = {}
         joined = Impacts.joined(batches)
         values = collide(model, joined, rtol=rtol, max_steps=CONTRACT_MAX_STEPS, errors=errors)
-        for error in errors.keys() - reported:
-            warn(errors[error])
+        warn(*(errors[error] for error in errors.keys() - reported))
         reported.update(errors)
         # an output that is the same for all impacts has length one
         columns = {name: np.broadcast_to(column, joined.shape) for name, column in values.items()}

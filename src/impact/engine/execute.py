@@ -140,8 +140,7 @@ def integrate_ranges(
                     for trajectory_range, (collisions, errors) in _submit_and_collect(
                         partial(submit, executor), remaining, running, find_reused, spec.capacity, run.should_stop
                     ):
-                        for error in errors.keys() - reported:
-                            warn(errors[error])
+                        warn(*(errors[error] for error in errors.keys() - reported))
                         reported |= errors.keys()
                         yield trajectory_range, collisions
                     return

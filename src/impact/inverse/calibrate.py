@@ -121,8 +121,7 @@ def calibrate(
             raise UsageError(f"{argument('model')}: set without {best_file}, which is written for that law")
         position_of_law(list(laws_to_fit(config)), model, argument("model"))
     name = str(source) if isinstance(source, str | Path) else "config"
-    for note in (*config.notes, *Plan(config).pair_notes(f"{name}: frictions")):
-        warn(note)
+    warn(*config.notes, *Plan(config).pair_notes(f"{name}: frictions"))
     result = calibrate_config(config, plugin_set.of(config.models), jobs)
     if output is not None and Path(output).suffix.lower() in TABLE_SUFFIXES:
         write_table(describe(result), Path(output), TableForm(), overwrite=overwrite)

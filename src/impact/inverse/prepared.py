@@ -96,8 +96,7 @@ def outputs_at(
         oblique=oblique,
         compute=compute,
     )
-    for error in errors.values():
-        warn(error)
+    warn(*errors.values())
     return outputs
 
 

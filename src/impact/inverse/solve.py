@@ -311,8 +311,7 @@ def warn_of_point(source: PointSource, point: PointWithE, impact: Impacts, outpu
     """Warn of a large indentation, and of an e of the source that the law ignores, unless it is solved for."""
     if point.solved is None and source.has_own_e and "e" not in point.defaulted_axes:
         warn_of_ignored_e(point.config, outputs["e_out"])
-    for note in depth_notes(outputs["peak_indentation"], impact.R1.item(), impact.R2.item()):
-        warn(note)
+    warn(*depth_notes(outputs["peak_indentation"], impact.R1.item(), impact.R2.item()))
 
 
 def solve_damping(config: Config, e: float) -> Config:

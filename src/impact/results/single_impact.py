@@ -328,8 +328,7 @@ def run(
     impact = run_single_impact(Plan(config, plugin_set.of(config.models)), first, samples)
     if "e" not in first and (opened.has_own_e or "e" in (at or {})):
         warn_of_ignored_e(config, impact.values["e_out"])
-    for note in depth_notes(impact.values["peak_indentation"], impact.derived["R1"], impact.derived["R2"]):
-        warn(note)
+    warn(*depth_notes(impact.values["peak_indentation"], impact.derived["R1"], impact.derived["R2"]))
     return impact
 
 
@@ -385,8 +384,7 @@ def run_single_impact(plan: Plan, first: tuple[str, ...], times: int | None = No
         recorded_slip=recorded_slip,
     )
     values = {name: array[0].item() for name, array in collision.items()}
-    for error in errors.values():
-        warn(error)
+    warn(*errors.values())
     history = slip = None
     has_slip = values.get("friction_status", FrictionStatus.OK) < FIRST_FAILURE
     if values["status"] == Status.OK and recorded and has_slip:
@@ -628,8 +626,7 @@ def _open_stored(dataset: xr.Dataset, overrides: Overrides, plugins: Plugins, na
     else:
         require_sweep(dataset, name)
     draft = stored_draft(dataset.attrs, plugins, name).with_settings(settings)
-    for note in (*changed_plugins(dataset.attrs, plugins, name), *unknown_plugins(dataset.attrs, plugins, name)):
-        warn(note)
+    warn(*changed_plugins(dataset.attrs, plugins, name), *unknown_plugins(dataset.attrs, plugins, name))
     labels = {str(key): label.values.item() for key, label in dataset.coords.items() if label.ndim == 0}
     labels = {} if calibration else {k: value for k, value in labels.items() if k not in LAW_DIMS}
     return PointSource(draft, plugins, labels, calibration=calibration)
@@ -693,8 +690,7 @@ def single_point(
         if is_case(name) and name not in {axis.numbered for axis in config.axes}:
             raise _unknown_input(draft, name)
     config, defaulted = _without_axes(config, {**labels, **fixed}, over)
-    for note in (*config.notes, *input_notes(Plan(config).inputs)):
-        warn(note)
+    warn(*config.notes, *input_notes(Plan(config).inputs))
     return config, defaulted
 
 

@@ -168,8 +168,7 @@ def sweep(
                 on_progress=on_progress,
             )
             result, summary = load(output), outcome.summary
-    for note in result_notes(summary):
-        warn(note)
+    warn(*result_notes(summary))
     return result
 
 
