@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import sys
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from difflib import get_close_matches
 from pathlib import Path
 from types import MappingProxyType
@@ -127,3 +127,10 @@ def did_you_mean(word: str, choices: Sequence[str], synonyms: Mapping[str, str] 
     matches = get_close_matches(word[:64].lower(), spellings, n=1, cutoff=cutoff)
     all_choices = f"known: {', '.join(sorted(choices[:1000]))}"
     return safe_text(f'did you mean "{spellings[matches[0]]}"?' if matches else all_choices, 800)
+
+
+def require_known(names: Iterable[str], known: Collection[str], what: str, where: str = "") -> None:
+    """Refuse the first name that is not known, such as `no output "..." of this law`, with the nearest name."""
+    for name in names:
+        if name not in known:
+            raise UsageError(f'{what} "{name}"{where}; {did_you_mean(name, list(known))}')

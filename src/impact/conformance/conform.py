@@ -10,7 +10,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from ..atomic import check_outputs
-from ..errors import UsageError, did_you_mean
+from ..errors import UsageError, did_you_mean, require_known
 from ..formatting import argument, number
 from ..reporting.report import report
 from ..results.board import CHECKS, Board, EngineChecks, board_dataset, excess_of
@@ -120,9 +120,7 @@ def _check_tolerances(tol: float | Mapping[str, float] | None) -> dict[str, floa
 
 def _selected(trials: Mapping[str, Trial], only: Sequence[str]) -> list[Trial]:
     """Choose the collisions to judge."""
-    for name in only:
-        if name not in trials:
-            raise UsageError(f'{argument("only")}: no collision "{name}"; {did_you_mean(name, list(trials))}')
+    require_known(only, trials, f"{argument('only')}: no collision")
     return [trial for trial in trials.values() if not only or trial.id in only]
 
 

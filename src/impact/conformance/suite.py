@@ -13,7 +13,7 @@ from importlib.resources import files
 from typing import Any, Literal, get_args
 
 from ..config.files import parse_document
-from ..errors import UsageError, did_you_mean
+from ..errors import require_known
 from ..formatting import argument
 
 Question = Mapping[str, float | str | None]
@@ -66,8 +66,7 @@ def read_suite(name: str = DEFAULT_SUITE) -> Mapping[str, Trial]:
     >>> trials["frame-mirrored"].of, trials["frame-mirrored"].question["omega1"]
     ('spin-both', -20.0)
     """
-    if name not in suites():
-        raise UsageError(f'{argument("suite")}: no set "{name}"; {did_you_mean(name, suites())}')
+    require_known([name], suites(), f"{argument('suite')}: no set")
     file = f"{name}.toml"
     document = parse_document(files(__package__).joinpath(file).read_text(encoding="utf-8"), file)
     defaults = document.pop("defaults")

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..array_types import Array
-from ..errors import ModelError, UsageError, did_you_mean
+from ..errors import ModelError, UsageError, require_known
 from .dimensionless import with_coefficients, with_units
 from .fixed_step_slip import FixedStepSlip
 from .formula_calls import Formula, argument_names
@@ -126,8 +126,7 @@ def friction_problem(key: str, kind: str, scheme: str, only: str = "") -> str:
 
 def check_scheme(model: ForceModel, n: float, scheme: str) -> None:
     """Raise a UsageError if there is no such scheme, or if it does not take the law."""
-    if scheme not in SCHEMES:
-        raise UsageError(f'no scheme "{scheme}"; {did_you_mean(scheme, list(SCHEMES))}')
+    require_known([scheme], SCHEMES, "no scheme")
     if not has_scheme(model, n, scheme):
         raise UsageError(law_problem(model, scheme))
 

@@ -33,7 +33,7 @@ from ..engine.inputs import Inputs
 from ..engine.plan import Plan
 from ..engine.plugins import read_plugins
 from ..engine.trajectories import PlanLaw, model_of
-from ..errors import UsageError, did_you_mean, warn
+from ..errors import UsageError, did_you_mean, require_known, warn
 from ..results.selection import as_keys
 from ..results.single_impact import open_source, single_point
 
@@ -242,7 +242,5 @@ def prepare(
     known = [*CENTRAL_OUTPUTS] if isinstance(law, ForceModel) else [*OUTPUTS]
     known = [name for name in known if OUTPUTS[name].dtype == "f8" and OUTPUTS[name].per_model]
     names = known if outputs is None else as_keys(outputs, "outputs")
-    for name in names:
-        if name not in known:
-            raise UsageError(f'outputs: no output "{name}" of this law; {did_you_mean(name, known)}')
+    require_known(names, known, "outputs: no output", " of this law")
     return PreparedProblem(replace(config, axes=()), law, tuple(names))

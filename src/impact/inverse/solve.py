@@ -43,7 +43,7 @@ from ..engine.build_impacts import build_impacts
 from ..engine.inputs import Inputs
 from ..engine.plan import Plan
 from ..engine.plugins import read_plugins
-from ..errors import UsageError, did_you_mean, warn
+from ..errors import UsageError, did_you_mean, require_known, warn
 from ..formatting import argument, law_name, number, prefixed, quantity, safe_text
 from ..results.plausibility import depth_notes
 from ..results.ranking import only_target, target_value
@@ -337,8 +337,7 @@ def solve_input(config: Config, unknown: Parameter, target: Mapping[str, object]
     """Find all values of an input that give a target; with an axis, the value nearest to it everywhere."""
     names = [name for name, variable in OUTPUTS.items() if variable.dtype == "f8" and variable.per_model]
     name, value = only_target(target)
-    if name not in names:
-        raise UsageError(f'{argument("target")}: no output "{name}"; {did_you_mean(name, names)}')
+    require_known([name], names, f"{argument('target')}: no output")
     if OUTPUTS[name].of_friction and not config.frictions:
         raise UsageError(
             f"{argument('target', key=name)}: got no friction law, expected {argument('friction', 'KEY')}"

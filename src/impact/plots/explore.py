@@ -22,7 +22,7 @@ from ..config.load import Config
 from ..contact.model import ForceModel
 from ..engine.plan import Plan
 from ..engine.plugins import Plugins, read_plugins
-from ..errors import ImpactError, UsageError, did_you_mean
+from ..errors import ImpactError, UsageError, did_you_mean, require_known
 from ..formatting import prefixed, safe_text
 from ..results.kinds import kind_of
 from ..results.provenance import changed_plugins, config_of_part, stored_config
@@ -114,9 +114,7 @@ def explore(
     others = [name for name in axes if name != first]
     x = ipywidgets.Dropdown(options=axes, value=first, description="x")
     y = ipywidgets.Dropdown(options=axes, value=others[0] if others else first, description="y")
-    for name in sel or {}:
-        if name not in swept:
-            raise UsageError(f'sel: no axis "{name}" to select along; {did_you_mean(name, swept)}')
+    require_known(sel or {}, swept, "sel: no axis", " to select along")
     sliders = {name: _slider(dataset, name, name not in reasons, (sel or {}).get(name)) for name in swept}
     picture = ipywidgets.Image(
         format="png", layout={"width": "100%", "max_width": MAX_PICTURE_WIDTH, "margin": "0"}

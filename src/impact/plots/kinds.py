@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..display import resolve_decimal
-from ..errors import UsageError, did_you_mean
+from ..errors import UsageError, require_known
 from ..formatting import argument
 
 if TYPE_CHECKING:
@@ -171,8 +171,7 @@ def check_choice(choice: Choice, kinds: Sequence[Kind]) -> None:
 
 def find_kind(name: str) -> Kind:
     """Find a kind of picture; an unknown one is a UsageError that suggests the nearest."""
-    if name not in KINDS:
-        raise UsageError(f'{argument("kind")}: no kind "{name}"; {did_you_mean(name, list(KINDS))}')
+    require_known([name], KINDS, f"{argument('kind')}: no kind")
     module = import_module(f".{KINDS[name]}", __package__)
     kind: Kind = getattr(module, name.upper().replace("-", "_"))
     return kind

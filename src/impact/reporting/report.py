@@ -30,7 +30,7 @@ from ..contact.model import ForceModel
 from ..contact.models import catalogue
 from ..engine.plan import Plan
 from ..engine.plugins import read_plugins
-from ..errors import ImpactError, UsageError, did_you_mean
+from ..errors import ImpactError, UsageError, require_known
 from ..formatting import argument, number, prefixed, safe_text, scaled_unit, with_year
 from ..plots.slices import varying_inputs
 from ..results.attributes import read_attribute
@@ -117,9 +117,7 @@ def _report_of(
     sections: Sequence[str] | None = None,
 ) -> str:
     """Write a result as one page of HTML; for errors see `report`."""
-    for name in sections or ():
-        if name not in SECTIONS:
-            raise UsageError(f'{argument("sections")}: no section "{name}"; {did_you_mean(name, SECTIONS)}')
+    require_known(sections or (), SECTIONS, f"{argument('sections')}: no section")
     if kind_of(dataset) == "board":
         for name, value in (("models", models), ("sections", sections)):
             if value:

@@ -14,7 +14,7 @@ from ..config.files import to_plain_data, to_plain_value
 from ..config.input_names import InputName
 from ..config.quantities import number_in
 from ..contact.variables import LAW_DIMS, OUTPUTS
-from ..errors import UsageError, did_you_mean
+from ..errors import UsageError, did_you_mean, require_known
 from ..formatting import argument, prefixed, safe_text
 from .schema import plain_unit
 
@@ -47,11 +47,9 @@ def chosen_laws(laws: object, dataset: xr.Dataset, dim: LawDim = "model") -> lis
     noun = "friction law" if dim == "friction" else dim
     wanted = as_keys(laws, f"{dim}s")
     keys = [str(key) for key in dataset[dim].values.ravel()] if dim in dataset.coords else []
-    for key in wanted:
-        if not keys:
-            raise UsageError(f'no {noun} "{key}" in this result, which has none; sweep a config with {dim}s')
-        if key not in keys:
-            raise UsageError(f'no {noun} "{key}" in this result; {did_you_mean(key, keys)}')
+    if wanted and not keys:
+        raise UsageError(f'no {noun} "{wanted[0]}" in this result, which has none; sweep a config with {dim}s')
+    require_known(wanted, keys, f"no {noun}", " in this result")
     return list(dict.fromkeys(wanted or keys))
 
 

@@ -22,7 +22,7 @@ from ..contact.status import FrictionStatus
 from ..contact.variables import OUTPUTS
 from ..engine.plan import Plan
 from ..engine.run import Run
-from ..errors import ConfigError, UsageError, did_you_mean
+from ..errors import ConfigError, UsageError, require_known
 from ..formatting import argument
 from ..results.selection import as_keys
 from ..results.sensitivity import HALF, QUANTILES, sensitivity_template
@@ -132,9 +132,7 @@ def sensitivities(
     """
     names = [name for name, variable in OUTPUTS.items() if not variable.flags]
     of = as_keys(of, "of")
-    for name in of:
-        if name not in names:
-            raise UsageError(f'{argument("of")}: no output "{name}"; {did_you_mean(name, names)}')
+    require_known(of, names, f"{argument('of')}: no output")
     if output is not None and len(of) > 1:
         raise UsageError(
             f"{argument('output')}: got {len(of)} outputs ({argument('of')}), expected one for a file"
