@@ -40,7 +40,7 @@ def build_impacts(inputs: Inputs, model: Law, index: Index) -> Impacts:
     v1, v2 = (velocity_at(inputs, ball, index) for ball in "12")
     m1, m2 = (mass_at(inputs, ball, index) for ball in "12")
     E1, E2, nu1, nu2 = (of_material(ball, key) for key in ("E", "nu") for ball in "12")
-    R1, R2 = (radius_at(inputs, ball, index, mass) for ball, mass in (("1", m1), ("2", m2)))
+    R1, R2 = (radius_at(inputs, ball, index) for ball in "12")
     n = value("n") if model.exponent is None else np.full_like(missing, model.exponent)
     with np.errstate(all="ignore"):
         stiffness_name = f"{model.key}.K"
@@ -172,16 +172,16 @@ def mass_at(inputs: Inputs, ball: str, index: Index) -> Array:
     return mass
 
 
-def radius_at(inputs: Inputs, ball: str, index: Index, mass: Array) -> Array:
+def radius_at(inputs: Inputs, ball: str, index: Index) -> Array:
     """Compute the radius of a ball at cells [m]; if the config has none, that of a sphere of its mass."""
     if f"R{ball}" in inputs.names():
         return values_at(inputs, f"R{ball}", index)
-    return sphere_radius(mass, property_at(inputs, ball, "rho", index))
+    return sphere_radius(mass_at(inputs, ball, index), property_at(inputs, ball, "rho", index))
 
 
 def smaller_radius_at(inputs: Inputs, index: Index) -> Array:
     """Compute the radius of the smaller ball at cells [m]; NaN where it is unknown."""
-    return np.fmin(*(radius_at(inputs, ball, index, mass_at(inputs, ball, index)) for ball in "12"))
+    return np.fmin(*(radius_at(inputs, ball, index) for ball in "12"))
 
 
 def rayleigh_time_at(inputs: Inputs, index: Index) -> Array:
@@ -189,7 +189,7 @@ def rayleigh_time_at(inputs: Inputs, index: Index) -> Array:
     times = []
     for ball in "12":
         mass = mass_at(inputs, ball, index)
-        radius = radius_at(inputs, ball, index, mass)
+        radius = radius_at(inputs, ball, index)
         with np.errstate(invalid="ignore"):
             density = mass / sphere_mass(radius, np.ones(1))
         E, nu = (property_at(inputs, ball, key, index) for key in ("E", "nu"))

@@ -383,7 +383,7 @@ def _check_witnesses_at(
     inputs |= {f"v{ball}": velocity_at(table.inputs, ball, index) for ball in "12"}
     inputs |= {f"m{ball}": mass_at(table.inputs, ball, index) for ball in "12"}
     if any(variable.of_friction for variable in variables):
-        inputs |= {f"R{ball}": radius_at(table.inputs, ball, index, inputs[f"m{ball}"]) for ball in "12"}
+        inputs |= {f"R{ball}": radius_at(table.inputs, ball, index) for ball in "12"}
     for variable in variables:
         expected, got = stored[f"witness_{variable.name}"].values, expanded[variable.name]
         columns = {**inputs, variable.name: expected}

@@ -25,7 +25,7 @@ from ..contact.fixed_step import EXACT
 from ..contact.materials import effective_mass
 from ..contact.variables import AXES, HISTORY, LAW_DIMS, OUTPUTS, Variable, by_name, default_variables
 from ..engine.build_impacts import mass_at, radius_at, restitution_at, velocity_at
-from ..engine.inputs import Index, Inputs
+from ..engine.inputs import Index
 from ..engine.plan import Plan
 from ..formatting import number
 from .kinds import Kind
@@ -330,7 +330,7 @@ def plan_coordinates(plan: Plan) -> xr.Coordinates:
         if f"m{ball}" not in names:
             derive(f"m{ball}", (f"R{ball}", *material), partial(mass_at, plan.inputs, ball), equation=equation)
         elif plan.frictions and f"R{ball}" not in names:
-            derive(f"R{ball}", (f"m{ball}", *material), partial(_radius, plan.inputs, ball), equation=equation)
+            derive(f"R{ball}", (f"m{ball}", *material), partial(radius_at, plan.inputs, ball), equation=equation)
     if "speed" in names:
         velocity = partial(velocity_at, plan.inputs, "1")
         derive("v1", ("speed", "angle", "v2"), velocity, equation="v1 = v2 + speed cos(angle)")
@@ -451,10 +451,6 @@ def _exponents(plan: Plan) -> tuple[tuple[str, ...], Array]:
     axis = plan.config.axes[axes[0]]
     values = np.asarray(axis.columns["n"], float)
     return ("model", axis.name), np.where(np.isnan(own)[:, None], values, own[:, None])
-
-
-def _radius(inputs: Inputs, ball: str, index: Index) -> Array:
-    return radius_at(inputs, ball, index, mass_at(inputs, ball, index))
 
 
 def provenance_attributes(plan: Plan) -> dict[str, object]:
