@@ -545,13 +545,11 @@ class Calibration:
         """MODEL, or MODEL with FRICTION, the best law first."""
         return [str(law) for law in self.dataset["model"].values]
 
-    def law(self, model: str, friction: str = "") -> xr.Dataset:
-        """Find the fit of a law, by whatever name."""
-        return self.dataset.isel(model=position_of_law(self.laws, law_name(model, friction), self.name))
-
-    def draft(self, law: xr.Dataset, model: str, plugins: Plugins) -> Draft:
-        """Open the config of a fitted law, under the name of a model."""
-        draft = open_text(fitted_config(self.config, law), self.name, plugins.models)
+    def draft(self, model: str, friction: str, plugins: Plugins) -> Draft:
+        """Open the config of a fitted law, by whatever name, under the name of a model."""
+        position = position_of_law(self.laws, law_name(model, friction), self.name)
+        config = fitted_config(self.config, self.dataset.isel(model=position))
+        draft = open_text(config, self.name, plugins.models)
         fitted = draft.models[0].key
         table = draft.table("model").get(fitted)
         is_renamed = table is not None and model != fitted
@@ -593,7 +591,7 @@ class PointSource:
         if self.calibration is None:
             return self.config_draft
         model = self.models[0] if model is None else model
-        return self.calibration.draft(self.calibration.law(model, friction or ""), model, self.plugins)
+        return self.calibration.draft(model, friction or "", self.plugins)
 
 
 def open_source(source: ConfigSource, overrides: Overrides, plugins: Plugins) -> PointSource:
