@@ -117,7 +117,11 @@ class Board(Displayed):
     def _engine(self, position: int) -> dict[str, Any]:
         """The facts, the checks and the counts of one engine."""
         engine = self.dataset.isel(engine=position)
-        checks = self._checks(engine)
+        columns = [engine[name].values.tolist() for name in ("collision", "criterion", *NUMBERS, "check_status")]
+        checks = [
+            dict(zip(("id", "check", *NUMBERS), values, strict=True)) | {"status": STATUS_WORDS[status]}
+            for *values, status in zip(*columns, strict=True)
+        ]
         return {
             "engine": str(engine["engine"].item()),
             "version": str(engine["engine_version"].item()),
@@ -128,14 +132,6 @@ class Board(Displayed):
                 word: sum(check["status"] == status for check in checks) for status, word in COUNTED.items()
             },
         }
-
-    @staticmethod
-    def _checks(engine: xr.Dataset) -> list[dict[str, Any]]:
-        columns = [engine[name].values.tolist() for name in ("collision", "criterion", *NUMBERS, "check_status")]
-        return [
-            dict(zip(("id", "check", *NUMBERS), values, strict=True)) | {"status": STATUS_WORDS[status]}
-            for *values, status in zip(*columns, strict=True)
-        ]
 
     def records(self) -> Sequence[Mapping[str, Any]]:
         """A row for each check of each engine."""
