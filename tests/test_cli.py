@@ -24,7 +24,7 @@ from rich.cells import cell_len
 
 import impact
 from impact.cli import exits
-from impact.cli.execution import Execution
+from impact.cli.execution import execution
 from impact.cli.main import COMMANDS, load_command
 from impact.errors import UsageError
 from impact.plots.data import read_points
@@ -797,7 +797,7 @@ def test_executors_exclude_each_other(cli: Run, small: Path, tmp_path: Path) -> 
 def test_threads_integrate_in_the_process_of_the_command_and_jobs_in_others(
     jobs: int, threads: int, shares_memory: bool
 ) -> None:
-    with Execution(lambda: False, quiet=True, jobs=jobs, threads=threads).keywords() as keywords:
+    with execution(True, jobs, threads) as keywords:
         assert keywords["backend"].shares_memory is shares_memory
 
 

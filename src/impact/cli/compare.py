@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -14,7 +15,7 @@ from ..atomic import check_outputs
 from ..display import dump, show
 from ..errors import ImpactError, UsageError
 from . import exits, options
-from .execution import Execution
+from .execution import execution, run_in_memory
 
 if TYPE_CHECKING:
     from ..comparison.formats import NoVerdict
@@ -92,7 +93,7 @@ def rerun(
     quiet: options.Quiet = False,
 ) -> None:
     """Repeat a sweep or a calibration from its result alone, and compare the new values with the stored ones."""
-    with exits.catch_signals() as should_stop:
+    with execution(quiet) as keywords:
         from ..comparison import formats
         from ..comparison.rerun import rerun as repeat
 
@@ -104,7 +105,7 @@ def rerun(
                 tol=dict(tol or ()) or None,
                 subset=subset,
                 max_points=max_points,
-                execute=Execution(should_stop, quiet).execute,
+                execute=partial(run_in_memory, **keywords),
             )
         except ImpactError as error:
             _print_outcome(formats.NoVerdict("the rerun", str(result), str(error)), format)

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,49 +24,37 @@ if TYPE_CHECKING:
     from ..results.outcome import SweepOutcome
 
 
-@dataclass(frozen=True)
-class Execution:
-    """How a command integrates, by its options; `should_stop` returns whether a signal came."""
-
-    should_stop: Callable[[], bool]
-    quiet: bool
-    jobs: int = 1
-    threads: int = 1
-    scheduler: str | None = None
-    scheduler_file: Path | None = None
-
-    def __post_init__(self) -> None:
-        options = ("jobs", "threads", "scheduler", "scheduler_file")
-        values = {f"--{name.replace('_', '-')}": getattr(self, name) for name in options}
-        selected = [f"{name} {value}" for name, value in values.items() if value not in (1, None)]
-        if len(selected) > 1:
-            raise UsageError(f"{selected[0]}: got {selected[1]} as well, expected one of the two")
-
-    def _executor(self) -> AbstractContextManager[ExecutorSpec]:
-        """Choose the executor; the size of a cluster is printed on stderr when it is entered."""
-        address = self.scheduler if self.scheduler is not None else self.scheduler_file
+@contextmanager
+def execution(
+    quiet: bool, jobs: int = 1, threads: int = 1, scheduler: str | None = None, scheduler_file: Path | None = None
+) -> Iterator[dict[str, Any]]:
+    """Catch signals, and show the progress, while public functions that take these keywords integrate."""
+    options = {"--jobs": jobs, "--threads": threads, "--scheduler": scheduler, "--scheduler-file": scheduler_file}
+    selected = [f"{name} {value}" for name, value in options.items() if value not in (1, None)]
+    if len(selected) > 1:
+        raise UsageError(f"{selected[0]}: got {selected[1]} as well, expected one of the two")
+    progress_bar = impact.progress_bar(exits.print_line, quiet=quiet)
+    with exits.catch_signals() as should_stop, progress_bar as on_progress:
+        backend: AbstractContextManager[ExecutorSpec]
+        address = scheduler if scheduler is not None else scheduler_file
         if address is None:
             from ..engine.executors import choose_executor
 
-            return choose_executor(self.jobs, self.threads)
-        from ..engine.dask import cluster
+            backend = choose_executor(jobs, threads)
+        else:
+            from ..engine.dask import cluster
 
-        return cluster(address, self.should_stop, (lambda note: None) if self.quiet else exits.print_line)
+            # the size of the cluster is printed when it is entered
+            backend = cluster(address, should_stop, (lambda note: None) if quiet else exits.print_line)
+        yield {"backend": backend, "on_progress": on_progress, "should_stop": should_stop}
 
-    @contextmanager
-    def keywords(self) -> Iterator[dict[str, Any]]:
-        """Show the progress while public functions that take these keywords run."""
-        backend = self._executor()
-        with impact.progress_bar(exits.print_line, quiet=self.quiet) as on_progress:
-            yield {"backend": backend, "on_progress": on_progress, "should_stop": self.should_stop}
 
-    def execute(self, plan: Plan) -> xr.Dataset:
-        """Run a plan in memory."""
-        from ..engine.run import Run
-        from ..results.sweep import sweep_in_memory
+def run_in_memory(plan: Plan, *, backend: AbstractContextManager[ExecutorSpec], **callbacks: Any) -> xr.Dataset:
+    """Run a plan in memory, with the keywords of `execution`."""
+    from ..engine.run import Run
+    from ..results.sweep import sweep_in_memory
 
-        with self.keywords() as keywords:
-            return sweep_in_memory(plan, Run(keywords.pop("backend"), **keywords))
+    return sweep_in_memory(plan, Run(backend, **callbacks))
 
 
 def print_summary_and_exit(outcome: SweepOutcome, *, quiet: bool, as_json: bool, allow_failed: bool) -> None:

@@ -8,7 +8,7 @@ from typing import Annotated
 import impact
 
 from . import exits, options
-from .execution import Execution, print_summary_and_exit
+from .execution import execution, print_summary_and_exit
 
 
 def expand(
@@ -56,19 +56,17 @@ def extend(
     as_json: options.Json = False,
 ) -> None:
     """Add values to the axes of a result; only what it does not hold is integrated."""
-    with exits.catch_signals() as should_stop:
-        execution = Execution(should_stop, quiet, jobs, threads)
-        with execution.keywords() as keywords:
-            outcome = impact.extend_to_file(
-                result,
-                sets,
-                output=output,
-                resume=resume,
-                overwrite=overwrite,
-                plugins=plugins or (),
-                max_points=max_points,
-                **keywords,
-            )
+    with execution(quiet, jobs, threads) as keywords:
+        outcome = impact.extend_to_file(
+            result,
+            sets,
+            output=output,
+            resume=resume,
+            overwrite=overwrite,
+            plugins=plugins or (),
+            max_points=max_points,
+            **keywords,
+        )
     if not quiet:
         reason = "; layout full holds none of them" if outcome.extended_layout == "full" else ""
         count = f"{outcome.integrated:,} of {outcome.trajectories:,} trajectories were integrated for it"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -13,7 +14,7 @@ import impact
 from ..display import dump, show
 from . import exits, options
 from .completion import complete_output
-from .execution import Execution
+from .execution import execution, run_in_memory
 
 
 def sensitivity(
@@ -42,7 +43,7 @@ def sensitivity(
     Of several outputs each has its own tables, and --json is a list.
     """
     outputs = list(dict.fromkeys(of or ["e_out"]))
-    with exits.catch_signals() as should_stop, warnings.catch_warnings():
+    with execution(quiet, jobs, threads) as keywords, warnings.catch_warnings():
         if quiet:
             warnings.simplefilter("ignore", impact.ImpactWarning)
         from ..uncertainty.sensitivity import sensitivities
@@ -55,7 +56,7 @@ def sensitivity(
             overrides=sets or (),
             plugins=plugins or (),
             max_points=max_points,
-            execute=Execution(should_stop, quiet, jobs, threads).execute,
+            execute=partial(run_in_memory, **keywords),
         )
     descriptions = [impact.describe(result) for result in results]
     if as_json:

@@ -12,7 +12,7 @@ import impact
 from ..display import Wrapped, dump, print_blocks, show
 from ..errors import UnfinishedError, UsageError
 from . import exits, options
-from .execution import Execution, print_summary_and_exit
+from .execution import execution, print_summary_and_exit
 
 
 def sweep(
@@ -42,13 +42,12 @@ def sweep(
     as_json: options.Json = False,
 ) -> None:
     """Run every model over a sweep and store post-impact velocities and their errors."""
-    with exits.catch_signals() as should_stop:
+    with execution(quiet, jobs, threads, scheduler, scheduler_file) as keywords:
 
         def print_note(note: str) -> None:
             if not quiet:
                 exits.print_line(f"note: {config}: {note}")
 
-        execution = Execution(should_stop, quiet, jobs, threads, scheduler, scheduler_file)
         inputs: dict[str, Any] = {
             "overrides": sets or (),
             "plugins": plugins or (),
@@ -62,15 +61,14 @@ def sweep(
             show(expected, as_json=as_json)
             if not as_json and (scheduler or scheduler_file):
                 print_blocks([Wrapped(expected.workers_line)])
-            if should_stop():
+            if keywords["should_stop"]():
                 raise UnfinishedError("nothing was written")
             return
-        with execution.keywords() as keywords:
-            inputs |= keywords
-            if shard is not None:
-                done = impact.sweep_shard(config, shard, output, overwrite=overwrite, **inputs)
-            else:
-                outcome = impact.sweep_to_file(config, output, resume=resume, overwrite=overwrite, **inputs)
+        inputs |= keywords
+        if shard is not None:
+            done = impact.sweep_shard(config, shard, output, overwrite=overwrite, **inputs)
+        else:
+            outcome = impact.sweep_to_file(config, output, resume=resume, overwrite=overwrite, **inputs)
     if shard is not None:
         if as_json:
             print(dump(done))
