@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from typing import NamedTuple
 
 from pydantic import ValidationError
 
@@ -55,11 +56,10 @@ KEY_SYNONYMS |= {f"{word}{ball}": f"{key}{ball}" for word, key in WORDS_OF_BALLS
 
 BARE_KEY = r"[A-Za-z0-9_-]++"
 TOML_TOKEN = re.compile(
-    r"""(?P<newline>\n)
-      | (?P<skip>[ \t\r]+ | \#[^\n]*)
-      | (?P<long>\"{3} (?: \\. | [^\\] )*? \"{3,5} | '{3} .*? '{3,5})
-      | (?P<name>" (?: \\. | [^"\\] )* " | '[^']*' | [^\s\[\]{}=,.\#"']+)
-      | (?P<mark>.)""",
+    r"""(?P<skip>[ \t\r]+ | \#[^\n]*)
+      | \"{3} (?: \\. | [^\\] )*? \"{3,5} | '{3} .*? '{3,5}
+      | " (?: \\. | [^"\\] )* " | '[^']*' | [^\s\[\]{}=,.\#"']+
+      | .""",
     re.DOTALL | re.VERBOSE,
 )
 
@@ -86,71 +86,62 @@ def key_lines(text: str) -> dict[KeyPath, int]:
     >>> key_lines("a = 1\\n[b]\\nc.d = [\\n  1,\\n  2]")[("b", "c", "d", 1)]
     5
     """
-    scanner = _KeyScanner()
-    for match in TOML_TOKEN.finditer(text):
-        scanner.read(match[0], str(match.lastgroup))
-    return scanner.lines
+    lines: dict[KeyPath, int] = {}
+    tokens = _tokens(text)
 
+    def read_key(token: _Token, base: KeyPath, end: str) -> KeyPath:
+        """Read a key or header, and record its line, also that of the tables that a dotted one implies."""
+        started, path = 0, base
+        while token.text != end:
+            if token.text not in ("[", "."):
+                started, path = started or token.line, (*path, _unquoted(token.text))
+                lines.setdefault(path, started)
+            token = next(tokens)
+        return path
 
-class _KeyScanner:
-    """Reads the tokens of a TOML text and records the line of each key."""
-
-    def __init__(self) -> None:
-        self.lines: dict[KeyPath, int] = {}
-        self.line = 1
-        self.table: KeyPath = ()
-        self.path: KeyPath = ()  # of the key or list element being read
-        self.parts: list[str] = []  # of the key being read, which begins on line `started`
-        self.started = 1
-        self.is_key = True
-        # open inline tables, with None, and open lists, with the index of the element being read
-        self.opened: list[tuple[KeyPath, int | None]] = []
-
-    def read(self, token: str, kind: str) -> None:
-        if kind == "newline" and not self.opened:
-            self.is_key, self.parts = True, []
-        elif kind not in ("newline", "skip"):
-            if self.is_key:
-                self._read_key(token, kind)
+    def read_value(token: _Token, path: KeyPath) -> _Token:
+        """Read a value, and return the token after it."""
+        if token.text not in ("[", "{"):
+            while token.text not in (",", "]", "}", "\n"):
+                token = next(tokens)
+            return token
+        first_line, index, element = token.line, 0, next(tokens)
+        while element.text not in ("]", "}"):
+            if token.text == "{":
+                inner, element = read_key(element, path, "="), next(tokens)
             else:
-                self._read_value(token)
-        self.line += token.count("\n")
+                inner, index = (*path, index), index + 1
+                if element.line != first_line:
+                    lines[inner] = element.line
+            element = read_value(element, inner)
+            element = next(tokens) if element.text == "," else element
+        return next(tokens)
 
-    def _read_key(self, token: str, kind: str) -> None:
-        if kind == "name":
-            self.started = self.started if self.parts else self.line
-            self.parts.append(_unquoted(token))
-        elif token == "=":
-            self._end_key(self.opened[-1][0] if self.opened else self.table)
-            self.is_key = False
-        elif token == "]" and self.parts:
-            self._end_key(())
-            self.table = self.path
-        elif token == "}":
-            self.path, self.is_key = self.opened.pop()[0], False
+    table: KeyPath = ()
+    for token in tokens:
+        if token.text == "[":
+            table = read_key(token, (), "]")
+        elif token.text not in ("]", "\n"):
+            path = read_key(token, table, "=")
+            read_value(next(tokens), path)
+    return lines
 
-    def _end_key(self, base: KeyPath) -> None:
-        """Record the line of a complete key or header, and of the tables that a dotted one implies."""
-        self.path = (*base, *self.parts)
-        self.parts = []
-        for end in range(len(base) + 1, len(self.path) + 1):
-            self.lines.setdefault(self.path[:end], self.started)
 
-    def _read_value(self, token: str) -> None:
-        if token in ("]", "}"):
-            self.path = self.opened.pop()[0]
-        elif token == ",":
-            base, index = self.opened[-1]
-            self.is_key = index is None
-            if index is not None:
-                self.opened[-1] = (base, index + 1)
-                self.path = (*base, index + 1)
-        else:
-            if self.opened and self.opened[-1][1] is not None and self.lines.get(self.opened[-1][0]) != self.line:
-                self.lines.setdefault(self.path, self.line)
-            if token in ("[", "{"):
-                self.opened.append((self.path, 0 if token == "[" else None))
-                self.path, self.is_key = (*self.path, 0) if token == "[" else self.path, token == "{"
+class _Token(NamedTuple):
+    """A part of a TOML text, and the line where it begins."""
+
+    text: str
+    line: int
+
+
+def _tokens(text: str) -> Iterator[_Token]:
+    """Split a TOML text, without spaces and comments, and without the line breaks in lists."""
+    line, depth = 1, 0
+    for match in TOML_TOKEN.finditer(f"{text}\n"):
+        depth += (match[0] in ("[", "{")) - (match[0] in ("]", "}"))
+        if match["skip"] is None and (match[0] != "\n" or depth == 0):
+            yield _Token(match[0], line)
+        line += match[0].count("\n")
 
 
 def _unquoted(token: str) -> str:
