@@ -6,14 +6,14 @@ Each step from the source to a `Config` takes a draft and returns a new one; see
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from ..contact.friction import FrictionLaw
-from ..contact.model import ForceModel
+from ..contact.model import ForceModel, Parameter
 from ..contact.models import catalogue
 from ..errors import ConfigError, MissingFileError, UsageError
 from ..formatting import argument, safe_text, type_of
@@ -163,6 +163,13 @@ class Draft:
     def laws(self) -> dict[str, Sequence[ForceModel | FrictionLaw]]:
         """The selected laws by the table of their parameters."""
         return {"model": self.models, "friction": self.frictions}
+
+    @property
+    def parameters(self) -> Iterator[tuple[InputName, Parameter]]:
+        """The parameters of the selected laws."""
+        for table, laws in self.laws.items():
+            for law in laws:
+                yield from ((InputName(table, law.key, parameter.name), parameter) for parameter in law.parameters)
 
     @cached_property
     def input_names(self) -> list[str]:

@@ -226,14 +226,8 @@ def _default_scalars(draft: Draft, solver: tables.Solver) -> dict[str, float]:
             *(draft.measurements.inputs if draft.measurements else ()),
         }
         defaults |= {**tables.OBLIQUE_DEFAULTS, **({"u2": 0.0} if is_given else {"u1": 0.0, "u2": 0.0})}
-    for table, laws in draft.laws.items():
-        defaults |= {
-            str(InputName(table, law.key, parameter.name)): parameter.default
-            for law in laws
-            for parameter in law.parameters
-            if parameter.default is not None
-        }
-    return defaults
+    of_laws = {str(name): parameter.default for name, parameter in draft.parameters}
+    return defaults | {name: default for name, default in of_laws.items() if default is not None}
 
 
 def _remove_invalid(data: Mapping[str, Any], problems: Iterable[ConfigProblem]) -> dict[str, Any]:

@@ -431,13 +431,9 @@ def add_fits(draft: Draft) -> Draft:
     uses_e |= any(law.may_use_e for law in draft.frictions)
     has_e = not {"e", "alpha"}.isdisjoint({*draft.table("sweep"), *as_table(draft.table("data").get("columns"))})
     paths: list[KeyPath] = [("sweep", "e")] if uses_e and not has_e else []
-    for table, laws in draft.laws.items():
-        paths += [
-            (table, law.key, parameter.name)
-            for law in laws
-            for parameter in law.parameters
-            if parameter.default is None and not parameter.optional
-        ]
+    paths += [
+        name.path for name, parameter in draft.parameters if parameter.default is None and not parameter.optional
+    ]
     data = draft.data
     for path in paths:
         if not contains_path(data, path):

@@ -17,15 +17,7 @@ from .._version import __version__
 from ..arguments import require_counts
 from ..config.columns import without_replaced_inputs
 from ..config.design import distribution_paths
-from ..config.draft import (
-    Draft,
-    Overrides,
-    Setting,
-    open_config,
-    open_text,
-    reject_law_key,
-    settings_of,
-)
+from ..config.draft import Draft, Overrides, Setting, open_config, open_text, reject_law_key, settings_of
 from ..config.files import as_table, to_plain_value
 from ..config.grid import Axis
 from ..config.input_names import SWEEP_INPUTS, InputName, input_values, with_words
@@ -731,13 +723,7 @@ def _has_input(draft: Draft, name: InputName) -> bool:
 
 
 def _unknown_input(draft: Draft, name: str) -> UsageError:
-    parameters = [
-        str(InputName(table, law.key, parameter.name))
-        for table, laws in draft.laws.items()
-        for law in laws
-        for parameter in law.parameters
-    ]
-    names = {*draft.input_names, *SWEEP_DEFAULTS, *parameters}
+    names = {*draft.input_names, *SWEEP_DEFAULTS, *(str(parameter) for parameter, _ in draft.parameters)}
     choices = {choice for choice in names if _has_input(draft, InputName.parse(choice))} | _joint_inputs(draft)
     hint = did_you_mean(name, [*choices, *SWEEP_INPUTS])
     # without a similar name, the inputs that this config has
