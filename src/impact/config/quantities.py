@@ -19,7 +19,7 @@ from pydantic import (
     Discriminator,
     Field,
     GetCoreSchemaHandler,
-    GetJsonSchemaHandler,
+    GetPydanticSchema,
     PlainValidator,
     Tag,
     TypeAdapter,
@@ -30,7 +30,7 @@ from pydantic import (
     model_validator,
 )
 from pydantic_core import InitErrorDetails, PydanticCustomError
-from pydantic_core.core_schema import CoreSchema, with_info_plain_validator_function
+from pydantic_core.core_schema import with_info_plain_validator_function
 
 from ..contact.model import ForceModel
 from ..contact.units import dimension, names_in
@@ -205,14 +205,9 @@ class Table(BaseModel):
     )
 
 
-@dataclass(frozen=True)
-class ReadAs:
+def read_as(value_type: Any) -> GetPydanticSchema:
     """Validate by a type that is built at run time; mypy sees the type of the value."""
-
-    type: Any
-
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> Any:
-        return handler.generate_schema(self.type)
+    return GetPydanticSchema(lambda source, handler: handler.generate_schema(value_type))
 
 
 def _float_to_int(value: object) -> object:
@@ -220,16 +215,16 @@ def _float_to_int(value: object) -> object:
     return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
-def bounded_int(least: int, most: int | None = None) -> ReadAs:
+def bounded_int(least: int, most: int | None = None) -> GetPydanticSchema:
     """Build the type of whole numbers in an interval."""
     interval = f"of at least {least:,}" if most is None else f"from {least:,} to {most:,}"
     bounds = Field(ge=least, le=most, strict=True)
-    return ReadAs(Annotated[int, bounds, BeforeValidator(_float_to_int), expected(f"a whole number {interval}")])
+    return read_as(Annotated[int, bounds, BeforeValidator(_float_to_int), expected(f"a whole number {interval}")])
 
 
 SEPARATORS, DECIMALS = (",", ";", "\t"), (".", ",")
-SeparatorKey: TypeAlias = Annotated[Any, ReadAs(Literal[SEPARATORS]), expected('",", ";" or "\\t"')]
-DecimalKey: TypeAlias = Annotated[Any, ReadAs(Literal[DECIMALS]), expected('"." or ","')]
+SeparatorKey: TypeAlias = Annotated[Any, read_as(Literal[SEPARATORS]), expected('",", ";" or "\\t"')]
+DecimalKey: TypeAlias = Annotated[Any, read_as(Literal[DECIMALS]), expected('"." or ","')]
 
 
 class Column(Table):
@@ -389,15 +384,13 @@ def value_form(value: object) -> str:
     match value:
         case list():
             return LIST
-        case {"fit": _} | FitRange():
+        case {"fit": _}:
             return FIT
-        case Distribution():
-            return DISTRIBUTION
         case dict() if not DISTRIBUTION_FORMS.keys().isdisjoint(value):
             return DISTRIBUTION
         case {"file": _} | {"column": _}:
             return COLUMN
-        case dict() | Range():
+        case dict():
             return RANGE
     return SCALAR
 
@@ -418,10 +411,10 @@ def _list_of(element: Any, description: str) -> Any:
     return Annotated[list[element], Field(min_length=1), BeforeValidator(check_not_empty), AfterValidator(tuple)]
 
 
-def name_or_names(description: str, choices_of: Callable[[ValidationInfo], Sequence[str]]) -> ReadAs:
+def name_or_names(description: str, choices_of: Callable[[ValidationInfo], Sequence[str]]) -> GetPydanticSchema:
     """Build the type of a name, or a list of names, that are among some choices."""
     choice = Annotated[str, known_name(description, choices_of)]
-    return ReadAs(
+    return read_as(
         Annotated[
             Annotated[choice, Tag(SCALAR)]
             | Annotated[_list_of(choice, description), Tag(LIST)]
@@ -500,7 +493,7 @@ class Quantity:
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> Any:
         # quantities with the same unit and interval share a type, whatever their meaning
         of_any_meaning = replace(self, meaning="")
-        validated = number_type(of_any_meaning) if source is float else Annotated[Any, _AnyForm(of_any_meaning)]
+        validated = number_type(of_any_meaning) if source is float else Annotated[Any, _any_form(of_any_meaning)]
         return handler.generate_schema(Annotated[validated, Field(description=self.description)])
 
     def validate(self, value: object, info: ValidationInfo) -> float:
@@ -605,22 +598,18 @@ class UnitError(ValueError):
     """A unit is unknown or has another dimension; the message is what is expected."""
 
 
-@dataclass(frozen=True)
-class _AnyForm:
+def _any_form(quantity: Quantity) -> GetPydanticSchema:
     """Validate a value of any form; a bare number does not need `numbers_type`, which takes long to build."""
 
-    quantity: Quantity
-
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return with_info_plain_validator_function(self.validate)
-
-    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> Any:
-        return handler(numbers_type(self.quantity).core_schema)
-
-    def validate(self, value: object, info: ValidationInfo) -> Any:
+    def validate(value: object, info: ValidationInfo) -> Any:
         if value_form(value) == SCALAR:
-            return self.quantity.validate(value, info)
-        return numbers_type(self.quantity).validate_python(value, context=info.context)
+            return quantity.validate(value, info)
+        return numbers_type(quantity).validate_python(value, context=info.context)
+
+    return GetPydanticSchema(
+        lambda source, handler: with_info_plain_validator_function(validate),
+        lambda schema, handler: handler(numbers_type(quantity).core_schema),
+    )
 
 
 @cache
@@ -646,7 +635,7 @@ def number_type(quantity: Quantity) -> Any:
 def numbers_type(quantity: Quantity) -> TypeAdapter[Any]:
     """Build the type of a number, list, range, column, fit or distribution, which its form tells apart."""
     number, end = number_type(quantity), number_type(replace(quantity, infinite=False))
-    any_number, count = number_type(Quantity(quantity.unit, "")), bounded_int(1).type
+    any_number, count = number_type(Quantity(quantity.unit, "")), Annotated[int, bounded_int(1)]
     spread = number_type(Quantity(quantity.unit, "", 0.0, above=True))
     ratio = number_type(Quantity("1", "", 1.0, above=True))
     of_quantity = quantity.expected.removeprefix("a ")

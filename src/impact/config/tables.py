@@ -45,7 +45,6 @@ from .quantities import (
     Names,
     Numbers,
     Quantity,
-    ReadAs,
     SeparatorKey,
     Table,
     ValidationContext,
@@ -55,6 +54,7 @@ from .quantities import (
     located_errors,
     mismatch_error,
     name_or_names,
+    read_as,
     schema_simplifier,
     value_error,
 )
@@ -96,7 +96,7 @@ CellsByName = Annotated[
     dict[
         str,
         Annotated[
-            list[Annotated[Any, ReadAs(float | str | None), expected(CELL_EXPECTED)]],
+            list[Annotated[Any, read_as(float | str | None), expected(CELL_EXPECTED)]],
             Field(min_length=1),
             expected("a list of values"),
         ],
@@ -190,7 +190,7 @@ class Sweep(Table):
     zip: Annotated[list[ZipGroup], expected('a list of groups of names, such as [["m1", "m2"]]')] = Field(
         default=[], description="groups of axes that vary together"
     )
-    cases: Annotated[Any, ReadAs(CasesTable)] = Field(
+    cases: Annotated[Any, read_as(CasesTable)] = Field(
         None, description="a CSV file of points, whose columns are config names with units, or a table of lists"
     )
 
@@ -244,11 +244,11 @@ class Solver:
     collapse: Annotated[
         bool, Field(strict=True, description="integrate impacts that are the same once"), expected("true or false")
     ] = True
-    core: Annotated[str, ReadAs(Literal[CORES]), Field(description="NumPy, numba where it can, or the faster")] = (
-        "auto"
-    )
+    core: Annotated[
+        str, read_as(Literal[CORES]), Field(description="NumPy, numba where it can, or the faster")
+    ] = "auto"
     integrator: Annotated[
-        Annotated[str, ReadAs(Literal[INTEGRATORS])],
+        Annotated[str, read_as(Literal[INTEGRATORS])],
         known_name("an integrator", lambda info: INTEGRATORS),
         Field(description="the continuous law with error control, or a scheme with a fixed step"),
     ] = EXACT
@@ -336,15 +336,15 @@ class Data(Table):
         json_schema_extra=schema_simplifier(anyOf=[{"required": ["file"]}, {"required": ["columns"]}])
     )
 
-    file: Annotated[Any, ReadAs(str), expected("the name of a CSV file")] = Field(
+    file: Annotated[Any, read_as(str), expected("the name of a CSV file")] = Field(
         None, description="CSV file, whose columns are inputs and outputs with units, and standard deviations"
     )
-    columns: Annotated[Any, ReadAs(DataColumns)] = Field(
+    columns: Annotated[Any, read_as(DataColumns)] = Field(
         None, description="the values, by name, or the headers of columns of the file"
     )
     separator: SeparatorKey = Field(None, description="of the columns of the file, where it is not recognised")
     decimal: DecimalKey = Field(None, description="sign of the file, where it is not recognised")
-    missing: Annotated[Any, ReadAs(Missing), known_name("what becomes of rows", lambda info: MISSING_ROWS)] = (
+    missing: Annotated[Any, read_as(Missing), known_name("what becomes of rows", lambda info: MISSING_ROWS)] = (
         Field(None, description="a row without a value is left out (skip, the default), or an error")
     )
     g: Annotated[float, GRAVITY] = STANDARD_GRAVITY
@@ -354,15 +354,15 @@ class Data(Table):
         expected("true or false"),
     ] = False
     lines: Annotated[
-        Any, ReadAs(list[Annotated[int, bounded_int(1)]]), expected("a list of the numbers of lines")
+        Any, read_as(list[Annotated[int, bounded_int(1)]]), expected("a list of the numbers of lines")
     ] = Field(None, description="the line of each point in the file, if the values are in columns")
-    noise: Annotated[Any, ReadAs(Noise), known_name("a kind of noise", lambda info: NOISES)] = Field(
+    noise: Annotated[Any, read_as(Noise), known_name("a kind of noise", lambda info: NOISES)] = Field(
         None,
         description="the standard deviations are given, have a common factor (scale), or an excess variance is "
         "added to theirs; excess by default with a column of specimens, given with standard deviations, "
         "otherwise scale",
     )
-    loss: Annotated[Any, ReadAs(Loss), known_name("a loss", lambda info: LOSSES)] = Field(
+    loss: Annotated[Any, read_as(Loss), known_name("a loss", lambda info: LOSSES)] = Field(
         None, description="how a residual counts: squared (linear), or less beyond one standard deviation"
     )
     sigma: Annotated[
@@ -375,7 +375,7 @@ class Design(Table):
 
     method: Annotated[
         str,
-        ReadAs(Literal[DESIGN_METHODS]),
+        read_as(Literal[DESIGN_METHODS]),
         known_name("a method", lambda info: DESIGN_METHODS),
         Field(description="scrambled Sobol or Halton sequence, Latin hypercube, or independent samples"),
     ] = "sobol"
@@ -472,8 +472,8 @@ class Document(Table):
     )
     solver: Solver = Field(default_factory=lambda: Solver())
     output: Output = Field(default_factory=lambda: Output())
-    data: Annotated[Any, ReadAs(Data)] = Field(None, description="measurements, for impact calibrate only")
-    design: Annotated[Any, ReadAs(Design)] = Field(
+    data: Annotated[Any, read_as(Data)] = Field(None, description="measurements, for impact calibrate only")
+    design: Annotated[Any, read_as(Design)] = Field(
         None, description="samples of the inputs that are distributions"
     )
     model: Any = None
