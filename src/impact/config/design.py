@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from ..array_types import Array
 from ..contact.model import ForceModel
-from .input_names import InputName, input_values
-from .quantities import DISTRIBUTION_FORMS, ConfigProblem, Distribution, KeyPath, as_text
+from .input_names import InputName, paths_with
+from .quantities import DISTRIBUTION_FORMS, ConfigProblem, Distribution, as_text
 from .tables import Design
 
 # samples of a unit interval stay this far from its ends, half the resolution of a Sobol sequence, so that no value
@@ -19,16 +19,9 @@ from .tables import Design
 LEAST_UNIT = 2.0**-31
 
 
-def distribution_paths(data: Mapping[str, Any]) -> Iterator[KeyPath]:
-    """List the path of every distribution in the data of a config."""
-    for name, value in input_values(data):
-        if isinstance(value, dict) and not DISTRIBUTION_FORMS.keys().isdisjoint(value):
-            yield name.path
-
-
 def design_problems(data: Mapping[str, Any]) -> list[ConfigProblem]:
     """Check that distributions have a [design], and that a [design] has distributions."""
-    paths = list(distribution_paths(data))
+    paths = paths_with(data, DISTRIBUTION_FORMS)
     if paths and "design" not in data:
         return [(paths[0], "got a distribution, expected a table [design] as well, such as n = 1024")]
     if not paths and "design" in data:

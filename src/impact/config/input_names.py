@@ -143,6 +143,11 @@ def is_input(name: object) -> bool:
     return name in SWEEP_INPUTS or "." in str(name)
 
 
+def paths_with(data: Mapping[str, Any], keys: Iterable[str]) -> list[KeyPath]:
+    """List the paths of the inputs whose value is a table with one of some keys, such as `{ fit = ... }`."""
+    return [name.path for name, value in input_values(data) if not as_table(value).keys().isdisjoint(keys)]
+
+
 def input_values(data: Mapping[str, Any]) -> Iterator[tuple[InputName, Any]]:
     """Yield the name and the value of every key of [sweep], of a material, of [model.KEY] and [friction.KEY]."""
     for key, value in as_table(data.get("sweep")).items():

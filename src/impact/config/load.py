@@ -19,7 +19,7 @@ from ..contact.variables import OUTPUTS, default_variables
 from ..errors import MissingFileError
 from . import measurements, quantities, tables
 from .columns import expand_cases, named_files, read_files, without_replaced_inputs
-from .design import design_problems, distribution_paths, draw_columns, unit_samples
+from .design import design_problems, draw_columns, unit_samples
 from .draft import (
     Draft,
     Measurements,
@@ -32,7 +32,7 @@ from .draft import (
 )
 from .files import as_table, override_text, set_value
 from .grid import MAX_POINTS, Axis, build_grid, chunk_problems
-from .input_names import InputName
+from .input_names import InputName, paths_with
 from .lines import validation_problems
 from .material_library import library
 from .quantities import Column, ConfigProblem, Distribution, FitRange, KeyPath
@@ -321,7 +321,7 @@ def _calibration_problems(
     single = "expected a single value, a column of [data] or { fit = [least, most] }"
     if "data" not in data:
         yield ("data",), 'missing, expected a table [data] of measurements, such as file = "drops.csv"'
-    fit_paths = list(measurements.fit_paths(data))
+    fit_paths = paths_with(data, ["fit"])
     if not fit_paths:
         yield ("sweep",), "got no parameter to fit, expected at least one { fit = [least, most] }"
     for path in fit_paths if are_valid and not fits else ():
@@ -329,9 +329,9 @@ def _calibration_problems(
     for name, value in values.items():
         if isinstance(value, tuple | quantities.Range):
             yield InputName.parse(name).path, f"got an axis, {single}"
-    uncertain = next(distribution_paths(data), ("design",) if "design" in data else ())
+    uncertain = [*paths_with(data, quantities.DISTRIBUTION_FORMS), *([("design",)] if "design" in data else [])]
     if uncertain:
-        yield uncertain, "got an uncertain input, which impact sweep and impact sensitivity take"
+        yield uncertain[0], "got an uncertain input, which impact sweep and impact sensitivity take"
     if as_table(data.get("sweep")).get("zip"):
         yield ("sweep", "zip"), f"got axes that vary together, {single} for each name"
     integrator = as_table(data.get("solver")).get("integrator", EXACT)

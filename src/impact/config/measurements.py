@@ -30,7 +30,7 @@ from .columns import (
 )
 from .draft import Draft, Measurements
 from .files import as_table, set_value
-from .input_names import InputName, input_values
+from .input_names import InputName, paths_with
 from .quantities import MAX_PROBLEMS, ConfigProblem, KeyPath, Quantity, as_text, value_error
 from .tables import (
     GRAVITY,
@@ -91,19 +91,12 @@ _Problem = tuple[str, int | None, str]
 _CellProblem = tuple[int | None, str]
 
 
-def fit_paths(data: Mapping[str, Any]) -> Iterator[KeyPath]:
-    """Yield the path of every `{ fit = ... }`."""
-    for name, value in input_values(data):
-        if isinstance(value, dict) and "fit" in value:
-            yield name.path
-
-
 def purpose_problems(data: Mapping[str, Any]) -> list[ConfigProblem]:
     """Refuse measurements and parameters to fit in a sweep."""
     takes = "use impact calibrate, which takes [data] and { fit = [least, most] }"
     if "data" in data:
         return [(("data",), f"got measurements, expected a sweep; {takes}")]
-    return [(path, f"got a fit, expected a value or an axis; {takes}") for path in fit_paths(data)][:1]
+    return [(path, f"got a fit, expected a value or an axis; {takes}") for path in paths_with(data, ["fit"])][:1]
 
 
 def _read_columns(columns: Columns, draft: Draft) -> tuple[_Points, list[_Problem]]:

@@ -16,12 +16,12 @@ import xarray as xr
 from .._version import __version__
 from ..arguments import require_counts
 from ..config.columns import without_replaced_inputs
-from ..config.design import distribution_paths
 from ..config.draft import Draft, Overrides, Setting, open_config, open_text, reject_law_key, settings_of
 from ..config.files import as_table, to_plain_value
 from ..config.grid import Axis
-from ..config.input_names import SWEEP_INPUTS, InputName, input_values, with_words
+from ..config.input_names import SWEEP_INPUTS, InputName, input_values, paths_with, with_words
 from ..config.load import Config, build, inline_files
+from ..config.quantities import DISTRIBUTION_FORMS
 from ..config.rules import has_other_stiffness
 from ..config.tables import DEFAULT_RTOL, MATERIAL_QUANTITIES, SWEEP_DEFAULTS, expand_models, law_quantities
 from ..contact.fixed_step import EXACT
@@ -659,7 +659,7 @@ def single_point(
     settings += [
         Setting(InputName.parse(name).path, values, argument("over", key=name)) for name, values in over.items()
     ]
-    is_uncertain = any(distribution_paths(draft.data))
+    is_uncertain = bool(paths_with(draft.data, DISTRIBUTION_FORMS))
     draft = draft.with_settings(settings)
     if isinstance(draft.table("sweep").get("cases"), str):
         # the inputs that vary together are the columns of the file
@@ -673,7 +673,7 @@ def single_point(
     for name, value in sorted({**labels, **fixed}.items(), key=lambda item: item[0] == "K"):
         if name not in joint and not is_case(name):
             draft = draft.with_settings([_setting_at(draft, name, value, law, source.at_name)])
-    if is_uncertain and not any(distribution_paths(draft.data)):
+    if is_uncertain and not paths_with(draft.data, DISTRIBUTION_FORMS):
         draft = replace(draft, data={key: value for key, value in draft.data.items() if key != "design"})
     config = build(draft)
     for name in fixed:
