@@ -405,13 +405,7 @@ def columns_of_table(table: Any, source: str) -> Columns:
         split_header(str(header)): getattr(values, "tolist", lambda v=values: v)()
         for header, values in table.items()
     }
-    names = [name for name, _ in cells]
-    twice = next((name for name, count in Counter(names).items() if count > 1), None)
-    if twice is not None:
-        raise ConfigError(
-            ": ".join(part for part in (source, f"got {as_text(twice)} twice, expected each column once") if part)
-        )
-    return Columns(
+    columns = Columns(
         source,
         0,
         range(1, max(map(len, cells.values()), default=0) + 1),
@@ -419,6 +413,10 @@ def columns_of_table(table: Any, source: str) -> Columns:
         {name: values for (name, _), values in cells.items()},
         is_text=False,
     )
+    twice = next((name for name, count in Counter(name for name, _ in cells).items() if count > 1), None)
+    if twice is not None:
+        raise ConfigError(columns.problem(f"got {as_text(twice)} twice, expected each column once"))
+    return columns
 
 
 def read_csv_of(

@@ -221,11 +221,8 @@ def _default_scalars(draft: Draft, solver: tables.Solver) -> dict[str, float]:
     defaults = {**tables.SWEEP_DEFAULTS, **({} if solver.integrator == EXACT else tables.FIXED_STEP_DEFAULTS)}
     if draft.frictions:
         # with an angle or a speed, u1 follows from it
-        is_given = {"angle", "speed"} & {
-            *draft.input_names,
-            *(draft.measurements.inputs if draft.measurements else ()),
-        }
-        defaults |= {**tables.OBLIQUE_DEFAULTS, **({"u2": 0.0} if is_given else {"u1": 0.0, "u2": 0.0})}
+        has_angle = bool({"angle", "speed"} & draft.table("sweep").keys())
+        defaults |= {**tables.OBLIQUE_DEFAULTS, **({"u2": 0.0} if has_angle else {"u1": 0.0, "u2": 0.0})}
     of_laws = {str(name): parameter.default for name, parameter in draft.parameters}
     return defaults | {name: default for name, default in of_laws.items() if default is not None}
 
