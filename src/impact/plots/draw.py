@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -36,8 +36,6 @@ from .labels import (
 )
 from .layout import LEGEND_PART, Picture
 from .style import default_size, styled
-
-ReadHistories = Callable[..., tuple[list[xr.Dataset], list[str]]]
 
 
 def plot(
@@ -131,9 +129,8 @@ def get_plot_data(
     kind: str,
     choice: Choice,
     plugins: Sequence[ForceModel | str | Path] = (),
-    read_histories: ReadHistories = histories,
 ) -> PlotData:
-    """Get the data of a picture, see `plot`; `read_histories` may return motions that it has integrated before."""
+    """Get the data of a picture, see `plot`."""
     plugin_set, found = read_plugins(plugins), find_kind(kind)
     default = default_kind(dataset)
     if default.source in STUDIES and found != default:
@@ -142,7 +139,7 @@ def get_plot_data(
         frictions = choice.frictions
         if found.of_friction and "friction" in dataset.dims:
             frictions = frictions or dataset["friction"].values.tolist()
-        motions, left_out = read_histories(dataset, choice.models, choice.sel or {}, plugin_set, frictions)
+        motions, left_out = histories(dataset, choice.models, choice.sel or {}, plugin_set, frictions)
         plot_data = found.data(motions, choice)
         return replace(plot_data, not_drawn=(*left_out, *plot_data.not_drawn))
     return found.data(dataset, choice)

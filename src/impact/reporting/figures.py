@@ -8,7 +8,6 @@ import math
 import shlex
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple, TypeAlias
 
@@ -21,11 +20,10 @@ from ..config.input_names import InputName, is_input
 from ..contact.model import ForceModel
 from ..contact.status import FIRST_FAILURE, NO_IMPACT
 from ..contact.units import names_in, with_numbers
-from ..engine.plugins import Plugins
 from ..errors import ImpactError
 from ..formatting import prefixed
 from ..plots.data import PlotData
-from ..plots.draw import ReadHistories, draw, get_plot_data
+from ..plots.draw import draw, get_plot_data
 from ..plots.kinds import STUDIES, Choice, Kind, Look, kinds_of
 from ..plots.slices import numeric_axes, unit_of, varying_inputs
 from ..plots.style import encoded
@@ -33,7 +31,6 @@ from ..results.ranking import MIN_ERROR_FLOOR
 from ..results.replay_command import command_start
 from ..results.schema import columns_along
 from ..results.selection import law_positions
-from ..results.single_impact import histories
 from ..results.slabs import distinct_points, is_computed, slabs
 
 # points that are searched for the first one with an answer, at which the figures are drawn
@@ -83,15 +80,15 @@ class Drawing:
         plans = list(iterate_choices(self.dataset, self.keys))
         # numbered as they stand on the page: those of friction have a section of their own
         for of_friction in (False, True):
-            more_figures: list[tuple[int, FigurePlan, Position, PlotData | None]] = []
+            more_figures: list[tuple[int, FigurePlan, Position, PlotData]] = []
             for plan in plans:
                 kind, _, position = plan
                 if kind.of_friction != of_friction:
                     continue
                 number = len(figures) + 1
                 try:
-                    plot_data = self.get_plot_data(plan)
-                    comparison, more_positions = _compare_values(self, plan)
+                    plot_data = get_plot_data(self.dataset, kind.name, plan.choice, self.plugins)
+                    comparison, more = _compare_values(self, plan, plot_data)
                     conditions = _condition_sentences(self.dataset, position, self.keys)
                     sentences = [kind.caption, *conditions, *comparison]
                     sentences += [f"Not drawn: {'; '.join(plot_data.not_drawn)}."] if plot_data.not_drawn else []
@@ -100,13 +97,11 @@ class Drawing:
                     left_out.append(f"The figure {kind.name} is left out: {'; '.join(error.problems)}")
                     continue
                 more_figures += [
-                    (number, self.plan_at(plan, index), index, known) for index, known in more_positions
+                    (number, _plan_at(self.dataset, plan, index), index, data) for index, data in more
                 ]
-            for first, plan, index, known in more_figures:
-                more = known or self.plot_data(plan)
-                if more is not None:
-                    caption = f"As Figure {first}, at {_changes_text(self.dataset, index)}."
-                    figures.append(self.figure(len(figures) + 1, plan, caption, more))
+            for first, plan, index, plot_data in more_figures:
+                caption = f"As Figure {first}, at {_changes_text(self.dataset, index)}."
+                figures.append(self.figure(len(figures) + 1, plan, caption, plot_data))
         return figures, left_out
 
     def figure(
@@ -148,84 +143,69 @@ class Drawing:
     def plot_data(self, plan: FigurePlan) -> PlotData | None:
         """Read the data of a figure; None where it has no values."""
         try:
-            return self.get_plot_data(plan)
+            return get_plot_data(self.dataset, plan.kind.name, plan.choice, self.plugins)
         except ImpactError:
             return None
-
-    def get_plot_data(self, plan: FigurePlan) -> PlotData:
-        """Get the data of a figure; a motion that several figures show is integrated once."""
-        return get_plot_data(
-            self.dataset, plan.kind.name, plan.choice, self.plugins, read_histories=self._read_histories
-        )
-
-    @cached_property
-    def _read_histories(self) -> ReadHistories:
-        known: dict[str, tuple[list[xr.Dataset], list[str]]] = {}
-
-        def read(
-            dataset: xr.Dataset,
-            models: Sequence[str] | None,
-            at: Mapping[str, object],
-            plugins: Plugins,
-            frictions: Sequence[str] | None,
-        ) -> tuple[list[xr.Dataset], list[str]]:
-            key = repr((models, sorted(at.items()), frictions))
-            if key not in known:
-                known[key] = histories(dataset, models, at, plugins, frictions)
-            return known[key]
-
-        return read
 
     def has_answer(self, position: Position) -> bool:
         """Whether a model has an answer for an impact at some values of axes."""
         if "status" not in self.dataset:
             return True
         status = self.dataset["status"].isel(model=law_positions(self.keys, self.dataset))
-        values = status.isel({dim: place for dim, place in position.items() if dim in status.dims}).values
+        values = status.isel(position, missing_dims="ignore").values
         return bool(((values < FIRST_FAILURE) & (values != NO_IMPACT)).any())
 
-    def plan_at(self, plan: FigurePlan, index: Position) -> FigurePlan:
-        """Return the plan of the same figure at other indices of some axes."""
-        kind, choice, position = plan
-        position = {**position, **index}
-        if kind.source == "history":
-            return FigurePlan(kind, replace(choice, sel=_inputs_at(self.dataset, position)), position)
-        sel = {str(dim): self.dataset[dim].values[place].item() for dim, place in position.items()}
-        return FigurePlan(kind, replace(choice, sel={**(choice.sel or {}), **sel}), position)
+
+def _plan_at(dataset: xr.Dataset, plan: FigurePlan, index: Position) -> FigurePlan:
+    """Return the plan of the same figure at other indices of some axes."""
+    kind, choice, position = plan
+    position = {**position, **index}
+    if kind.source == "history":
+        return FigurePlan(kind, replace(choice, sel=_inputs_at(dataset, position)), position)
+    sel = {str(dim): dataset[dim].values[place].item() for dim, place in position.items()}
+    return FigurePlan(kind, replace(choice, sel={**(choice.sel or {}), **sel}), position)
 
 
 def _compare_values(
-    drawing: Drawing, plan: FigurePlan
-) -> tuple[list[str], list[tuple[Position, PlotData | None]]]:
-    """Compare the numbers of a figure at the values of all other axes, at most MAX_COMPARED combinations.
+    drawing: Drawing, plan: FigurePlan, plot_data: PlotData
+) -> tuple[list[str], list[tuple[Position, PlotData]]]:
+    """Compare the data of a figure with those at the values of all other axes, at most MAX_COMPARED combinations.
 
-    Returns sentences, and what is drawn too: the indices of the axes that differ, and the data if they are known.
+    Returns sentences, and what is drawn too: the indices of the axes that differ, and the data there.
     Motions are integrated for it: they are compared at the first and the last value of each axis alone.
     """
     sizes, position = drawing.dataset.sizes, plan.position
     dims = [dim for dim in position if sizes[dim] > 1]
+    base = tuple(position[dim] for dim in dims)
+    known: dict[tuple[int, ...], PlotData | None] = {base: plot_data}
+
+    def read(index: Position) -> PlotData | None:
+        # a motion is integrated once
+        place = tuple({**position, **index}[dim] for dim in dims)
+        if place not in known:
+            known[place] = drawing.plot_data(_plan_at(drawing.dataset, plan, index))
+        return known[place]
+
     if plan.kind.source == "history":
-        one_each = [{dim: place} for dim in dims for place in (0, sizes[dim] - 1)]
-        compared = [{dim: position[dim] for dim in dims}, *({**position, **index} for index in one_each)]
+        compared = [{dim: place} for dim in dims for place in (0, sizes[dim] - 1)]
     else:
         count = {dim: sizes[dim] for dim in dims}
         while math.prod(count.values()) > MAX_COMPARED:
             count[max(count, key=lambda dim: count[dim])] -= 1
         places = itertools.product(*(_spread(sizes[dim], count[dim], position[dim]) for dim in dims))
         compared = [dict(zip(dims, place, strict=True)) for place in places]
-    known = {
-        tuple(index[dim] for dim in dims): drawing.plot_data(drawing.plan_at(plan, index)) for index in compared
-    }
-    tables = {index: _numbers(data) for index, data in known.items()}
+    for index in compared:
+        read(index)
+    tables = {place: _numbers(data) for place, data in known.items()}
     differ = []
     for axis, dim in enumerate(dims):
-        base = position[dim]
-        pairs = ((table, tables[*index[:axis], base, *index[axis + 1 :]]) for index, table in tables.items())
+        pairs = ((table, tables[*at[:axis], base[axis], *at[axis + 1 :]]) for at, table in tables.items())
         if not all(_are_equal(*pair) for pair in pairs):
             differ.append(dim)
     drawn = _more_positions(drawing, plan, differ)
     sentences = _comparison_sentences(sizes, dims, differ, drawn, len(tables))
-    return sentences, [(index, known.get(tuple({**position, **index}[dim] for dim in dims))) for index in drawn]
+    more = [(index, read(index)) for index in drawn]
+    return sentences, [(index, data) for index, data in more if data is not None]
 
 
 def _comparison_sentences(
@@ -342,14 +322,11 @@ def iterate_choices(dataset: xr.Dataset, keys: Sequence[str]) -> Iterator[Figure
         inputs = [choice.x] if is_motion else kind.inputs_along(choice.x, choice.y)
         dims = [axes[name].dims[0] for name in inputs if name in axes and name not in (choice.sel or {})]
         position = _first_answered_index(dataset, keys, [*dims, *({SAMPLE} & {*kind.along})])
-        if not is_motion:
-            sel = {str(dim): dataset[dim].values[index].item() for dim, index in position.items()}
-            yield FigurePlan(kind, replace(choice, sel=sel), position)
-            continue
-        if choice.x:
+        if is_motion and choice.x:
             values = axes[choice.x].values
             position[dims[0]] = int(np.argsort(values, kind="stable")[values.size // 2])
-        yield FigurePlan(kind, replace(choice, x=None, sel=_inputs_at(dataset, position)), position)
+        choice = replace(choice, x=None if is_motion else choice.x, sel=None)
+        yield _plan_at(dataset, FigurePlan(kind, choice, {}), position)
 
 
 def _inputs_at(dataset: xr.Dataset, position: Position) -> dict[str, float | str]:
