@@ -14,9 +14,9 @@ from ..contact.models import catalogue
 from ..formatting import law_name, safe_text
 from ..results.attributes import read_attribute
 from ..results.schema import exponent_text
-from .curves import Curve, CurveData, Mark, Panel, curve_of
+from .curves import Curve, CurveData, Mark, Panel, curve_of, law_curve
 from .kinds import Choice, Kind
-from .labels import REFERENCE, friction_text, law_text, words_of
+from .labels import REFERENCE, LawPart, friction_text, law_text, words_of
 from .slices import choose_line, described_inputs, parameter_text, unit_of
 
 # a permanent indentation is marked above this fraction of the largest one
@@ -108,27 +108,21 @@ def curves_over(
     """
     first = histories[0]
     is_single = of_friction and len({str(history["model"].item()) for history in histories}) == 1
+    laws = []
+    for history in histories:
+        # a single model is not named beside every friction law
+        names = [] if is_single else [_model_label(history, choice.equations)]
+        friction = str(history["friction"].item()) if of_friction else ""
+        if friction:
+            inputs = impact_inputs(history)
+            names.append(friction_text(friction, inputs, _units_of(inputs)))
+        laws.append(LawPart(law_name(*names), str(history["model"].item()), friction, history))
     panels = []
     for x, y, end in pairs:
-        curves = [
-            curve_of(
-                # a single model is not named beside every friction law
-                law_name(
-                    "" if is_single else _model_label(history, choice.equations),
-                    _friction_label(history) if of_friction else "",
-                ),
-                str(history["model"].item()),
-                history[x].values,
-                history[y].values,
-                y,
-                end,
-                friction=str(history["friction"].item()) if of_friction else "",
-            )
-            for history in histories
-        ]
+        curves = tuple(law_curve(law, law.data[x].values, law.data[y].values, y, end) for law in laws)
         x_label, y_label = (words_of(first[name].attrs, name) for name in (x, y))
         x_unit, y_unit = (unit_of(first[name]) for name in (x, y))
-        panels.append(Panel(x_label, y_label, tuple(curves), x_unit, y_unit, x_name=x, y_name=y))
+        panels.append(Panel(x_label, y_label, curves, x_unit, y_unit, x_name=x, y_name=y))
     model = _model_label(first, choice.equations) if is_single else ""
     conditions = ", ".join(filter(None, (model, _conditions_text(histories))))
     return CurveData(title, conditions, tuple(panels))
@@ -139,11 +133,6 @@ def _with_impulse(history: xr.Dataset) -> xr.Dataset:
     v = np.asarray(history["v"].values, float)
     impulse = _effective_mass(impact_inputs(history)) * (v[0] - v)
     return history.assign(tau=("t", impulse, {"units": "N s", "long_name": "Impulse"}))
-
-
-def _friction_label(history: xr.Dataset) -> str:
-    inputs = impact_inputs(history)
-    return friction_text(str(history["friction"].item()), inputs, _units_of(inputs))
 
 
 def _model_label(history: xr.Dataset, numbered: bool) -> str:
@@ -179,15 +168,7 @@ def _conditions_text(histories: Sequence[xr.Dataset]) -> str:
 
 
 def _units_of(inputs: Mapping[str, object]) -> dict[str, str]:
-    """Find the units of the inputs of an impact; "1" for those of plug-ins, which may not be installed."""
-    units = {}
-    for name in inputs:
-        try:
-            quantity = InputName.parse(name).quantity(catalogue())
-        except KeyError:
-            quantity = None
-        units[name] = quantity.unit if quantity else "1"
-    return units
+    return {name: InputName.parse(name).unit for name in inputs}
 
 
 def choose_point(dataset: xr.Dataset, keys: Sequence[str]) -> Choice | None:
