@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 from ..config.measurements import SIGMA
 from ..errors import UsageError
 from ..formatting import NO_BREAK, heading, law_name
-from .data import MEASURED, LegendEntries, Points
+from .data import MEASURED, LegendEntries, PlotData, Points
 from .labels import LawPart, annotate_right_edge, label_axis, pretty_conditions, symbol, words_of
 from .slices import unit_of
 from .style import FAINT, SOFT, is_geometric, model_styles, tint
@@ -104,7 +104,7 @@ class Panel:
 
 
 @dataclass(frozen=True)
-class CurveData:
+class CurveData(PlotData):
     """The data of a picture of curves: panels below each other, and measured points that the result has."""
 
     title: str
@@ -112,10 +112,6 @@ class CurveData:
     panels: tuple[Panel, ...]
     not_drawn: tuple[str, ...] = ()
     measured: tuple[Points, ...] = ()
-
-    @property
-    def panel_count(self) -> int:
-        return len(self.panels)
 
     @property
     def names(self) -> set[str]:

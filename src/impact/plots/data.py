@@ -34,19 +34,14 @@ class PlotData(Protocol):
     """The data of a picture: a frozen dataclass that makes its tables and draws itself."""
 
     __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
+    title: str
+    conditions: str
+    panels: tuple[Any, ...]
+    not_drawn: tuple[str, ...]  # what is left out, and why
 
     @property
-    def title(self) -> str: ...
-
-    @property
-    def conditions(self) -> str: ...
-
-    @property
-    def not_drawn(self) -> tuple[str, ...]:
-        """What is left out, and why."""
-
-    @property
-    def panel_count(self) -> int: ...
+    def panel_count(self) -> int:
+        return len(self.panels)
 
     @property
     def names(self) -> set[str]:

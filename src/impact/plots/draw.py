@@ -147,7 +147,7 @@ def get_plot_data(
 
 def check_log(log: str, pictures: Collection[PlotData]) -> None:
     """Refuse a logarithmic axis that none of some pictures has."""
-    panels = [panel for picture in pictures for panel in (picture, *getattr(picture, "panels", ()))]
+    panels = [panel for picture in pictures for panel in (picture, *picture.panels)]
     for letter in log:
         if panels and not any(getattr(panel, f"{letter}_log", False) for panel in panels):
             why = "it has values <= 0, or this kind of picture has no logarithmic one"

@@ -25,7 +25,7 @@ from ..array_types import Array, Mask
 from ..errors import UsageError, did_you_mean
 from ..formatting import argument, heading, law_name, percentage, safe_text
 from ..results.ranking import error_floor
-from .data import LegendEntries, Points
+from .data import LegendEntries, PlotData, Points
 from .kinds import Choice, Kind
 from .labels import (
     REFERENCE,
@@ -80,7 +80,7 @@ class Field:
 
 
 @dataclass(frozen=True)
-class MapData:
+class MapData(PlotData):
     """The data of a map, or of the closest model, in SI: panels over the same two axes."""
 
     title: str
@@ -154,21 +154,12 @@ class MapData:
     def wide_table(self) -> pd.DataFrame:
         """Make a row for each point, with a column for each model or pair."""
         x_unit, y_unit, unit = self.units
-        table = self.long_table()
-        points = table.iloc[: len(self.x_values) * len(self.y_values)]
-        owners = [law_name(panel.model or "", panel.friction) for panel in self.panels]
-        columns = table[self.variable].to_numpy().reshape(len(owners), -1)
-        return pd.DataFrame(
-            {
-                heading(self.x, unit=x_unit): points[self.x],
-                heading(self.y, unit=y_unit): points[self.y],
-                **{
-                    heading(self.variable, owner, unit): column
-                    for owner, column in zip(owners, columns, strict=True)
-                },
-                **{name: points[name] for name in ("closest", "abs_e_error") if self.closest},
-            }
-        )
+        points = self.long_table().iloc[: len(self.x_values) * len(self.y_values)]
+        columns = {heading(self.x, unit=x_unit): points[self.x], heading(self.y, unit=y_unit): points[self.y]}
+        for panel in self.panels:
+            law = panel.key if panel.model else ""
+            columns[heading(self.variable, law, unit)] = np.transpose(panel.values).ravel()
+        return pd.DataFrame(columns | {name: points[name] for name in ("closest", "abs_e_error") if self.closest})
 
     def place_panels(self, figure: Figure, width: float) -> tuple[list[Axes], float]:
         """Place panels in rows; only the left and lower axes have tick labels."""

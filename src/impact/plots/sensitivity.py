@@ -18,7 +18,7 @@ from ..formatting import heading, law_name
 from ..results.kinds import kind_of
 from ..results.selection import select, select_laws
 from ..results.sensitivity import distribution_texts
-from .data import LegendEntries, Points
+from .data import LegendEntries, PlotData, Points
 from .kinds import Choice, Kind
 from .labels import (
     LawPart,
@@ -59,7 +59,7 @@ class BarPanel:
 
 
 @dataclass(frozen=True)
-class BarData:
+class BarData(PlotData):
     """The data of a picture of Sobol indices: a panel for each model or pair, with bars for each input."""
 
     title: str
@@ -67,10 +67,6 @@ class BarData:
     inputs: tuple[str, ...]
     panels: tuple[BarPanel, ...]
     not_drawn: tuple[str, ...] = ()
-
-    @property
-    def panel_count(self) -> int:
-        return len(self.panels)
 
     @property
     def names(self) -> set[str]:
