@@ -166,19 +166,15 @@ def _read_kinds(
         except UsageError as error:
             reasons[kind] = str(error)
     if plot_data and choice.sel:
-        for kind in reasons:
-            # a motion is at the selected point
-            if find_kind(kind).source == "history":
-                continue
+        # a motion is at the selected point
+        for kind in [kind for kind in reasons if find_kind(kind).source != "history"]:
             try:
                 plot_data[kind] = _over_selected_axes(kind, dataset, choice, plugins)
+                del reasons[kind]
             except UsageError as error:
                 # what is missing on all axes, not beside the selected values
                 reasons[kind] = str(error)
-    return (
-        {kind: plot_data[kind] for kind in kinds if kind in plot_data},
-        {kind: reason for kind, reason in reasons.items() if kind not in plot_data},
-    )
+    return {kind: plot_data[kind] for kind in kinds if kind in plot_data}, reasons
 
 
 def _over_selected_axes(kind: str, dataset: xr.Dataset, choice: Choice, plugins: Plugins) -> PlotData:
