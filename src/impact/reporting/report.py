@@ -145,6 +145,7 @@ def _report_of(
         name = Path(str(dataset.encoding.get("source", ""))).name
         drawn, left_out = Drawing(dataset, keys, plugins, name, model_count).figures()
     descriptions = [_model_section(dataset.isel(model=index)) for index in range(dataset.sizes["model"])]
+    friction = _friction_section(dataset, summary) if "friction" in dataset.dims else None
     inputs, changes = inputs_of(dataset), read_attribute(dataset.attrs, "config_set")
     lines = str(dataset.attrs.get("config", "")).replace("\r\n", "\n").expandtabs(4).split("\n")
     return template("report.html.j2").render(
@@ -171,10 +172,10 @@ def _report_of(
         left_out=left_out,
         running_title=_css_text(page_title(dataset)),
         failures=_failures_section(dataset, summary),
-        friction=_friction_section(dataset, summary) if "friction" in dataset.dims else None,
+        friction=friction,
         facts=_facts(dataset),
         models=descriptions,
-        evidence=[*(row for model in descriptions for row in model["evidence"]), *_friction_evidence(dataset)],
+        evidence=[row for part in (*descriptions, *filter(None, [friction])) for row in part["evidence"]],
         config=Markup("\n").join(safe_text(line, MAX_LINE_LETTERS) for line in lines),
         changes=[change for change in changes if not _library_material(change)],
         library_materials=", ".join(filter(None, map(_library_material, changes))),
@@ -299,7 +300,7 @@ def _summary_sentence(dataset: xr.Dataset) -> str:
 
 
 def _friction_section(dataset: xr.Dataset, summary: Summary) -> dict[str, Any]:
-    """Describe the friction laws, and the number of points of pairs by friction status."""
+    """Describe the friction laws, and where they were read, and count the points of pairs by friction status."""
     laws = [(key, frictions().get(key)) for key in dataset["friction"].values.tolist()]
     return {
         "laws": [
@@ -310,14 +311,8 @@ def _friction_section(dataset: xr.Dataset, summary: Summary) -> dict[str, Any]:
             (status.name.lower(), f"{count:,}", status.meaning)
             for status, count in sorted(summary.friction_counts.items())
         ],
+        "evidence": [_evidence_row(key, law.evidence) for key, law in laws if law],
     }
-
-
-def _friction_evidence(dataset: xr.Dataset) -> Iterator[tuple[str, str, str]]:
-    """List where the formulas of friction laws were read."""
-    for key in dataset["friction"].values.tolist() if "friction" in dataset.dims else ():
-        if key in frictions():
-            yield _evidence_row(key, frictions()[key].evidence)
 
 
 def _evidence_row(key: str, seen: Evidence) -> tuple[str, str, str]:
