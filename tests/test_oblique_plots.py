@@ -367,7 +367,7 @@ def test_other_pictures_do_not_depend_on_friction(beads: xr.Dataset) -> None:
     )
     plane = get_plot_data(beads, "map", Choice(variable="e_out"))
     assert isinstance(plane, MapData)
-    assert [panel.key for panel in plane.panels] == list(MODELS)
+    assert [panel.law for panel in plane.panels] == list(MODELS)
 
 
 @pytest.mark.slow
@@ -376,7 +376,7 @@ def test_a_map_of_friction_has_a_panel_for_each_pair(beads: xr.Dataset) -> None:
     assert isinstance(plane, MapData)
     assert (plane.x, plane.y) == ("angle", "mu")
     for panel, key in zip(plane.panels, (COULOMB, MINDLIN), strict=True):
-        assert panel.key == f"{TSUJI} with {key}"
+        assert panel.law == f"{TSUJI} with {key}"
         stored = beads["beta"].sel(model=TSUJI, friction=key).transpose("mu", "angle").values
         assert np.array_equal(panel.values, stored)
     assert plane.panels[0].label == "Coulomb"

@@ -50,6 +50,7 @@ class PlotData(Protocol):
     @property
     def laws(self) -> dict[str, str]:
         """The names of the models and pairs with their parameters, by key."""
+        return {panel.law: panel.label for panel in self.panels if panel.law}
 
     def long_table(self) -> pd.DataFrame:
         """Make a tidy table: a row for each point."""

@@ -74,9 +74,9 @@ class Field:
     friction: str = ""
 
     @property
-    def key(self) -> str:
-        """The key of its model or pair, or "reference"."""
-        return law_name(self.model or "reference", self.friction)
+    def law(self) -> str:
+        """The key of its model or pair; empty for the reference."""
+        return law_name(self.model or "", self.friction)
 
 
 @dataclass(frozen=True)
@@ -117,16 +117,12 @@ class MapData(PlotData):
     def names(self) -> set[str]:
         """The axes, variable and models whose text a user can replace."""
         variable = () if self.closest else (self.variable,)
-        return {self.x, self.y, *variable, *(panel.key for panel in self.panels)}
+        return {self.x, self.y, *variable, *(panel.law or "reference" for panel in self.panels)}
 
     @cached_property
     def edges(self) -> tuple[Array, Array]:
         """The edges of the cells along x and along y."""
         return edges_of(self.x_values, self.x_log), edges_of(self.y_values, self.y_log)
-
-    @property
-    def laws(self) -> dict[str, str]:
-        return {panel.key: panel.label for panel in self.panels if panel.model}
 
     def long_table(self) -> pd.DataFrame:
         """Make a row for each point of each model; x varies more slowly than y."""
@@ -157,8 +153,7 @@ class MapData(PlotData):
         points = self.long_table().iloc[: len(self.x_values) * len(self.y_values)]
         columns = {heading(self.x, unit=x_unit): points[self.x], heading(self.y, unit=y_unit): points[self.y]}
         for panel in self.panels:
-            law = panel.key if panel.model else ""
-            columns[heading(self.variable, law, unit)] = np.transpose(panel.values).ravel()
+            columns[heading(self.variable, panel.law, unit)] = np.transpose(panel.values).ravel()
         return pd.DataFrame(columns | {name: points[name] for name in ("closest", "abs_e_error") if self.closest})
 
     def place_panels(self, figure: Figure, width: float) -> tuple[list[Axes], float]:
@@ -178,11 +173,11 @@ class MapData(PlotData):
     def draw(self, all_axes: Sequence[Axes], labels: Mapping[str, str], points: Points | None) -> LegendEntries:
         x, y = self.edges
         mesh, entries = self._draw_closest(all_axes, labels) if self.closest else self._draw_fields(all_axes)
-        names = [labels.get(panel.key, pretty_conditions(panel.label)) for panel in self.panels]
-        titles = ["Closest model", "Its absolute error"] if self.closest else names
-        keys = [panel.key for panel in self.panels]
-        short, plain = legend_labels(keys, "short"), legend_labels(keys, "keys")
-        shorter = {pretty_conditions(each.label): (short[each.key], plain[each.key]) for each in self.panels}
+        names = {panel.law or "reference": pretty_conditions(panel.label) for panel in self.panels}
+        chosen = [labels.get(key, name) for key, name in names.items()]
+        titles = ["Closest model", "Its absolute error"] if self.closest else chosen
+        short, plain = legend_labels(names, "short"), legend_labels(names, "keys")
+        shorter = {name: (short[key], plain[key]) for key, name in names.items()}
         figure = all_axes[0].figure
         for axes, title in zip(all_axes, titles, strict=True):
             heading_text = axes.set_title(title)

@@ -73,10 +73,6 @@ class BarData(PlotData):
         """The axis, inputs and models whose text a user can replace."""
         return {"index", *self.inputs, *self.laws}
 
-    @property
-    def laws(self) -> dict[str, str]:
-        return {panel.law: panel.label for panel in self.panels}
-
     def long_table(self) -> pd.DataFrame:
         """Make a row for each bar."""
         parts = [
