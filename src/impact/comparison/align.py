@@ -24,56 +24,32 @@ MODEL_COORDINATES = ("model", "exponent", *MODEL_METADATA)
 
 
 @dataclass(frozen=True)
-class AlignedResult:
-    """One of two results, at their common points.
-
-    Its `coords` at these points are in memory; an input that only the other result varies has an axis of length
-    one. `positions` of the points in the result are by axis, in the order of the baseline.
-    """
-
-    dataset: xr.Dataset
-    coords: xr.Dataset
-    positions: Mapping[str, IndexArray]
-
-    def read(self, name: str, region: Mapping[str, slice]) -> Labels:
-        """Read values at some of the common points, of length one along axes that the variable does not have."""
-        if name in self.coords:
-            variable = self.coords.variables[name]
-            index: dict[Hashable, Any] = {dim: region[str(dim)] for dim in variable.dims}
-        else:
-            variable = self.dataset.variables[name]
-            index = {dim: _as_slice(self.positions[str(dim)][region[str(dim)]]) for dim in variable.dims}
-        # loaded before it is transposed: a transposed lazy array would be read point by point
-        values = np.asarray(variable.isel(index).values)
-        values = values.transpose([variable.dims.index(dim) for dim in region if dim in variable.dims])
-        return values[tuple(slice(None) if dim in variable.dims else np.newaxis for dim in region)]
-
-
-def _as_slice(positions: IndexArray) -> IndexArray | slice:
-    """Convert neighbouring positions to a slice, which files and computed variables read faster."""
-    first = int(positions[0])
-    is_range = np.array_equal(positions, np.arange(first, first + len(positions)))
-    return slice(first, first + len(positions)) if is_range else positions
-
-
-@dataclass(frozen=True)
 class Alignment:
     """Two results at their common points, and the differences between their inputs.
 
     Parameters
     ----------
-    sizes : by axis, the number of common points
+    new, baseline : the results at their common points, in the order of the baseline; an input that only the other
+        result varies has an axis of length one; the coordinates are in memory, the variables may be lazy
     dims : by common variable, its axes in the order of the baseline, without variables that vary along different
         axes; empty if the results have no common point
     scales : by variable of a calibration, the scale of each value; NaN if the data do not determine the value
     """
 
-    new: AlignedResult
-    baseline: AlignedResult
-    sizes: Mapping[str, int]
+    new: xr.Dataset
+    baseline: xr.Dataset
     dims: Mapping[str, tuple[str, ...]]
     faults: tuple[Difference, ...]
     scales: Mapping[str, Array] = field(default_factory=dict)
+
+
+def read_values(result: xr.Dataset, name: str, region: Mapping[str, slice]) -> Labels:
+    """Read values at some points of an aligned result, of length one along axes that the variable lacks."""
+    variable = result.variables[name]
+    # loaded before it is transposed: a transposed lazy array would be read point by point
+    part = variable.isel({dim: region[str(dim)] for dim in variable.dims}).load()
+    values = part.transpose(*(dim for dim in region if dim in part.dims)).values
+    return np.expand_dims(values, [axis for axis, dim in enumerate(region) if dim not in part.dims])
 
 
 def align_sweeps(new: xr.Dataset, baseline: xr.Dataset, *, subset: bool) -> Alignment:
@@ -97,10 +73,11 @@ def align_sweeps(new: xr.Dataset, baseline: xr.Dataset, *, subset: bool) -> Alig
         faults += _unmatched_labels(labels[0], labels[1], names, positions[axis], subset=subset)
     faults += _changed_scalars(a, b, "nothing in common" if subset else "physics config")
     if any(fault.kind == "nothing in common" for fault in faults):
-        nowhere = AlignedResult(new, xr.Dataset(), {}), AlignedResult(baseline, xr.Dataset(), {})
-        return Alignment(*nowhere, {}, {}, tuple(faults))
-    new_positions, baseline_positions = ({axis: pair[side] for axis, pair in positions.items()} for side in (0, 1))
-    a, b = a.isel(new_positions), b.isel(baseline_positions)
+        return Alignment(xr.Dataset(), xr.Dataset(), {}, tuple(faults))
+    a, b = (
+        _select_points(result, coords, {axis: pair[side] for axis, pair in positions.items()})
+        for side, (result, coords) in enumerate(((new, a), (baseline, b)))
+    )
     faults += _changed_columns(a, b)
     dims = {}
     for name in (name for name in OUTPUTS if name in new and name in baseline):
@@ -109,13 +86,7 @@ def align_sweeps(new: xr.Dataset, baseline: xr.Dataset, *, subset: bool) -> Alig
             dims[name] = axes
         else:
             faults.append(Difference("labels", name, f"{name} varies along other axes"))
-    return Alignment(
-        AlignedResult(new, a, new_positions),
-        AlignedResult(baseline, b, baseline_positions),
-        {axis: len(pair[0]) for axis, pair in positions.items()},
-        dims,
-        tuple(faults),
-    )
+    return Alignment(a, b, dims, tuple(faults))
 
 
 def align_studies(
@@ -123,12 +94,20 @@ def align_studies(
 ) -> Alignment:
     """Align two studies whose points are in the same order; the variables that have a scale are compared."""
     labels = {dim: baseline.variables[dim] for dim in baseline.dims if dim in baseline.coords}
-    coords = xr.Dataset(coords=xr.Coordinates(labels, indexes={}))
-    sizes = {str(dim): size for dim, size in baseline.sizes.items()}
-    positions = {dim: np.arange(size) for dim, size in sizes.items()}
-    results = [AlignedResult(dataset, coords, positions) for dataset in (new, baseline)]
+    coords = xr.Coordinates(labels, indexes={})
+    a, b = (xr.Dataset({name: study.variables[name] for name in scales}, coords) for study in (new, baseline))
     dims = {name: tuple(map(str, baseline[name].dims)) for name in scales}
-    return Alignment(results[0], results[1], sizes, dims, tuple(faults), scales)
+    return Alignment(a, b, dims, tuple(faults), scales)
+
+
+def _select_points(result: xr.Dataset, coords: xr.Dataset, positions: Mapping[str, IndexArray]) -> xr.Dataset:
+    """Select points by their positions along each axis; neighbours by a slice, which files read faster."""
+    index: dict[Hashable, IndexArray | slice] = {}
+    for axis, along in positions.items():
+        neighbours = slice(int(along[0]), int(along[0]) + len(along))
+        index[axis] = neighbours if np.array_equal(along, np.arange(neighbours.start, neighbours.stop)) else along
+    variables = {name: result.variables[name] for name in result.data_vars}
+    return coords.isel(index).assign({n: v.isel({d: index[d] for d in v.dims}) for n, v in variables.items()})
 
 
 def _drop_foreign_axes(result: xr.Dataset, other: xr.Dataset) -> xr.Dataset:

@@ -124,18 +124,18 @@ def compare(
         repeats=repeats,
         worst_along={}
         if is_study
-        else _along_axes({name: ratios for name, (_, ratios) in compared.items()}, aligned.baseline.coords),
+        else _along_axes({name: ratios for name, (_, ratios) in compared.items()}, aligned.baseline),
     )
 
 
-def _along_axes(largest: Mapping[str, Mapping[str, np.ndarray]], coords: xr.Dataset) -> dict[str, xr.Dataset]:
+def _along_axes(largest: Mapping[str, Mapping[str, np.ndarray]], baseline: xr.Dataset) -> dict[str, xr.Dataset]:
     """Collect the largest ratios along each axis, by variable, with the labels of the baseline."""
     along = {}
     for axis in dict.fromkeys(axis for by_axis in largest.values() for axis in by_axis):
         columns = {name: (axis, by_axis[axis]) for name, by_axis in largest.items() if axis in by_axis}
         # a group of neighbours has the label of the first
-        first = {axis: slice(None, None, group_size(coords.sizes[axis]))}
-        labels = {n: v.isel(first) for n, v in coords.variables.items() if v.dims == (axis,)}
+        first = {axis: slice(None, None, group_size(baseline.sizes[axis]))}
+        labels = {n: v.isel(first) for n, v in baseline.coords.variables.items() if v.dims == (axis,)}
         along[axis] = xr.Dataset(columns, labels)
     return along
 
@@ -216,7 +216,7 @@ def _sweep_notes(new: xr.Dataset, baseline: xr.Dataset, aligned: Alignment) -> l
         f"the code of {safe_text(key, 60)} changed" for key in sorted(a.keys() & b.keys()) if a[key] != b[key]
     ]
     notes += _attribute_notes(a, b, dict.fromkeys(sorted(a.keys() ^ b.keys())))
-    return notes + _model_metadata_notes(aligned.new.coords, aligned.baseline.coords)
+    return notes + _model_metadata_notes(aligned.new, aligned.baseline)
 
 
 def _attribute_notes(

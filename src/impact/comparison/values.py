@@ -20,7 +20,7 @@ from ..errors import UsageError
 from ..results import slabs
 from ..results.replay_command import inputs_of_model
 from ..results.schema import columns_along, inputs_of_scale, is_case, scale_of
-from .align import AlignedResult, Alignment
+from .align import Alignment, read_values
 from .verdict import VariableComparison
 
 # slices of the common points, by axis; along axes that are not in it, the first point represents all
@@ -37,20 +37,20 @@ DIMENSIONLESS_SCALES = ("v0", "the peak", "itself", "m v0^2/2")
 def representative_regions(variables: Sequence[Variable], aligned: Alignment) -> dict[str, list[Region]]:
     """Choose by variable the regions whose points represent all common points; see `compare` for the rule."""
     results = (aligned.new, aligned.baseline)
-    known = [v.name for v in variables if any(slabs.is_computed(r.dataset.variables[v.name]) for r in results)]
-    models = range(aligned.sizes.get("model", 0) if known else 0)
-    datasets_by_model = [[_dataset_of_model(result, model) for result in results] for model in models]
+    known = [v.name for v in variables if any(slabs.is_computed(r.variables[v.name]) for r in results)]
+    models = range(aligned.baseline.sizes["model"] if known else 0)
+    datasets_by_model = [[result.isel(model=slice(model, model + 1)) for result in results] for model in models]
     regions: dict[str, list[Region]] = {}
     for variable in variables:
         dims = aligned.dims[variable.name]
         if variable.name not in known:
-            parts = [_region(dims, aligned.sizes, slice(None))]
+            parts = [_region(dims, aligned.baseline.sizes, slice(None))]
         elif "model" in dims:
             dims_by_model = [_representative_dims(variable, aligned, datasets) for datasets in datasets_by_model]
-            parts = [_region(d, aligned.sizes, slice(m, m + 1)) for m, d in enumerate(dims_by_model)]
+            parts = [_region(d, aligned.baseline.sizes, slice(m, m + 1)) for m, d in enumerate(dims_by_model)]
         else:
-            dims = _representative_dims(variable, aligned, [result.dataset for result in results])
-            parts = [_region(dims, aligned.sizes, slice(None))]
+            dims = _representative_dims(variable, aligned, results)
+            parts = [_region(dims, aligned.baseline.sizes, slice(None))]
         points = sum(math.prod(part.stop - part.start for part in region.values()) for region in parts)
         if points > MAX_COMPARED_POINTS:
             expected = f"expected at most {MAX_COMPARED_POINTS:,}; select a part of the results"
@@ -59,15 +59,7 @@ def representative_regions(variables: Sequence[Variable], aligned: Alignment) ->
     return regions
 
 
-def _dataset_of_model(result: AlignedResult, model: int) -> xr.Dataset:
-    """Select the model at a common position."""
-    if "model" not in result.dataset.dims:
-        return result.dataset
-    position = int(result.positions["model"][model])
-    return result.dataset.isel(model=slice(position, position + 1))
-
-
-def _region(dims: Iterable[str], sizes: Mapping[str, int], models: slice) -> Region:
+def _region(dims: Iterable[str], sizes: Mapping[Hashable, int], models: slice) -> Region:
     """Take some models and all points along the other dimensions."""
     return {dim: slice(*(models if dim == "model" else slice(None)).indices(sizes[dim])[:2]) for dim in dims}
 
@@ -81,13 +73,8 @@ def _representative_dims(
         present = [(dataset, name) for dataset in datasets for name in names if name in dataset]
         return {dim for dataset, name in present for dim in slabs.varying_dims(dataset, name)}
 
-    scale: set[Hashable] = set()
-    for name in inputs_of_scale(variable):
-        if name in aligned.baseline.coords:
-            scale |= set(aligned.baseline.coords.variables[name].dims)
-        elif name in datasets[1]:
-            scale |= set(slabs.varying_dims(datasets[1], name))
-    full = varying(variable.name) | scale
+    inputs = [name for name in inputs_of_scale(variable) if name in datasets[1]]
+    full = varying(variable.name).union(*(slabs.varying_dims(datasets[1], name) for name in inputs))
     candidates = [full]
     if variable.per_model and variable.has_tolerance:
         # the status decides whether a NaN is an answer
@@ -97,12 +84,12 @@ def _representative_dims(
     chosen = []
     for dims in candidates:
         chosen.append(tuple(dim for dim in aligned.dims[variable.name] if dim in dims or dim == "model"))
-        if _points(chosen[-1], aligned.sizes) <= slabs.MAX_SUMMARY_POINTS:
+        if _points(chosen[-1], aligned.baseline.sizes) <= slabs.MAX_SUMMARY_POINTS:
             return chosen[-1]
-    return min(chosen, key=lambda dims: _points(dims, aligned.sizes))
+    return min(chosen, key=lambda dims: _points(dims, aligned.baseline.sizes))
 
 
-def _points(dims: Iterable[str], sizes: Mapping[str, int]) -> int:
+def _points(dims: Iterable[str], sizes: Mapping[Hashable, int]) -> int:
     """Count the points of one model."""
     return math.prod(sizes[dim] for dim in dims if dim != "model")
 
@@ -127,15 +114,15 @@ def compare_values(
     than `MAX_RATIO_GROUPS` points; constant along an axis of which the first point represents all.
     """
     dims = aligned.dims[variable.name]
-    shape = tuple(aligned.sizes[dim] for dim in dims)
+    shape = tuple(aligned.baseline.sizes[dim] for dim in dims)
     largest = {dim: np.zeros(-(-size // group_size(size))) for dim, size in zip(dims, shape, strict=True)}
     different = 0
     worst: Worst | None = None
     for region in regions:
-        weight = math.prod(aligned.sizes[dim] for dim in dims if dim not in region)
+        weight = math.prod(aligned.baseline.sizes[dim] for dim in dims if dim not in region)
         for slab in _slabs(variable.name, aligned, region):
             part = {dim: slab.get(dim, slice(0, 1)) for dim in dims}
-            a, b = aligned.new.read(variable.name, part), aligned.baseline.read(variable.name, part)
+            a, b = (read_values(result, variable.name, part) for result in (aligned.new, aligned.baseline))
             if np.array_equal(a, b):
                 continue
             ratio, difference = _ratio(variable, aligned, part, a, b, tol)
@@ -147,7 +134,7 @@ def compare_values(
             for axis, dim in enumerate(dims):
                 maxima = ratio.max(axis=tuple(other for other in range(len(dims)) if other != axis))
                 if dim in slab:
-                    groups = np.arange(slab[dim].start, slab[dim].stop) // group_size(aligned.sizes[dim])
+                    groups = np.arange(slab[dim].start, slab[dim].stop) // group_size(aligned.baseline.sizes[dim])
                     np.maximum.at(largest[dim], groups, maxima)
                 else:
                     np.maximum(largest[dim], maxima, out=largest[dim])
@@ -160,7 +147,7 @@ def compare_values(
         different=different,
         worst=worst.difference if worst else 0.0,
         ratio=worst.ratio if worst else 0.0,
-        at=_inputs_of_point(aligned.new.coords, dims, worst.place) if worst else {},
+        at=_inputs_of_point(aligned.new, dims, worst.place) if worst else {},
         new=worst.new if worst else math.nan,
         baseline=worst.baseline if worst else math.nan,
     ), largest
@@ -178,7 +165,7 @@ def group_size(size: int) -> int:
 def _slabs(name: str, aligned: Alignment, region: Region) -> Iterator[dict[str, slice]]:
     """Split a region into slabs; of a file with chunks, into slabs of whole chunks, so that each is read once."""
     sizes: dict[Hashable, int] = {dim: part.stop - part.start for dim, part in region.items()}
-    variable = aligned.baseline.dataset.variables[name]
+    variable = aligned.baseline.variables[name]
     chunks = dict(zip(variable.dims, variable.encoding.get("chunksizes") or (), strict=False))
     if slabs.is_lazy(variable) and chunks and math.prod(chunks.values()) <= slabs.SLAB_POINTS:
         parts = slabs.slabs(sizes, chunks=[chunks.get(dim, 1) for dim in sizes])
@@ -230,17 +217,17 @@ def _scale(variable: Variable, aligned: Alignment, region: Region, shape: tuple[
     """Compute the scale of each point of a region in the variable's unit."""
     if aligned.scales:
         return aligned.scales[variable.name][tuple(region.values())]
-    has_peak = "peak_indentation" in aligned.baseline.dataset
-    scale = scale_of(variable, lambda name: aligned.baseline.read(name, region), has_peak=has_peak)
+    has_peak = "peak_indentation" in aligned.baseline
+    scale = scale_of(variable, lambda name: read_values(aligned.baseline, name, region), has_peak=has_peak)
     return np.broadcast_to(scale, shape)
 
 
 def _may_be_missing(variable: Variable, aligned: Alignment, region: Region) -> NDArray[Any] | bool:
     """Find where NaNs in both are equal: the same status explains them, or the law if neither has failed."""
     results = (aligned.new, aligned.baseline)
-    if not variable.per_model or not all(variable.status in result.dataset for result in results):
+    if not variable.per_model or not all(variable.status in result for result in results):
         return True
-    new, baseline = (result.read(variable.status, region) for result in results)
+    new, baseline = (read_values(result, variable.status, region) for result in results)
     is_explained = (new == baseline) & (baseline != Status.OK)
     return np.asarray(is_explained | (variable.may_be_nan & (np.maximum(new, baseline) < FIRST_FAILURE)))
 
