@@ -7,8 +7,6 @@ is a product of a matrix of counts with the columns that are averaged.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from ..array_types import Array
@@ -19,35 +17,28 @@ RESAMPLES, CONFIDENCE = 1000, 0.95
 MAX_BLOCK = 2**22
 
 
-@dataclass(frozen=True)
-class Indices:
-    """Indices, shape (outputs, inputs), with the ends of intervals of 95 %, NaN without a bootstrap."""
-
-    first: Array
-    total: Array
-    first_lower: Array
-    first_upper: Array
-    total_lower: Array
-    total_upper: Array
-
-
 def mixed_rows(a: Array, b: Array) -> Array:
     """Stack A, B, and A with each column of B, shape (n, inputs) to (n (inputs + 2), inputs)."""
     mixed = [np.where(np.arange(a.shape[1]) == column, b, a) for column in range(a.shape[1])]
     return np.concatenate([a, b, *mixed])
 
 
-def indices_of(values: Array, seed: int | None = None) -> Indices:
-    """Sobol indices, with intervals by the percentiles of a bootstrap over the rows.
+def indices_of(values: Array, seed: int | None = None) -> dict[str, Array]:
+    """Compute Sobol indices, with intervals by the percentiles of a bootstrap over the rows.
 
     Parameters
     ----------
     values : at the rows of `mixed_rows`, shape (outputs, inputs + 2, n)
     seed : of the bootstrap; None for no intervals
 
+    Returns
+    -------
+    dict : the indices and the ends of their intervals of 95 % by the name of the variable,
+        of shape (outputs, inputs); the ends are NaN without a bootstrap
+
     >>> a, b = np.random.default_rng(1).random((2, 4096, 2))
     >>> x, y = mixed_rows(a, b).T
-    >>> indices_of((x + y).reshape(1, 4, 4096)).first.round(1)
+    >>> indices_of((x + y).reshape(1, 4, 4096))["first"].round(1)
     array([[0.5, 0.5]])
     """
     outputs, blocks, n = values.shape
@@ -70,9 +61,11 @@ def indices_of(values: Array, seed: int | None = None) -> Indices:
         ends = 0.5 - 0.5 * CONFIDENCE, 0.5 + 0.5 * CONFIDENCE
         # as the indices are, while an estimate may lie outside
         lower, upper = np.clip(np.quantile(resampled, ends, axis=1), 0.0, 1.0)
-    pairs = (np.split(array, 2, axis=1) for array in (estimates, lower, upper))
-    (first, total), (first_lower, total_lower), (first_upper, total_upper) = pairs
-    return Indices(first, total, first_lower, first_upper, total_lower, total_upper)
+    return {
+        f"{name}{end}": part
+        for end, array in (("", estimates), ("_lower", lower), ("_upper", upper))
+        for name, part in zip(("first", "total"), np.split(array, 2, axis=1), strict=True)
+    }
 
 
 def _columns(values: Array) -> Array:

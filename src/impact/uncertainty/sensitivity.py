@@ -222,9 +222,8 @@ def _statistics(values: Array, config: Config) -> dict[str, Array]:
     varies = deviation > resolution
     changes = np.abs(values[:, 2:] - values[:, :1]).max(axis=2) > resolution[:, None]
     values = np.concatenate([values[:, :2], np.where(changes[..., None], values[:, 2:], values[:, :1])], axis=1)
-    whole, half = indices_of(values[varies], config.design.seed), None
-    if n > 2:
-        half = indices_of(np.ascontiguousarray(values[varies][..., : n // 2]))
+    whole = indices_of(values[varies], config.design.seed)
+    half = indices_of(np.ascontiguousarray(values[varies][..., : n // 2])) if n > 2 else {}
 
     def of_all(indices: Array | float) -> Array:
         array = np.full((outputs, blocks - 2), np.nan)
@@ -236,6 +235,6 @@ def _statistics(values: Array, config: Config) -> dict[str, Array]:
         "mean": mean,
         "sd": deviation,
         "quantiles": np.quantile(independent, QUANTILES, axis=1).T,
-        **{name: of_all(array) for name, array in vars(whole).items()},
-        **{name: of_all(np.nan if half is None else vars(half)[name.removesuffix("_half")]) for name in HALF},
+        **{name: of_all(array) for name, array in whole.items()},
+        **{name: of_all(half.get(name.removesuffix("_half"), np.nan)) for name in HALF},
     }
