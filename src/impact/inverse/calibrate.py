@@ -181,23 +181,24 @@ def prediction(
     points: int,
     compute: ComputeCollisions | None = None,
 ) -> VectorFunction:
-    """Build the function from parameters, shape (k, len(names)), to outputs of a law, shape (k, outputs points).
+    """Build the function from parameters, shape (k, len(names)), to outputs of a law, shape (k, outputs inputs).
 
-    All points of the first output come first; NaN where the law has no result. `compute` is that of
+    The outputs at the first `points` inputs, those of the measurements, come first, all of one output before the
+    next one; then those at the other inputs. NaN where the law has no result. `compute` is that of
     `impact.contact.simulate.simulate`.
     """
     assert config.data is not None
     outputs = tuple(config.data.outputs)
+    count = max(map(len, inputs.values()), default=points)
 
     def predict(rows: Array) -> Array:
         columns = {name: np.tile(values, len(rows)) for name, values in inputs.items()}
-        columns |= {name: np.repeat(values, points) for name, values in zip(names, rows.T, strict=True)}
+        columns |= {name: np.repeat(values, count) for name, values in zip(names, rows.T, strict=True)}
         collisions = outputs_at(config, law, columns, outputs, compute)
         # a law on which no column has an effect has one trajectory
-        shape = len(rows) * points
-        return np.concatenate(
-            [np.broadcast_to(collisions[name], shape).reshape(-1, points) for name in outputs], axis=1
-        )
+        size = len(rows) * count
+        values = np.stack([np.broadcast_to(collisions[name], size).reshape(-1, count) for name in outputs], axis=1)
+        return np.hstack([part.reshape(len(rows), -1) for part in np.split(values, [points], axis=2)])
 
     return predict
 
@@ -225,7 +226,11 @@ def fit_laws(config: Config) -> dict[str, Fit]:
     problems: list[FitProblem] = []
     functions: dict[str, VectorFunction] = {}
     shared: dict[object, InterpolatedCollisions] = {}
-    varied = varied_input(data.inputs)
+    varied, grid = varied_input(data.inputs)
+    with_curve = {
+        name: [*column, *(grid.tolist() if name == varied else [column[0]] * grid.size)]
+        for name, column in data.inputs.items()
+    }
     for key, law in laws.items():
         names = parameters_of(config, law)
         problem = FitProblem(key, _bounds(config, names), points, f"{key}, integrated")
@@ -234,7 +239,7 @@ def fit_laws(config: Config) -> dict[str, Fit]:
         if compute is not None:
             compute = shared.setdefault(motion_key(model_of(law)), compute)
         functions[problem.key] = prediction(config, law, names, data.inputs, len(data.lines), compute)
-        functions[problem.final_key] = _with_curve(config, law, names, varied)
+        functions[problem.final_key] = prediction(config, law, names, with_curve, len(data.lines))
     return dict(zip(laws, fit_all(problems, functions), strict=True))
 
 
@@ -255,24 +260,6 @@ def varied_input(inputs: Mapping[str, Sequence[float]]) -> tuple[str, Array]:
     lower, upper = float(column.min()), float(column.max())
     space = np.geomspace if lower > 0.0 and upper / lower > LOG_CURVE_RATIO else np.linspace
     return name, space(lower, upper, CURVE_POINTS)
-
-
-def _with_curve(config: Config, law: PlanLaw, names: Sequence[str], varied: tuple[str, Array]) -> VectorFunction:
-    """Build the function that predicts the measurements, and then each output over the varied input."""
-    assert config.data is not None
-    inputs, (name, grid) = config.data.inputs, varied
-    columns = {other: [*column, *[column[0]] * grid.size] for other, column in inputs.items()}
-    if name:
-        columns[name] = [*inputs[name], *grid.tolist()]
-    count = len(config.data.lines)
-    predict = prediction(config, law, names, columns, count + grid.size)
-
-    def predict_with_curve(rows: Array) -> Array:
-        values = predict(rows).reshape(len(rows), -1, count + grid.size)
-        parts = np.split(values, [count], axis=2)
-        return np.concatenate([part.reshape(len(rows), -1) for part in parts], axis=1)
-
-    return predict_with_curve
 
 
 def determined_groups(config: Config, model: ForceModel, names: Sequence[str], fit: Fit) -> list[str]:
