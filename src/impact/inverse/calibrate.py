@@ -328,25 +328,14 @@ def _dimension_of_product(
 
 
 def _reduced(rows: Array) -> Array:
-    """Bring rows to reduced row echelon form.
+    """Bring independent rows to reduced row echelon form.
 
-    >>> _reduced(np.array([[0.0, 2.0, 4.0], [0.0, 1.0, 3.0]])).tolist()
+    >>> _reduced(np.array([[0.0, 2.0, 4.0], [0.0, 1.0, 3.0]])).round(12).tolist()
     [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
     """
-    rows = rows.copy()
-    column = 0
-    for row in range(len(rows)):
-        while column < rows.shape[1] and np.abs(rows[row:, column]).max() < 1e-6:
-            column += 1
-        if column == rows.shape[1]:
-            break
-        pivot = row + int(np.abs(rows[row:, column]).argmax())
-        rows[[row, pivot]] = rows[[pivot, row]]
-        rows[row] /= rows[row, column]
-        others = np.arange(len(rows)) != row
-        rows[others] -= np.outer(rows[others, column], rows[row])
-        column += 1
-    return rows
+    ranks = [np.linalg.matrix_rank(rows[:, :end], tol=1e-6) for end in range(rows.shape[1] + 1)]
+    pivots = np.flatnonzero(np.diff(ranks))
+    return np.asarray(np.linalg.solve(rows[:, pivots], rows), float)
 
 
 def _product(powers: Mapping[str, Fraction]) -> str:
