@@ -7,8 +7,8 @@ wait, their requests are evaluated together.
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from functools import partial
 from queue import SimpleQueue
 from typing import TypeVar
@@ -52,52 +52,43 @@ def run_together(functions: Mapping[str, VectorFunction], solvers: Sequence[Call
 
 
 def _run_threads(functions: Mapping[str, VectorFunction], solvers: Sequence[Callable[[Evaluate], T]]) -> list[T]:
-    # what the running thread sends: a request, a result or an exception
-    messages: SimpleQueue[tuple[str, object]] = SimpleQueue()
+    # what the running solver sends: a request, or at its end its future
+    messages: SimpleQueue[tuple[str, Array] | Future[T]] = SimpleQueue()
     answers: list[SimpleQueue[Array | None]] = [SimpleQueue() for _ in solvers]
+    futures: list[Future[T]] = []
+    requests: dict[int, tuple[str, Array]] = {}
 
     def evaluate(number: int, key: str, rows: Array) -> Array:
-        messages.put(("request", (key, rows)))
+        messages.put((key, rows))
         answer = answers[number].get()
         if answer is None:
             raise _Stopped
         return answer
 
-    def solve(number: int) -> None:
-        try:
-            messages.put(("result", solvers[number](partial(evaluate, number))))
-        except _Stopped:
-            pass
-        except BaseException as error:
-            messages.put(("error", error))
+    def wait_for(number: int) -> None:
+        """Let a solver run alone: threads that compete for the interpreter's lock cost more time."""
+        message = messages.get()
+        if isinstance(message, Future):
+            message.result()
+        else:
+            requests[number] = message
 
-    threads = [threading.Thread(target=solve, args=(number,), daemon=True) for number in range(len(solvers))]
-    started: list[threading.Thread] = []
-    results: dict[int, T] = {}
-    values: dict[int, Array] = {}
-    try:
-        while len(results) < len(solvers):
-            requests: dict[int, tuple[str, Array]] = {}
-            # one solver runs at a time: threads that compete for the interpreter's lock cost more time
-            for number, thread in enumerate(threads):
-                if number in results:
-                    continue
-                if number in values:
+    with ThreadPoolExecutor(len(solvers)) as executor:
+        try:
+            for number, solver in enumerate(solvers):
+                futures.append(executor.submit(solver, partial(evaluate, number)))
+                futures[-1].add_done_callback(messages.put)
+                wait_for(number)
+            while requests:
+                values = _evaluate_all(functions, requests)
+                requests.clear()
+                for number in sorted(values):
                     answers[number].put(values[number])
-                else:
-                    thread.start()
-                    started.append(thread)
-                kind, content = messages.get()
-                if kind == "error":
-                    raise content  # type: ignore[misc]
-                (requests if kind == "request" else results)[number] = content  # type: ignore[assignment]
-            values = _evaluate_all(functions, requests)
-    finally:
-        for answer in answers:
-            answer.put(None)
-        for thread in started:
-            thread.join()
-    return [results[number] for number in range(len(solvers))]
+                    wait_for(number)
+        finally:
+            for answer in answers:
+                answer.put(None)
+    return [future.result() for future in futures]
 
 
 def _evaluate_all(
