@@ -18,7 +18,6 @@ from . import exits, options
 from .execution import execution, run_in_memory
 
 if TYPE_CHECKING:
-    from ..comparison.formats import NoVerdict
     from ..comparison.verdict import Verdict
 
 
@@ -48,7 +47,7 @@ def compare(
     try:
         verdict = impact.compare(new, baseline, tol=dict(tol or ()) or None, subset=subset)
     except ImpactError as error:
-        _print_outcome(formats.NoVerdict(str(new), str(baseline), str(error)), format)
+        _print_outcome(formats.NoVerdict(str(new), str(baseline), error=str(error)), format)
         raise
     _report_verdict(verdict, format, plot)
 
@@ -108,7 +107,7 @@ def rerun(
                 execute=partial(run_in_memory, **keywords),
             )
         except ImpactError as error:
-            _print_outcome(formats.NoVerdict("the rerun", str(result), str(error)), format)
+            _print_outcome(formats.NoVerdict("the rerun", str(result), error=str(error)), format)
             raise
     _report_verdict(verdict, format, plot)
 
@@ -141,7 +140,7 @@ def _report_verdict(verdict: Verdict, format: Format, plot: Path | None) -> None
         raise typer.Exit(exits.EXIT_NOT_EQUAL)
 
 
-def _print_outcome(outcome: Verdict | NoVerdict, format: Format) -> None:
+def _print_outcome(outcome: Verdict, format: Format) -> None:
     """Print a verdict or an error on stdout; an error has no table, its message is on stderr."""
     from ..comparison import formats
 

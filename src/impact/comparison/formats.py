@@ -25,33 +25,29 @@ MAX_ANNOTATED = 3
 
 
 @dataclass(frozen=True)
-class NoVerdict:
-    """The error that prevented a comparison, with the attributes of a verdict that are printed."""
+class NoVerdict(Verdict):
+    """The error that prevented a comparison, in place of its verdict."""
 
-    new: str
-    baseline: str
-    error: str
-    equal: None = None
     faults: tuple[Difference, ...] = ()
-    ranked: tuple[VariableComparison, ...] = ()
-    notes: tuple[str, ...] = ()
+    variables: tuple[VariableComparison, ...] = ()
+    error: str = ""
+
+    @property
+    def equal(self) -> bool:
+        """False: nothing was compared."""
+        return False
 
     @property
     def headline(self) -> str:
         """The error in one line."""
         return "; ".join(self.error.splitlines())
 
-    def replay(self, variable: VariableComparison) -> str:
-        """Return an empty text: there is no point to run again."""
-        return ""
-
     def as_dict(self) -> dict[str, Any]:
         """Return plain data with the fields of a verdict; `equal` is null."""
-        names = {"new": safe_text(self.new), "baseline": safe_text(self.baseline)}
-        return {"equal": None, "headline": self.headline, **names, "faults": [], "variables": [], "notes": []}
+        return super().as_dict() | {"equal": None}
 
 
-def as_junit(outcome: Verdict | NoVerdict) -> str:
+def as_junit(outcome: Verdict) -> str:
     """Write JUnit XML: a suite with a test for each kind of difference and variable, named by what it claims."""
     tests = {
         claim: [fault.text for fault in outcome.faults if fault.kind == kind] for kind, claim in CLAIMS.items()
@@ -59,12 +55,13 @@ def as_junit(outcome: Verdict | NoVerdict) -> str:
     for variable in outcome.ranked:
         lines = [] if variable.is_equal else [variable.text, outcome.replay(variable)]
         tests[f"{variable.name} is equal within its tolerance"] = [line for line in lines if line]
-    if outcome.equal is None:
+    is_error = isinstance(outcome, NoVerdict)
+    if is_error:
         tests = {"both are readable": []}
     numbers = {
         "tests": len(tests),
         "failures": sum(map(bool, tests.values())),
-        "errors": int(outcome.equal is None),
+        "errors": int(is_error),
         "skipped": 0,
     }
     counts = {name: str(number) for name, number in numbers.items()}
@@ -73,7 +70,7 @@ def as_junit(outcome: Verdict | NoVerdict) -> str:
     suite = ElementTree.SubElement(root, "testsuite", {"name": title, **counts})
     for claim, lines in tests.items():
         test = ElementTree.SubElement(suite, "testcase", {"classname": "impact.compare", "name": claim})
-        if outcome.equal is None:
+        if is_error:
             ElementTree.SubElement(test, "error", {"message": outcome.headline})
         elif lines:
             ElementTree.SubElement(test, "failure", {"message": lines[0]}).text = "\n".join(lines)
@@ -83,9 +80,9 @@ def as_junit(outcome: Verdict | NoVerdict) -> str:
     return ElementTree.tostring(root, encoding="unicode", xml_declaration=True)
 
 
-def as_markdown(outcome: Verdict | NoVerdict) -> str:
+def as_markdown(outcome: Verdict) -> str:
     """Write Markdown for a pull request or a job summary."""
-    sign = {True: "✅", False: "❌", None: "⚠️"}[outcome.equal]
+    sign = "⚠️" if isinstance(outcome, NoVerdict) else "✅" if outcome.equal else "❌"
     new, baseline = (_escape_code(safe_text(name)) for name in (outcome.new, outcome.baseline))
     lines = [f"### {sign} {PROGRAM}: {_escape_markdown(outcome.headline)}", ""]
     lines += [f"`{new}` against the baseline `{baseline}`", ""]
@@ -109,7 +106,7 @@ def as_markdown(outcome: Verdict | NoVerdict) -> str:
     return "\n".join(lines).rstrip() + "\n"
 
 
-def as_github(outcome: Verdict | NoVerdict) -> str:
+def as_github(outcome: Verdict) -> str:
     """Write a workflow command of GitHub Actions: an annotation on the baseline, with the worst differences."""
     failures = [(fault.text, "") for fault in by_kind(outcome.faults)]
     failures += [(variable.text, outcome.replay(variable)) for variable in outcome.ranked if not variable.is_equal]
