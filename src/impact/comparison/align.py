@@ -89,17 +89,6 @@ def align_sweeps(new: xr.Dataset, baseline: xr.Dataset, *, subset: bool) -> Alig
     return Alignment(a, b, dims, tuple(faults))
 
 
-def align_studies(
-    new: xr.Dataset, baseline: xr.Dataset, scales: Mapping[str, Array], faults: Sequence[Difference]
-) -> Alignment:
-    """Align two studies whose points are in the same order; the variables that have a scale are compared."""
-    labels = {dim: baseline.variables[dim] for dim in baseline.dims if dim in baseline.coords}
-    coords = xr.Coordinates(labels, indexes={})
-    a, b = (xr.Dataset({name: study.variables[name] for name in scales}, coords) for study in (new, baseline))
-    dims = {name: tuple(map(str, baseline[name].dims)) for name in scales}
-    return Alignment(a, b, dims, tuple(faults), scales)
-
-
 def _select_points(result: xr.Dataset, coords: xr.Dataset, positions: Mapping[str, IndexArray]) -> xr.Dataset:
     """Select points by their positions along each axis; neighbours by a slice, which files read faster."""
     index: dict[Hashable, IndexArray | slice] = {}

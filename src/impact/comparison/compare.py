@@ -20,8 +20,7 @@ from ..results.replay_command import command_start
 from ..results.schema import MODEL_METADATA, SCHEMA, SCHEMA_VERSION, is_case
 from ..results.xarray_backend import load
 from .align import MODEL_COORDINATES, Alignment, align_sweeps
-from .boards import align_boards, version_notes
-from .calibrations import align_calibrations, fit_notes
+from .studies import align_boards, align_calibrations, fit_notes, version_notes
 from .tolerances import ALL_VARIABLES, Tolerances, calibration_tolerances, effective_tolerances
 from .values import compare_values, group_size, representative_regions
 from .verdict import Difference, Verdict

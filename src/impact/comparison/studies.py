@@ -1,7 +1,8 @@
-"""Align two calibrations law by law: the same measurements, parameters and bounds, and the scale of each value."""
+"""Align two studies: calibrations law by law, boards of `impact conform` engine by engine and check by check."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,8 +13,8 @@ from ..config.input_names import is_input
 from ..formatting import safe_text
 from ..results.attributes import read_attribute
 from ..results.calibration import fit_status
-from ..results.schema import CALIBRATION
-from .align import Alignment, align_studies
+from ..results.schema import BOARD, CALIBRATION
+from .align import MAX_NAMED_LABELS, Alignment
 from .verdict import Difference
 
 # coordinates along the measured values, which have to be equal
@@ -24,23 +25,71 @@ def align_calibrations(new: xr.Dataset, baseline: xr.Dataset, *, subset: bool) -
     """Align two calibrations by their laws, whose order does not matter."""
     faults = _data_faults(new, baseline)
     is_same_data = all(fault.kind != "labels" for fault in faults)
-    keys = [list(map(str, dataset["model"].values)) for dataset in (new, baseline)]
-    for own, others, side in ((keys[0], keys[1], "NEW"), (keys[1], keys[0], "BASELINE")):
-        only = ", ".join(key for key in own if key not in others)
+    common = common_labels(new, baseline, "model")
+    for study, side in ((new, "NEW"), (baseline, "BASELINE")):
+        only = ", ".join(key for key in map(str, study["model"].values) if key not in common)
         if only and not subset:
             faults.append(Difference("labels", "model", f"model: in {side} only: {safe_text(only, 400)}"))
-    common = common_laws(new, baseline)
     if not common:
         faults.append(Difference("nothing in common", "", "the two have no law in common"))
     new, baseline = new.sel(model=common), baseline.sel(model=common)
     names = [name for name in CALIBRATION if name in new and name in baseline] if common and is_same_data else []
     scales = {name: np.broadcast_to(_scale(name, baseline), baseline[name].shape) for name in names}
-    return align_studies(new, baseline, scales, faults)
+    return _align(new, baseline, scales, faults)
 
 
-def common_laws(new: xr.Dataset, baseline: xr.Dataset) -> list[str]:
-    """List the laws that two calibrations have, in the order of the baseline."""
-    return [key for key in map(str, baseline["model"].values) if key in new["model"].values]
+def align_boards(new: xr.Dataset, baseline: xr.Dataset, *, subset: bool) -> Alignment:
+    """Align two boards by the labels of engines and checks, whose order does not matter."""
+    faults = []
+    suites = [dataset.attrs["suite"] for dataset in (new, baseline)]
+    if suites[0] != suites[1]:
+        text = safe_text(f"suite is {suites[0]}, in BASELINE {suites[1]}")
+        faults.append(Difference("physics config", "suite", text))
+    common = {dim: common_labels(new, baseline, dim) for dim in ("engine", "check")}
+    for dim in common:
+        for study, side in ((new, "NEW"), (baseline, "BASELINE")):
+            only = [label for label in map(str, study[dim].values) if label not in common[dim]]
+            if only and not subset:
+                named = ", ".join(only[:MAX_NAMED_LABELS]) + (", ..." if len(only) > MAX_NAMED_LABELS else "")
+                text = f"{dim}: {len(only)} of {study.sizes[dim]} in {side} only: {named}"
+                faults.append(Difference("labels", dim, safe_text(text, 400)))
+        if not common[dim]:
+            faults.append(Difference("nothing in common", dim, f"the two have no {dim} in common"))
+    names = list(BOARD) if all(common.values()) and suites[0] == suites[1] else []
+    new, baseline = (dataset.sel(common) for dataset in (new, baseline))
+    # all numbers are dimensionless; what is not supported in one of them differs by its status
+    scales = {name: np.maximum(1.0, np.abs(np.nan_to_num(baseline[name].values.astype(float)))) for name in names}
+    return _align(new, baseline, scales, faults)
+
+
+def version_notes(new: xr.Dataset, baseline: xr.Dataset) -> list[str]:
+    """Name the engines whose version or kind differs."""
+    notes = []
+    for engine in common_labels(new, baseline, "engine"):
+        for name in ("engine_version", "engine_kind"):
+            a, b = (str(dataset[name].sel(engine=engine).item()) for dataset in (new, baseline))
+            if a != b:
+                word = name.removeprefix("engine_")
+                notes.append(
+                    safe_text(f"the {word} of {engine} is {a or 'unknown'}, in BASELINE {b or 'unknown'}")
+                )
+    return notes
+
+
+def _align(
+    new: xr.Dataset, baseline: xr.Dataset, scales: Mapping[str, Array], faults: Sequence[Difference]
+) -> Alignment:
+    """Align two studies whose points are in the same order; the variables that have a scale are compared."""
+    labels = {dim: baseline.variables[dim] for dim in baseline.dims if dim in baseline.coords}
+    coords = xr.Coordinates(labels, indexes={})
+    a, b = (xr.Dataset({name: study.variables[name] for name in scales}, coords) for study in (new, baseline))
+    dims = {name: tuple(map(str, baseline[name].dims)) for name in scales}
+    return Alignment(a, b, dims, tuple(faults), scales)
+
+
+def common_labels(new: xr.Dataset, baseline: xr.Dataset, dim: str) -> list[str]:
+    """List the laws, engines or checks that two studies have, in the order of the baseline."""
+    return [label for label in map(str, baseline[dim].values) if label in new[dim].values]
 
 
 def _data_faults(new: xr.Dataset, baseline: xr.Dataset) -> list[Difference]:
@@ -110,7 +159,7 @@ def _scale(name: str, baseline: xr.Dataset) -> Array:
 def fit_notes(new: xr.Dataset, baseline: xr.Dataset) -> list[str]:
     """Name the laws whose fits ended with another status."""
     notes = []
-    for key in common_laws(new, baseline):
+    for key in common_labels(new, baseline, "model"):
         a, b = (fit_status(dataset.sel(model=key)) for dataset in (new, baseline))
         if a != b:
             notes.append(f"the fit of {key} is {a}, in BASELINE {b}")
