@@ -34,7 +34,7 @@ def align_calibrations(new: xr.Dataset, baseline: xr.Dataset, *, subset: bool) -
         faults.append(Difference("nothing in common", "", "the two have no law in common"))
     new, baseline = new.sel(model=common), baseline.sel(model=common)
     names = [name for name in CALIBRATION if name in new and name in baseline] if common and is_same_data else []
-    scales = {name: np.broadcast_to(_scale(name, baseline), baseline[name].shape) for name in names}
+    scales = {name: _scale(name, baseline) for name in names}
     return _align(new, baseline, scales, faults)
 
 
@@ -130,30 +130,24 @@ def _data_faults(new: xr.Dataset, baseline: xr.Dataset) -> list[Difference]:
 
 def _scale(name: str, baseline: xr.Dataset) -> Array:
     """Compute the scale of each value of a variable; NaN if the data do not determine the value."""
-    variable = CALIBRATION[name]
-    values = np.abs(np.asarray(baseline[name].values, float))
+    variable, values = CALIBRATION[name], abs(baseline[name])
     match variable.scale:
         case "exact":
-            return np.zeros(())
+            scale = xr.zeros_like(values)
         case "itself + interval":
-            width = np.asarray((baseline["upper"] - baseline["lower"]).values, float)
-            estimate = np.abs(np.asarray(baseline["estimate"].values, float))
-            scale = np.where(baseline["identifiable"].values == 1, estimate + np.nan_to_num(width), np.nan)
+            interval = (baseline["upper"] - baseline["lower"]).fillna(0.0)
+            scale = (abs(baseline["estimate"]) + interval).where(baseline["identifiable"] == 1)
         case "deviations":
-            deviation = np.sqrt(np.diagonal(np.asarray(baseline[name].values, float), axis1=-2, axis2=-1))
-            scale = deviation[..., :, None] * deviation[..., None, :]
+            deviation = np.sqrt(np.diagonal(values, axis1=-2, axis2=-1))
+            scale = values.copy(data=deviation[..., :, None] * deviation[..., None, :])
         case "measured":
-            measured = np.abs(np.asarray(baseline["measured"].values, float))
-            outputs = baseline["output"].values
-            largest = {output: measured[outputs == output].max() for output in dict.fromkeys(outputs)}
-            along = outputs if "point" in variable.dims else baseline["output_name"].values
-            shape = (1, -1) if "point" in variable.dims else (1, -1, 1)
-            scale = np.array([largest[output] for output in along]).reshape(shape)
+            largest = abs(baseline["measured"]).groupby("output").max()
+            scale = largest.sel(output=baseline["output" if "point" in variable.dims else "output_name"])
         case "max(1, itself)":
-            scale = np.where(values > 1.0, values, 1.0)
+            scale = values.where(values > 1.0, 1.0)
         case _:
             scale = values
-    return np.where(np.isfinite(scale), scale, np.nan)
+    return np.asarray(scale.where(np.isfinite(scale)).broadcast_like(values).transpose(*values.dims), float)
 
 
 def fit_notes(new: xr.Dataset, baseline: xr.Dataset) -> list[str]:
