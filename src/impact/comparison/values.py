@@ -97,12 +97,12 @@ def _points(dims: Iterable[str], sizes: Mapping[Hashable, int]) -> int:
 class Worst(NamedTuple):
     """The worst point of a region, the largest tuple; `place` is its negative index, so that the first wins."""
 
-    ratio: float
-    size: float
-    place: tuple[int, ...]
-    difference: float
-    new: float
-    baseline: float
+    ratio: float = 0.0
+    size: float = 0.0
+    place: tuple[int, ...] = ()
+    difference: float = 0.0
+    new: float = math.nan
+    baseline: float = math.nan
 
 
 def compare_values(
@@ -117,7 +117,7 @@ def compare_values(
     shape = tuple(aligned.baseline.sizes[dim] for dim in dims)
     largest = {dim: np.zeros(-(-size // group_size(size))) for dim, size in zip(dims, shape, strict=True)}
     different = 0
-    worst: Worst | None = None
+    worst = Worst()
     for region in regions:
         weight = math.prod(aligned.baseline.sizes[dim] for dim in dims if dim not in region)
         for slab in _slabs(variable.name, aligned, region):
@@ -129,8 +129,7 @@ def compare_values(
             different += int(np.count_nonzero(ratio > 1.0)) * weight
             if not ratio.max():
                 continue
-            worst_here = _worst_of_slab(variable, part, ratio, difference, a, b)
-            worst = worst_here if worst is None else max(worst, worst_here)
+            worst = max(worst, _worst_of_slab(variable, part, ratio, difference, a, b))
             for axis, dim in enumerate(dims):
                 maxima = ratio.max(axis=tuple(other for other in range(len(dims)) if other != axis))
                 if dim in slab:
@@ -145,11 +144,11 @@ def compare_values(
         tolerance=tol if variable.has_tolerance else math.nan,
         points=math.prod(shape) - int(undetermined),
         different=different,
-        worst=worst.difference if worst else 0.0,
-        ratio=worst.ratio if worst else 0.0,
-        at=_inputs_of_point(aligned.new, dims, worst.place) if worst else {},
-        new=worst.new if worst else math.nan,
-        baseline=worst.baseline if worst else math.nan,
+        worst=worst.difference,
+        ratio=worst.ratio,
+        at=_inputs_of_point(aligned.new, dims, worst.place) if worst.place else {},
+        new=worst.new,
+        baseline=worst.baseline,
     ), largest
 
 
