@@ -238,7 +238,7 @@ def export(
         e_continuous=problem.e_continuous,
         contact_time=contact_time,
         friction=collision.friction,
-        beta_continuous=problem.outputs.get("beta", math.nan),
+        beta_continuous=problem.law.continuous.get("beta", math.nan),
         at_dt=at_dt,
         needed=needed,
         parameters=parameters,

@@ -42,7 +42,6 @@ class ExportProblem:
     Parameters
     ----------
     law : the law, the impact and the contact time of the continuous law
-    outputs : of the continuous law, by name, in SI
     point : the config, the axes of the source that are at their first value, and the damping that was solved for
     fit_notes : of a calibration, the rank of the law and its weight, and other laws that were fitted
     better_fit : a remark on the law of a calibration that fits best, where it is none of the code; else ""
@@ -54,7 +53,6 @@ class ExportProblem:
     code: Code
     version: str
     law: FixedStepLaw
-    outputs: Mapping[str, float]
     point: PointWithE
     fit_notes: tuple[str, ...]
     better_fit: str
@@ -73,7 +71,7 @@ class ExportProblem:
 
     @property
     def e_continuous(self) -> float:
-        return self.outputs["e_out"]
+        return self.law.continuous["e_out"]
 
     @property
     def requested_e(self) -> float:
@@ -86,7 +84,7 @@ class ExportProblem:
         for name in ("R1", "R2"):
             if math.isnan(values[name]):
                 is_wall = name == "R2" and self.has_wall
-                values[name] = math.inf if is_wall else RADIUS_PER_PEAK * self.outputs["peak_indentation"]
+                values[name] = math.inf if is_wall else RADIUS_PER_PEAK * self.law.continuous["peak_indentation"]
         oblique = self.law.oblique
         if oblique is not None:
             values |= {name: float(getattr(oblique.impact, name).item()) for name in OBLIQUE_VALUES}
@@ -161,7 +159,6 @@ def prepare_export(
         code=code,
         version=version,
         law=fixed,
-        outputs=fixed.continuous,
         point=point,
         fit_notes=fit_notes,
         better_fit=better_fit,

@@ -199,7 +199,7 @@ def _with_friction(
     speed = math.hypot(v0, float((oblique.impact.u1 - oblique.impact.u2).item()))
     # a law that needs no radius may have none in its impact
     radius = problem.collision(float(steps[0]), 0.5).effective_radius
-    turning = TURNING * problem.outputs["peak_indentation"] / radius
+    turning = TURNING * problem.law.continuous["peak_indentation"] / radius
     is_turning = problem.code.shortens_arms or not problem.has_wall
     return replace(
         verification,
