@@ -111,14 +111,11 @@ def _comparable_coordinates(result: xr.Dataset, other: xr.Dataset) -> xr.Dataset
     """Load the coordinates of a result; a single value that the other varies becomes an axis of length one."""
     materials = read_attribute(result.attrs, "materials")
     coords = _with_materials(result.coords.to_dataset().compute(), materials, other)
-    if "model" not in result.dims:
-        # one model was selected: its key is still a label
-        coords = _with_axis(coords, "model", MODEL_COORDINATES)
-    if "friction" in coords and "friction" not in result.dims:
-        coords = _with_axis(coords, "friction", ["friction"])
-    for axis in map(str, other.dims):
+    # the key of a law that was selected is still a label
+    for axis in map(str, dict.fromkeys((*LAW_DIMS, *other.dims))):
         if axis not in coords.dims and axis in coords and coords[axis].ndim == 0:
-            coords = _with_axis(coords, axis, [n for n in other.coords if axis in other.variables[n].dims])
+            along = [name for name in other.coords if axis in other.variables[name].dims]
+            coords = _with_axis(coords, axis, MODEL_COORDINATES if axis == "model" else [axis, *along])
     # an input that varies with a zip group in the other result only: repeat it along their common axis
     repeated = {
         name: (
