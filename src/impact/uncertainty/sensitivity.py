@@ -200,13 +200,9 @@ def sensitivity_of(plan: Plan, of: str, swept: xr.Dataset) -> xr.Dataset:
         # a pair that has no meaning has not failed
         status = swept["friction_status"].transpose("model", ..., SAMPLE).values.reshape(values.shape)
         statistics["failed"] -= (status == FrictionStatus.NOT_COMBINABLE).sum(axis=(1, 2))
-    variables = {name: result.variables[name] for name in statistics}
-    return result.assign(
-        {
-            name: variable.copy(data=statistics[name].reshape(variable.shape).astype(variable.dtype))
-            for name, variable in variables.items()
-        }
-    )
+    for name, array in statistics.items():
+        result[name].values = array.reshape(result[name].shape).astype(result[name].dtype)
+    return result
 
 
 def _statistics(values: Array, config: Config) -> dict[str, Array]:
@@ -222,19 +218,14 @@ def _statistics(values: Array, config: Config) -> dict[str, Array]:
     varies = deviation > resolution
     changes = np.abs(values[:, 2:] - values[:, :1]).max(axis=2) > resolution[:, None]
     values = np.concatenate([values[:, :2], np.where(changes[..., None], values[:, 2:], values[:, :1])], axis=1)
-    whole = indices_of(values[varies], config.design.seed)
-    half = indices_of(np.ascontiguousarray(values[varies][..., : n // 2])) if n > 2 else {}
-
-    def of_all(indices: Array | float) -> Array:
-        array = np.full((outputs, blocks - 2), np.nan)
-        array[varies] = indices
-        return array
-
+    indices = indices_of(values, config.design.seed)
+    half = indices_of(np.ascontiguousarray(values[..., : n // 2])) if n > 2 else {}
+    unknown = np.full((outputs, blocks - 2), np.nan)
+    indices |= {name: half.get(name.removesuffix("_half"), unknown) for name in HALF}
     return {
         "failed": failed,
         "mean": mean,
         "sd": deviation,
         "quantiles": np.quantile(independent, QUANTILES, axis=1).T,
-        **{name: of_all(array) for name, array in whole.items()},
-        **{name: of_all(half.get(name.removesuffix("_half"), np.nan)) for name in HALF},
+        **{name: np.where(varies[:, None], array, np.nan) for name, array in indices.items()},
     }
