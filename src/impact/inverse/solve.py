@@ -40,7 +40,6 @@ from ..contact.units import names_in, with_numbers
 from ..contact.variables import OUTPUTS
 from ..display import Block, Displayed
 from ..engine.build_impacts import build_impacts
-from ..engine.inputs import Inputs
 from ..engine.plan import Plan
 from ..engine.plugins import read_plugins
 from ..errors import UsageError, did_you_mean, require_known, warn
@@ -483,20 +482,18 @@ class SolveProblem:
         """Find the size of the unknown: 1 in the contact's own units, or its typical value if it is no damping."""
         if self.unknown.typical and not self.unknown.is_damping:
             return abs(self.unknown.typical)
-        inputs = trial_inputs(self.config, self.columns(np.ones(1)))
-        impacts = build_impacts(inputs, self.model, inputs.index())
-        if self.unknown.name == "K":
-            # without a stiffness in the config that of the materials, else of the radii, is the scale
-            others = Inputs(self.config.scalars, (), self.config.materials)
-            stiffness = float(build_impacts(others, self.model, ()).K[0])
-            return stiffness if 0.0 < stiffness < math.inf else 1.0
         if self.unknown.name in ("e", "mu"):
             return 1.0
-        if self.unknown.name.startswith("friction."):
-            unit = 1.0 / float(impacts.in_own_units(np.ones(1), self.unknown.unit)[0])
-            return unit if 0.0 < unit < math.inf else 1.0
-        unit = 1.0 / float(impacts.dimensionless(self.model, self.unknown.name)[0])
-        return unit if 0.0 < unit < math.inf else 1.0
+        # without a stiffness in the config that of the materials, else of the radii, is the scale
+        inputs = trial_inputs(self.config, {} if self.unknown.name == "K" else self.columns(np.ones(1)))
+        impacts = build_impacts(inputs, self.model, inputs.index())
+        if self.unknown.name == "K":
+            size = float(impacts.K[0])
+        elif self.unknown.name.startswith("friction."):
+            size = 1.0 / float(impacts.in_own_units(np.ones(1), self.unknown.unit)[0])
+        else:
+            size = 1.0 / float(impacts.dimensionless(self.model, self.unknown.name)[0])
+        return size if 0.0 < size < math.inf else 1.0
 
 
 def _all_roots(problem: SolveProblem, target: float) -> SolveResult:
