@@ -88,18 +88,17 @@ def as_markdown(outcome: Verdict) -> str:
     lines += [f"`{new}` against the baseline `{baseline}`", ""]
     if outcome.faults:
         lines += [*(f"- {_escape_markdown(fault.text)}" for fault in by_kind(outcome.faults)), ""]
-    differing = [variable for variable in outcome.ranked if not variable.is_equal]
-    if differing:
+    if outcome.differing:
         lines += [
             "| variable | differ | worst | × tolerance | at | new | baseline |",
             "|---|--:|--:|--:|---|--:|--:|",
         ]
-        for variable in differing:
+        for variable in outcome.differing:
             numbers = f"{number(variable.worst, 3)} | {number(variable.ratio, 3)}"
             values = f"{number(variable.new, 12)} | {number(variable.baseline, 12)}"
             counts, point = f"{variable.different} of {variable.points}", _escape_markdown(variable.location)
             lines.append(f"| `{variable.name}` | {counts} | {numbers} | {point} | {values} |")
-        commands = dict.fromkeys(filter(None, map(outcome.replay, differing)))
+        commands = dict.fromkeys(filter(None, map(outcome.replay, outcome.differing)))
         # a fence of four backticks, since a name may contain three
         lines += ["", "````sh", *commands, "````", ""] if commands else [""]
     lines += [f"- note: {_escape_markdown(note)}" for note in outcome.notes]
@@ -109,7 +108,7 @@ def as_markdown(outcome: Verdict) -> str:
 def as_github(outcome: Verdict) -> str:
     """Write a workflow command of GitHub Actions: an annotation on the baseline, with the worst differences."""
     failures = [(fault.text, "") for fault in by_kind(outcome.faults)]
-    failures += [(variable.text, outcome.replay(variable)) for variable in outcome.ranked if not variable.is_equal]
+    failures += [(variable.text, outcome.replay(variable)) for variable in outcome.differing]
     lines = [outcome.headline]
     for text, command in failures[:MAX_ANNOTATED]:
         lines += [text, command] if command and command not in lines else [text]
