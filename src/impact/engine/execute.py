@@ -15,7 +15,6 @@ from dataclasses import dataclass
 from functools import lru_cache, partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .._version import __version__
 from ..config.tables import Solver
@@ -32,7 +31,7 @@ from ..errors import StoreError, UsageError, warn
 from .executors import ExecutorSpec
 from .plan import Plan
 from .run import Run
-from .trajectories import Columns, PlanLaw, TrajectoryRange, keys_of
+from .trajectories import Columns, PlanLaw, ReusedPart, TrajectoryRange, keys_of
 
 # how often a range whose process was killed is submitted again
 MAX_RETRIES = 3
@@ -41,16 +40,8 @@ POLL_INTERVAL_S = 0.2
 
 # the results of a range, and a line for each distinct error that the law raised
 Integrated = tuple[Record, dict[str, str]]
-# a mask of the trajectories of a range that are reused from another result, and their results; None for no reuse
-ReusedPart = tuple[NDArray[np.bool_], Record] | None
-FindReused = Callable[[TrajectoryRange], ReusedPart]
 # the ranges that are being integrated
 Running = dict[Future[Integrated], tuple[TrajectoryRange, ReusedPart]]
-
-
-def reuse_nothing(trajectory_range: TrajectoryRange) -> ReusedPart:
-    """Return None: the default of `find_reused`."""
-    return None
 
 
 @dataclass(frozen=True)
@@ -119,15 +110,12 @@ def other_version(location: str, location_version: str, this_version: str) -> st
 
 
 def integrate_ranges(
-    plan: Plan,
-    todo: Iterable[TrajectoryRange],
-    run: Run,
-    find_reused: FindReused = reuse_nothing,
+    plan: Plan, todo: Iterable[TrajectoryRange], run: Run
 ) -> Iterator[tuple[TrajectoryRange, Record]]:
     """Integrate ranges of trajectories, and yield each when it is finished: in order in this process alone.
 
-    `find_reused` returns the trajectories of a range that are not integrated, with their results. A killed process
-    gets its ranges again, a few times; a warning states each distinct error that a law raised.
+    What the plan reuses is not integrated. A killed process gets its ranges again, a few times; a warning states
+    each distinct error that a law raised.
     """
     remaining, attempts = deque(todo), Counter[int]()
     reported: set[str] = set()
@@ -138,7 +126,7 @@ def integrate_ranges(
             try:
                 with spec.start() as executor:
                     for trajectory_range, (collisions, errors) in _submit_and_collect(
-                        partial(submit, executor), remaining, running, find_reused, spec.capacity, run.should_stop
+                        plan, partial(submit, executor), remaining, running, spec.capacity, run.should_stop
                     ):
                         warn(*(errors[error] for error in errors.keys() - reported))
                         reported |= errors.keys()
@@ -157,10 +145,10 @@ def integrate_ranges(
 
 
 def _submit_and_collect(
+    plan: Plan,
     submit: Callable[[TrajectoryRange, ReusedPart], Future[Integrated]],
     remaining: deque[TrajectoryRange],
     running: Running,
-    find_reused: FindReused,
     capacity: Callable[[], int],
     should_stop: Callable[[], bool],
 ) -> Iterator[tuple[TrajectoryRange, Integrated]]:
@@ -170,7 +158,7 @@ def _submit_and_collect(
             # called in every round, even if no range remains: it raises if the workers cannot be reached any more
             limit = capacity()
             while remaining and len(running) < limit and not should_stop():
-                trajectory_range, reused = remaining[0], find_reused(remaining[0])
+                trajectory_range, reused = remaining[0], plan.reused(remaining[0])
                 if reused is not None and reused[0].all():
                     remaining.popleft()
                     yield trajectory_range, (reused[1], {})
@@ -230,28 +218,23 @@ def _build_submit(
     plan: Plan, spec: ExecutorSpec
 ) -> Callable[[Executor, TrajectoryRange, ReusedPart], Future[Integrated]]:
     """Build the function that submits what is not reused of a range to an executor."""
-    integrate: Callable[[Sequence[str], Columns], Integrated]
-    if spec.shares_memory:
-        laws = {keys_of(law): law for law in plan.laws}
-
-        def integrate(keys: Sequence[str], columns: Columns) -> Integrated:
-            return integrate_columns(laws[tuple(keys)], columns, plan.solver)
-
-    else:
-        values = [plugin.model.key for plugin in plan.plugins.items if plugin.is_value]
-        if values:
-            raise UsageError(
-                f"{', '.join(values)} is given as a Python value, which cannot be sent to other "
-                "processes; expected the file that it is in, or jobs=1"
-            )
-        integrate = partial(integrate_remotely, context=context_of(plan))
+    values = [plugin.model.key for plugin in plan.plugins.items if plugin.is_value]
+    if values and not spec.shares_memory:
+        raise UsageError(
+            f"{', '.join(values)} is given as a Python value, which cannot be sent to other "
+            "processes; expected the file that it is in, or jobs=1"
+        )
+    context = context_of(plan)
 
     def submit(executor: Executor, trajectory_range: TrajectoryRange, reused: ReusedPart) -> Future[Integrated]:
         # the arguments are built here, so that waiting ranges take no memory
         columns = plan.columns_of(trajectory_range)
         if reused is not None:
             columns = {name: values[~reused[0]] for name, values in columns.items()}
-        return executor.submit(integrate, keys_of(plan.laws[trajectory_range.model]), columns)
+        law = plan.laws[trajectory_range.model]
+        if spec.shares_memory:
+            return executor.submit(integrate_columns, law, columns, context.solver)
+        return executor.submit(integrate_remotely, keys_of(law), columns, context)
 
     return submit
 

@@ -30,6 +30,7 @@ from .trajectories import (
     MAX_CELLS,
     Columns,
     PlanLaw,
+    ReusedPart,
     TrajectoryMap,
     TrajectoryRange,
     build_map,
@@ -120,6 +121,10 @@ class Plan:
         index = tuple(index_along.get(axis, np.zeros(1, np.intp)) for axis in range(len(self.shape)))
         columns = columns_at(self.inputs, self.laws[trajectory_range.model], trajectory_map.axes, index)
         return {name: np.broadcast_to(values, cells.shape).copy() for name, values in columns.items()}
+
+    def reused(self, trajectory_range: TrajectoryRange) -> ReusedPart:
+        """Find the trajectories of a range that are not integrated; see `impact.results.extend.ExtendedPlan`."""
+        return None
 
     def check_count(self, most: int, name: str) -> None:
         """Refuse too many trajectories before any array is allocated; `name` is that of the config."""

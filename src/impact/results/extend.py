@@ -6,6 +6,7 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -19,21 +20,20 @@ from ..config.draft import Setting, settings_of
 from ..config.files import override_text
 from ..config.grid import MAX_POINTS, Axis
 from ..config.input_names import InputName
+from ..config.load import Config
 from ..config.tables import CORES
 from ..contact.model import ForceModel
 from ..contact.status import STATUS_OK, Status
-from ..engine.execute import ReusedPart
 from ..engine.executors import SERIAL, ExecutorSpec
 from ..engine.inputs import Inputs
 from ..engine.plan import Plan
 from ..engine.plugins import Plugins, read_plugins
 from ..engine.run import ProgressCallback, Run, ignore, never
-from ..engine.trajectories import TrajectoryMap, TrajectoryRange, keys_of, model_of
+from ..engine.trajectories import ReusedPart, TrajectoryMap, TrajectoryRange, keys_of, model_of
 from ..errors import ResultError, UsageError
 from ..formatting import argument, safe_text
 from .attributes import read_attribute
 from .kinds import require_sweep
-from .layouts import FillSlab
 from .outcome import SweepOutcome
 from .provenance import stored_config
 from .selection import IndexArray, match_labels
@@ -153,38 +153,23 @@ def _extend_into(
         config = stored_config(before.attrs, [], plugins, name, run.max_points)
         old = Plan(config, plugins.of(config.models))
         _check_whole(before, old, name)
-        new = _extended_plan(before, old, changes, plugins, name, run.max_points)
+        config = _extended_config(before, old, changes, plugins, name, run.max_points)
         if before.attrs.get("core") in CORES:
             # the existing trajectories were integrated by this core
-            solver = replace(new.config.solver, core=str(before.attrs["core"]))
-            new = replace(new, config=replace(new.config, solver=solver))
+            config = replace(config, solver=replace(config.solver, core=str(before.attrs["core"])))
+        new = ExtendedPlan(config, plugins.of(config.models), old=old, table=table, name=name)
         _check_changes(old, new, name)
         new.check_count(run.max_points, name)
-        axes = tuple(_axis_positions(axis, old.inputs, name) for axis in new.config.axes)
-        _check_none_lost(old, axes, name)
+        _check_none_lost(new)
         seal = str(before.encoding["seal"])
         record = {"seal": seal, "set": [setting.override for setting in changes]}
         history = [*read_attribute(before.attrs, "extended", name), record]
-        old_positions = _OldPositions(old, new, axes)
-        n_integrated: dict[int, int] = {}
-
         # a full result has no trajectories, only the values of its points
-        fill = old_positions.filler(before) if table is None and new.layout == "full" else None
-
-        def find_reused(trajectory_range: TrajectoryRange) -> ReusedPart:
-            reused = None
-            if table is not None:
-                reused = old_positions.from_table(trajectory_range, table)
-            elif fill is not None:
-                reused = old_positions.not_needed(trajectory_range)
-            count = 0 if reused is None else int(np.count_nonzero(reused[0]))
-            n_integrated[trajectory_range.number] = trajectory_range.size - count
-            return reused
-
-        extension = Extension(seal, json.dumps(history), find_reused, fill, replaces=output == source)
+        fill = partial(new.fill, before) if table is None and new.layout == "full" else None
+        extension = Extension(seal, json.dumps(history), fill, replaces=output == source)
         outcome = sweep_into(output, new, run, extension)
     layout = "full" if table is None else "factored"
-    return replace(outcome, integrated=sum(n_integrated.values()), extended_layout=layout)
+    return replace(outcome, integrated=sum(new.integrated.values()), extended_layout=layout)
 
 
 def _check_whole(before: xr.Dataset, old: Plan, name: str) -> None:
@@ -196,10 +181,10 @@ def _check_whole(before: xr.Dataset, old: Plan, name: str) -> None:
         raise UsageError(f"{name}: got a part of a result, expected the whole result")
 
 
-def _extended_plan(
+def _extended_config(
     before: xr.Dataset, old: Plan, changes: Sequence[Setting], plugins: Plugins, source: str, max_points: int
-) -> Plan:
-    """Plan the sweep with the changes, and all values and models of the result."""
+) -> Config:
+    """Read the config with the changes, and all values and models of the result."""
     config = stored_config(before.attrs, changes, plugins, source, max_points)
     added = []
     for axis in config.axes:
@@ -222,7 +207,7 @@ def _extended_plan(
             added.append(override_text((table,), keys))
     if added:
         config = stored_config(before.attrs, [*changes, *added], plugins, source, max_points)
-    return Plan(config, plugins.of(config.models))
+    return config
 
 
 def _check_changes(old: Plan, new: Plan, name: str) -> None:
@@ -263,19 +248,17 @@ class _AxisPositions:
     positions: IndexArray
 
 
-def _check_none_lost(old: Plan, axes: Sequence[_AxisPositions], name: str) -> None:
+def _check_none_lost(plan: ExtendedPlan) -> None:
     """Refuse a plan that lacks a value of the old one."""
-    for number, axis in enumerate(old.config.axes):
-        positions = {
-            position for new_axis in axes if new_axis.axis == number for position in new_axis.positions.tolist()
-        }
-        lost = [position for position in range(axis.size) if position not in positions]
+    for number, axis in enumerate(plan.old.config.axes):
+        kept = (new_axis.positions.tolist() for new_axis in plan.positions if new_axis.axis == number)
+        lost = {*range(axis.size)}.difference(*kept)
         if lost:
-            row = {column: safe_text(str(values[lost[0]]), 40) for column, values in axis.columns.items()}
+            row = {column: safe_text(str(values[min(lost)]), 40) for column, values in axis.columns.items()}
             values = ", ".join(f"{column}={value}" for column, value in row.items())
             raise UsageError(
-                f"{name}: {argument('overrides')} leaves out {values}, expected all values that the result has, "
-                "and more; columns that vary together are given together"
+                f"{plan.name}: {argument('overrides')} leaves out {values}, expected all values that the result "
+                "has, and more; columns that vary together are given together"
             )
 
 
@@ -307,32 +290,57 @@ def _axis_positions(axis: Axis, old: Inputs, name: str) -> _AxisPositions:
     return _AxisPositions(next(iter(axes), None), np.array(positions, np.intp))
 
 
-@dataclass(frozen=True)
-class _OldPositions:
-    """The trajectories and points of the old sweep that those of the new one equal."""
+@dataclass(frozen=True, kw_only=True)
+class ExtendedPlan(Plan):
+    """The plan of the larger result: what the smaller one holds is neither integrated nor computed again.
+
+    Parameters
+    ----------
+    old : the plan of the smaller result
+    table : its trajectories; None if it has only the values of its points
+    name : of its file, in messages
+    integrated : how many trajectories of each range are not reused, by its number
+    """
 
     old: Plan
-    new: Plan
-    axes: tuple[_AxisPositions, ...]
+    table: TrajectoryTable | None
+    name: str
+    integrated: dict[int, int] = field(default_factory=dict)
     # by law, for each trajectory its row in the old table, or -1
     _rows: dict[int, IndexArray] = field(default_factory=dict)
 
-    def law(self, number: int) -> int | None:
+    @cached_property
+    def positions(self) -> tuple[_AxisPositions, ...]:
+        """The positions of the values of each axis in the old result."""
+        return tuple(_axis_positions(axis, self.old.inputs, self.name) for axis in self.config.axes)
+
+    def old_law(self, number: int) -> int | None:
         """Find the number that a model or a pair had in the old plan, or None."""
         keys = [keys_of(law) for law in self.old.laws]
-        of_law = keys_of(self.new.laws[number])
+        of_law = keys_of(self.laws[number])
         return keys.index(of_law) if of_law in keys else None
 
-    def from_table(self, trajectory_range: TrajectoryRange, table: TrajectoryTable) -> ReusedPart:
+    def reused(self, trajectory_range: TrajectoryRange) -> ReusedPart:
+        """Find the trajectories of a range that the old result has, or that only points need which it has."""
+        reused = None
+        if self.table is not None:
+            reused = self._from_table(trajectory_range, self.table)
+        elif self.layout == "full":
+            reused = self._not_needed(trajectory_range)
+        count = 0 if reused is None else int(np.count_nonzero(reused[0]))
+        self.integrated[trajectory_range.number] = trajectory_range.size - count
+        return reused
+
+    def _from_table(self, trajectory_range: TrajectoryRange, table: TrajectoryTable) -> ReusedPart:
         """Take the trajectories of a range that the old result has in its table."""
-        law = self.law(trajectory_range.model)
+        law = self.old_law(trajectory_range.model)
         if law is None:
             return None
         old_rows = self._old_rows(trajectory_range, table.maps[law])
         is_known = old_rows >= 0
         stored = table.rows.take(law, np.maximum(old_rows, 0))
         # a status that was assigned before integration may differ between the two sweeps
-        status = self.new.columns_of(trajectory_range)["status"]
+        status = self.columns_of(trajectory_range)["status"]
         is_known &= np.where(
             status == STATUS_OK, ~np.isin(stored.status, CHECKED_STATUSES), stored.status == status
         )
@@ -340,11 +348,11 @@ class _OldPositions:
         collisions.put(np.flatnonzero(is_known), stored.take(np.flatnonzero(is_known)))
         return is_known, collisions
 
-    def not_needed(self, trajectory_range: TrajectoryRange) -> ReusedPart:
+    def _not_needed(self, trajectory_range: TrajectoryRange) -> ReusedPart:
         """Mark the trajectories of a range that only points need which the old result holds in full."""
-        trajectory_map = self.new.maps[trajectory_range.model]
-        others = [axis for axis in range(len(self.axes)) if axis not in trajectory_map.axes]
-        is_new_along = [(self.axes[axis].positions < 0).any() for axis in others]
+        trajectory_map = self.maps[trajectory_range.model]
+        others = [axis for axis in range(len(self.positions)) if axis not in trajectory_map.axes]
+        is_new_along = [(self.positions[axis].positions < 0).any() for axis in others]
         if self._has_new_law(trajectory_range.model) or any(is_new_along):
             return None
         if trajectory_map.of_cell is None:
@@ -357,21 +365,21 @@ class _OldPositions:
 
     def _has_new_law(self, number: int) -> bool:
         """Whether a model or a pair, or a pair of the model, is not in the old sweep."""
-        law = self.new.laws[number]
+        law = self.laws[number]
         return any(
-            self.law(other) is None
-            for other, with_law in enumerate(self.new.laws)
+            self.old_law(other) is None
+            for other, with_law in enumerate(self.laws)
             if other == number or model_of(with_law) == law
         )
 
     def _is_old(self, trajectory_map: TrajectoryMap, cells: IndexArray) -> NDArray[np.bool_]:
         is_old = np.ones(cells.shape, bool)
         for axis, coordinate in trajectory_map.index_along(cells).items():
-            is_old &= self.axes[axis].positions[coordinate] >= 0
+            is_old &= self.positions[axis].positions[coordinate] >= 0
         return is_old
 
     def _old_rows(self, trajectory_range: TrajectoryRange, old_map: TrajectoryMap) -> IndexArray:
-        trajectory_map = self.new.maps[trajectory_range.model]
+        trajectory_map = self.maps[trajectory_range.model]
         if trajectory_map.of_cell is None:
             return self._rows_of_cells(trajectory_map, old_map, trajectory_range.rows)
         if trajectory_range.model not in self._rows:
@@ -387,41 +395,37 @@ class _OldPositions:
         """Find the old row of each cell's trajectory, or -1."""
         index = [np.zeros(cells.shape, np.intp) for _ in self.old.config.axes]
         for axis, coordinate in trajectory_map.index_along(cells).items():
-            old_axis = self.axes[axis].axis
+            old_axis = self.positions[axis].axis
             if old_axis is not None:
-                index[old_axis] = np.maximum(self.axes[axis].positions[coordinate], 0)
-        covered = {self.axes[axis].axis for axis in trajectory_map.axes}
+                index[old_axis] = np.maximum(self.positions[axis].positions[coordinate], 0)
+        covered = {self.positions[axis].axis for axis in trajectory_map.axes}
         if not set(old_map.axes) <= covered:
             return np.full(cells.shape, -1, np.intp)
         rows = old_map.rows(tuple(index)) if index else np.zeros(cells.shape, np.intp)
         return np.where(self._is_old(trajectory_map, cells), rows, -1)
 
-    def filler(self, before: xr.Dataset) -> FillSlab:
-        """Build the function that copies the values of the old result into the values of a slab."""
+    def fill(self, before: xr.Dataset, slab: ExpandedSlab) -> None:
+        """Copy the values of the old result into the values of a slab."""
         names = [axis.name for axis in self.old.config.axes]
-
-        def fill(slab: ExpandedSlab) -> None:
-            if self.law(slab.number) is None:
-                return
-            of_law = dict(zip(("model", "friction"), keys_of(self.new.laws[slab.number]), strict=False))
-            old_positions = [axis.positions[part] for axis, part in zip(self.axes, slab.region, strict=True)]
-            inside = np.ix_(*(np.flatnonzero(positions >= 0) for positions in old_positions))
-            if any(positions.size == 0 for positions in inside):
-                return
-            # in the order of the axes of this slab
-            chosen: Mapping[Any, Any] = {
-                names[axis.axis]: positions[positions >= 0]
-                for axis, positions in zip(self.axes, old_positions, strict=True)
-                if axis.axis is not None
-            }
-            for name, array in slab.values.items():
-                if "model" not in before[name].dims:
-                    continue
-                old_values = before[name].sel(of_law).isel(chosen).transpose(*chosen).values
-                shape = tuple(positions.size for positions in inside)
-                if not array.flags.writeable:
-                    # a view of computed values that was not copied
-                    slab.values[name] = array = array.copy()
-                array[inside or ...] = old_values.reshape(shape) if array.shape else old_values
-
-        return fill
+        if self.old_law(slab.number) is None:
+            return
+        of_law = dict(zip(("model", "friction"), keys_of(self.laws[slab.number]), strict=False))
+        old_positions = [axis.positions[part] for axis, part in zip(self.positions, slab.region, strict=True)]
+        inside = np.ix_(*(np.flatnonzero(positions >= 0) for positions in old_positions))
+        if any(positions.size == 0 for positions in inside):
+            return
+        # in the order of the axes of this slab
+        chosen: Mapping[Any, Any] = {
+            names[axis.axis]: positions[positions >= 0]
+            for axis, positions in zip(self.positions, old_positions, strict=True)
+            if axis.axis is not None
+        }
+        for name, array in slab.values.items():
+            if "model" not in before[name].dims:
+                continue
+            old_values = before[name].sel(of_law).isel(chosen).transpose(*chosen).values
+            shape = tuple(positions.size for positions in inside)
+            if not array.flags.writeable:
+                # a view of computed values that was not copied
+                slab.values[name] = array = array.copy()
+            array[inside or ...] = old_values.reshape(shape) if array.shape else old_values

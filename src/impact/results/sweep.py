@@ -23,7 +23,7 @@ from ..config.load import read_config
 from ..contact.model import ForceModel
 from ..contact.records import Record
 from ..engine import checkpoint
-from ..engine.execute import FindReused, integrate_ranges, reuse_nothing
+from ..engine.execute import integrate_ranges
 from ..engine.executors import SERIAL, ExecutorSpec, choose_executor
 from ..engine.plan import Plan
 from ..engine.plugins import read_plugins
@@ -55,14 +55,12 @@ class Extension:
     ----------
     seal : of the old result
     note : JSON text for the attribute `extended` of the new result
-    find_reused : returns the trajectories of a range that are not integrated again
     fill : copies old values into a slab; None if all values are computed from trajectories
     replaces : whether the new result replaces the old one
     """
 
     seal: str = ""
     note: str = ""
-    find_reused: FindReused = reuse_nothing
     fill: FillSlab | None = None
     replaces: bool = False
 
@@ -277,7 +275,7 @@ def sweep_into(
     most = RANGE_TRAJECTORIES // 64 if plan.frictions else RANGE_TRAJECTORIES
     if plan.trajectories <= most and few and not os.path.lexists(folder):
         # so short that it is neither stopped nor reported
-        table, counter = _integrate_in_memory(plan, DEFAULT_RUN, extension.find_reused)
+        table, counter = _integrate_in_memory(plan, DEFAULT_RUN)
         try:
             return store_result(output, plan, table, counter, run, extension)
         except UnfinishedError:
@@ -293,7 +291,7 @@ def sweep_into(
         with report_kept_ranges(
             folder, counter, again, lambda error: _missing_space(error, output, plan, counter)
         ):
-            complete_ranges(work_folder, plan, plan.ranges, counter, run, extension.find_reused)
+            complete_ranges(work_folder, plan, plan.ranges, counter, run)
             table = table_of_ranges(plan, partial(reload_range, work_folder))
             outcome = store_result(
                 output, plan, table, counter, run, extension, checkpoint.partial_file_of(output)
@@ -302,13 +300,11 @@ def sweep_into(
     return outcome
 
 
-def _integrate_in_memory(
-    plan: Plan, run: Run, find_reused: FindReused = reuse_nothing
-) -> tuple[TrajectoryTable, ProgressCounter]:
+def _integrate_in_memory(plan: Plan, run: Run) -> tuple[TrajectoryTable, ProgressCounter]:
     """Integrate all ranges of a plan without a work folder."""
     finished: dict[TrajectoryRange, Record] = {}
     counter = ProgressCounter.start(plan.ranges, plan.points, run)
-    integrate(plan, plan.ranges, finished.__setitem__, counter, run, find_reused)
+    integrate(plan, plan.ranges, finished.__setitem__, counter, run)
     return table_of_ranges(plan, finished.__getitem__), counter
 
 
@@ -318,7 +314,6 @@ def complete_ranges(
     ranges: Sequence[TrajectoryRange],
     counter: ProgressCounter,
     run: Run,
-    find_reused: FindReused = reuse_nothing,
 ) -> None:
     """Integrate the ranges that a work folder does not have yet."""
     todo: list[TrajectoryRange] = []
@@ -333,7 +328,7 @@ def complete_ranges(
         else:
             counter.count(trajectory_range, stored)
     counter.report()
-    integrate(plan, todo, work_folder.store, counter, run, find_reused)
+    integrate(plan, todo, work_folder.store, counter, run)
 
 
 def integrate(
@@ -342,10 +337,9 @@ def integrate(
     store: Callable[[TrajectoryRange, Record], None],
     counter: ProgressCounter,
     run: Run,
-    find_reused: FindReused = reuse_nothing,
 ) -> None:
     """Integrate ranges, and store and count each; an `UnfinishedError` if some are missing in the end."""
-    for trajectory_range, collisions in integrate_ranges(plan, ranges, run, find_reused):
+    for trajectory_range, collisions in integrate_ranges(plan, ranges, run):
         store(trajectory_range, collisions)
         counter.count(trajectory_range, collisions)
         counter.report()
