@@ -29,11 +29,11 @@ def index_of(cells: NDArray[np.integer], shape: Sequence[int]) -> Index:
     return np.unravel_index(cells, shape) if shape else ()
 
 
-class StoredStiffness(NamedTuple):
-    """K [N/m^n] of a law as a file stores it: the axes on which it depends, and its values over them."""
+class Column(NamedTuple):
+    """An input: the axes along which it varies, none for a scalar, and its values over them."""
 
     axes: tuple[int, ...]
-    values: NDArray[np.float64]
+    values: NDArray[np.generic]
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class Inputs:
     scalars: Mapping[str, float | str]
     axes: tuple[Axis, ...]
     materials: Mapping[str, Material]
-    stiffness: Mapping[str, StoredStiffness] = field(default_factory=dict)
+    stiffness: Mapping[str, Column] = field(default_factory=dict)
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -68,35 +68,25 @@ class Inputs:
 
     def names(self) -> tuple[str, ...]:
         """List all config names that have a value, those of axes first."""
-        return (*(name for axis in self.axes for name in axis.columns), *self.scalars, *self.stiffness)
+        return tuple(self._columns)
 
     def axes_of(self, name: str) -> tuple[int, ...]:
         """List the axes along which a name varies: none for a scalar."""
-        if name in self.stiffness:
-            return self.stiffness[name].axes
-        return tuple(number for number, axis in enumerate(self.axes) if name in axis.columns)
+        return self._columns[name].axes if name in self._columns else ()
 
     def column(self, name: str, index: Index) -> NDArray[np.generic]:
         """Look up the values of a name at cells; of length 1 along the axes on which it does not vary."""
-        if name in self.scalars:
-            return np.full((1,) * dimensions(index), self.scalars[name])
-        if name in self.stiffness:
-            axes, K = self.stiffness[name]
-            at_cells = K[tuple(index[axis] for axis in axes)]
-            return at_cells if axes else at_cells.reshape((1,) * dimensions(index))
-        (number,) = self.axes_of(name)
-        return self._arrays[name][index[number]]
+        axes, values = self._columns[name]
+        at_cells = values[tuple(index[axis] for axis in axes)]
+        return at_cells if axes else at_cells.reshape((1,) * dimensions(index))
 
     def values(self, name: str) -> NDArray[np.generic]:
         """Look up all values of a name: those of its axis, or a single one, None for a name without a value."""
-        if name in self._arrays:
-            return self._arrays[name]
-        if name in self.stiffness:
-            return self.stiffness[name].values
+        if name in self._columns:
+            return self._columns[name].values
         parsed = InputName.parse(name)
         material = self.materials.get(parsed.material)
-        constant = getattr(material, parsed.key) if material is not None else None
-        return np.asarray(self.scalars.get(name, constant))
+        return np.asarray(None if material is None else getattr(material, parsed.key))
 
     def materials_of(self, ball: str) -> frozenset[str]:
         """List the materials that a ball, "1" or "2", has in any cell."""
@@ -108,8 +98,14 @@ class Inputs:
         return np.ix_(*(np.arange(size)[cells] for size, cells in zip(self.shape, slices, strict=True)))
 
     @cached_property
-    def _arrays(self) -> dict[str, NDArray[np.generic]]:
-        return {name: np.asarray(values) for axis in self.axes for name, values in axis.columns.items()}
+    def _columns(self) -> dict[str, Column]:
+        columns = {
+            name: Column((number,), np.asarray(values))
+            for number, axis in enumerate(self.axes)
+            for name, values in axis.columns.items()
+        }
+        scalars = {name: Column((), np.asarray(value)) for name, value in self.scalars.items()}
+        return {**columns, **scalars, **self.stiffness}
 
     @cached_property
     def _ball_materials(self) -> dict[str, frozenset[str]]:

@@ -30,7 +30,7 @@ from ..contact.status import FRICTION_STATUSES, STATUSES, Status
 from ..contact.tangential import TangentialResult
 from ..contact.variables import OUTPUTS, Variable
 from ..engine.build_impacts import has_stiffness_rule, mass_at, radius_at, values_at, velocity_at
-from ..engine.inputs import Inputs, StoredStiffness, index_of
+from ..engine.inputs import Column, Inputs, index_of
 from ..engine.trajectories import TrajectoryMap
 from ..errors import ResultError, UsageError
 from ..formatting import number, safe_text
@@ -273,7 +273,7 @@ def _stored_maps(
     return maps
 
 
-def _read_stiffness(inputs: Inputs, laws: Mapping[str, LawRecord], parts: ReadParts) -> dict[str, StoredStiffness]:
+def _read_stiffness(inputs: Inputs, laws: Mapping[str, LawRecord], parts: ReadParts) -> dict[str, Column]:
     """Read K of each law with a rule for it, over the axes that it depends on; see `Inputs`."""
     axes = {
         f"{key}.K": _axis_numbers(inputs, law.stiffness_axes)
@@ -283,7 +283,7 @@ def _read_stiffness(inputs: Inputs, laws: Mapping[str, LawRecord], parts: ReadPa
     shapes = [tuple(inputs.shape[axis] for axis in numbers) for numbers in axes.values()]
     values = parts("law_stiffness", [math.prod(shape) for shape in shapes])
     return {
-        name: StoredStiffness(numbers, np.reshape(K, shape))
+        name: Column(numbers, np.reshape(K, shape))
         for (name, numbers), shape, K in zip(axes.items(), shapes, values, strict=True)
     }
 
