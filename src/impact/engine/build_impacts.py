@@ -11,7 +11,7 @@ from ..array_types import Array
 from ..contact.formula_calls import argument_names, call_by_name
 from ..contact.friction import FrictionLaw
 from ..contact.impacts import Impacts, stiffness as hertz_or_secant
-from ..contact.materials import effective_mass, hertz_stiffness, rayleigh_time, sphere_mass, sphere_radius
+from ..contact.materials import hertz_stiffness, rayleigh_time, sphere_mass, sphere_radius
 from ..contact.model import Law
 from ..contact.rigid import ObliqueImpacts
 from ..contact.simulate import PHASE, STEP, STEPS_PER_CONTACT
@@ -32,42 +32,22 @@ def build_impacts(inputs: Inputs, model: Law, index: Index) -> Impacts:
     missing = np.full((1,) * dimensions(index), np.nan)
 
     def value(name: str) -> Array:
-        return values_at(inputs, name, index)
+        return input_at(inputs, name, index)
 
-    def of_material(ball: str, key: str) -> Array:
-        return property_at(inputs, ball, key, index)
-
-    v1, v2 = (velocity_at(inputs, ball, index) for ball in "12")
-    m1, m2 = (mass_at(inputs, ball, index) for ball in "12")
-    E1, E2, nu1, nu2 = (of_material(ball, key) for key in ("E", "nu") for ball in "12")
-    R1, R2 = (radius_at(inputs, ball, index) for ball in "12")
+    balls = {f"{name}{ball}": value(f"{name}{ball}") for name in "vmR" for ball in "12"}
+    properties = ("E", "nu", "yield_strength")
+    materials = {f"{key}{ball}": property_at(inputs, ball, key, index) for key in properties for ball in "12"}
     n = value("n") if model.exponent is None else np.full_like(missing, model.exponent)
+    parameters = {parameter.name: value(f"{model.key}.{parameter.name}") for parameter in model.parameters}
     with np.errstate(all="ignore"):
+        impacts = Impacts(e=value("e"), K=missing, n=n, parameters=parameters, **balls, **materials)
         stiffness_name = f"{model.key}.K"
         if stiffness_name in names or "K" in names:
             K = value(stiffness_name if stiffness_name in names else "K")
         else:
-            K = hertz_or_secant(n, hertz_stiffness(E1, nu1, E2, nu2, R1, R2), effective_mass(m1, m2), v1 - v2)
-        e = restitution_at(inputs, index)
-    parameters = {parameter.name: value(f"{model.key}.{parameter.name}") for parameter in model.parameters}
-    impacts = Impacts(
-        e=e,
-        v1=v1,
-        v2=v2,
-        m1=m1,
-        m2=m2,
-        K=K,
-        n=n,
-        R1=R1,
-        R2=R2,
-        E1=E1,
-        nu1=nu1,
-        E2=E2,
-        nu2=nu2,
-        yield_strength1=of_material("1", "yield_strength"),
-        yield_strength2=of_material("2", "yield_strength"),
-        parameters=parameters,
-    )
+            hertz = hertz_stiffness(impacts.E1, impacts.nu1, impacts.E2, impacts.nu2, impacts.R1, impacts.R2)
+            K = hertz_or_secant(n, hertz, impacts.m, impacts.v0)
+    impacts = replace(impacts, K=K)
     if not has_stiffness_rule(inputs, model):
         return impacts
     assert model.stiffness is not None
@@ -88,7 +68,7 @@ def build_oblique(
     """Build the tangential inputs of impacts at cells, with the parameters of a friction law."""
 
     def value(name: str) -> Array:
-        return values_at(inputs, name, index)
+        return input_at(inputs, name, index)
 
     u1, u2, tangent = (value(name) for name in ("u1", "u2", "angle"))
     if "angle" in inputs.names():
@@ -99,11 +79,7 @@ def build_oblique(
         impacts=impacts,
         u1=u1,
         u2=u2,
-        omega1=value("omega1"),
-        omega2=value("omega2"),
-        inertia_factor1=value("inertia_factor1"),
-        inertia_factor2=value("inertia_factor2"),
-        mu=value("mu"),
+        **{name: value(name) for name in ("omega1", "omega2", "inertia_factor1", "inertia_factor2", "mu")},
         tangent=tangent if "angle" in inputs.names() else None,
         parameters={}
         if friction is None
@@ -116,27 +92,44 @@ def fixed_steps_at(inputs: Inputs, impacts: Impacts, index: Index) -> dict[str, 
     names = inputs.names()
     if "phase" not in names:
         return {}
-    phase = {PHASE: values_at(inputs, "phase", index)}
+    phase = {PHASE: input_at(inputs, "phase", index)}
     if "dt" not in names:
-        return {STEPS_PER_CONTACT: values_at(inputs, "steps_per_contact", index), **phase}
+        return {STEPS_PER_CONTACT: input_at(inputs, "steps_per_contact", index), **phase}
     with np.errstate(all="ignore"):
-        return {STEP: values_at(inputs, "dt", index) / impacts.time, **phase}
+        return {STEP: input_at(inputs, "dt", index) / impacts.time, **phase}
 
 
-def values_at(inputs: Inputs, name: str, index: Index) -> Array:
-    """Look up the numbers of a config name at cells; NaN for a name without a value."""
-    if name not in inputs.names():
-        return np.full((1,) * dimensions(index), np.nan)
-    return np.asarray(inputs.column(name, index), float)
+def input_at(inputs: Inputs, name: str, index: Index) -> Array:
+    """Look up the numbers of an input at cells; one without values follows from others, or is NaN.
 
+    With a speed, v1 = v2 + speed cos(angle) [m/s]. A mass [kg] or a radius [m] is that of a sphere of the other
+    one and the density of its material. With alpha, e = 1 - alpha (v1 - v2), equation (24).
 
-def velocity_at(inputs: Inputs, ball: str, index: Index) -> Array:
-    """Look up the normal velocity of a ball at cells [m/s]; with a speed, v1 = v2 + speed cos(angle)."""
-    velocity = values_at(inputs, f"v{ball}", index)
-    if ball == "2" or "speed" not in inputs.names():
-        return velocity
-    angle = values_at(inputs, "angle", index) if "angle" in inputs.names() else np.zeros_like(velocity)
-    return velocity_at(inputs, "2", index) + values_at(inputs, "speed", index) * np.cos(angle)
+    Raises
+    ------
+    ModelError : the config has neither the mass nor a radius and density to derive it from
+    """
+    names, ball = inputs.names(), name[-1]
+
+    def value(other: str) -> Array:
+        return input_at(inputs, other, index)
+
+    if name == "v1" and "speed" in names:
+        return value("v2") + value("speed") * (np.cos(value("angle")) if "angle" in names else 1.0)
+    if name in names:
+        return np.asarray(inputs.column(name, index), float)
+    if name == "e":
+        return 1.0 - value("alpha") * (value("v1") - value("v2"))
+    if name in ("R1", "R2"):
+        return sphere_radius(value(f"m{ball}"), property_at(inputs, ball, "rho", index))
+    unknown = np.full((1,) * dimensions(index), np.nan)
+    if name not in ("m1", "m2"):
+        return unknown
+    radius = value(f"R{ball}") if f"R{ball}" in names else unknown
+    mass = sphere_mass(radius, property_at(inputs, ball, "rho", index))
+    if np.isnan(mass).any():
+        raise ModelError(f"{name}: missing, expected {name}, or R{ball} and the density rho of its material")
+    return mass
 
 
 def property_at(inputs: Inputs, ball: str, key: str, index: Index) -> Array:
@@ -153,56 +146,25 @@ def property_at(inputs: Inputs, ball: str, key: str, index: Index) -> Array:
         column = f"materials.{material}.{key}"
         # also where no cell has the material: the shape shows along which axes the property of the ball varies
         if column in names:
-            values = np.where(material_of_cell == material, values_at(inputs, column, index), values)
+            values = np.where(material_of_cell == material, input_at(inputs, column, index), values)
     return values
-
-
-def mass_at(inputs: Inputs, ball: str, index: Index) -> Array:
-    """Compute the mass of a ball at cells [kg]; if the config has none, that of a sphere of its radius.
-
-    Raises
-    ------
-    ModelError : the config has neither the mass nor a radius and density to derive it from
-    """
-    if f"m{ball}" in inputs.names():
-        return values_at(inputs, f"m{ball}", index)
-    mass = sphere_mass(values_at(inputs, f"R{ball}", index), property_at(inputs, ball, "rho", index))
-    if np.isnan(mass).any():
-        raise ModelError(f"m{ball}: missing, expected m{ball}, or R{ball} and the density rho of its material")
-    return mass
-
-
-def radius_at(inputs: Inputs, ball: str, index: Index) -> Array:
-    """Compute the radius of a ball at cells [m]; if the config has none, that of a sphere of its mass."""
-    if f"R{ball}" in inputs.names():
-        return values_at(inputs, f"R{ball}", index)
-    return sphere_radius(mass_at(inputs, ball, index), property_at(inputs, ball, "rho", index))
 
 
 def smaller_radius_at(inputs: Inputs, index: Index) -> Array:
     """Compute the radius of the smaller ball at cells [m]; NaN where it is unknown."""
-    return np.fmin(*(radius_at(inputs, ball, index) for ball in "12"))
+    return np.fmin(input_at(inputs, "R1", index), input_at(inputs, "R2", index))
 
 
 def rayleigh_time_at(inputs: Inputs, index: Index) -> Array:
     """Compute the smaller Rayleigh time of the two balls at cells [s]; NaN where none is known."""
     times = []
     for ball in "12":
-        mass = mass_at(inputs, ball, index)
-        radius = radius_at(inputs, ball, index)
+        mass, radius = (input_at(inputs, f"{name}{ball}", index) for name in "mR")
         with np.errstate(invalid="ignore"):
             density = mass / sphere_mass(radius, np.ones(1))
         E, nu = (property_at(inputs, ball, key, index) for key in ("E", "nu"))
         times.append(rayleigh_time(radius, density, E, nu))
     return np.fmin(*times)
-
-
-def restitution_at(inputs: Inputs, index: Index) -> Array:
-    """Compute the requested restitution at cells: e, or e = 1 - alpha (v1 - v2), equation (24)."""
-    if "e" in inputs.names():
-        return values_at(inputs, "e", index)
-    speed = velocity_at(inputs, "1", index) - velocity_at(inputs, "2", index)
-    return 1.0 - values_at(inputs, "alpha", index) * speed
 
 
 def has_stiffness_rule(inputs: Inputs, model: Law) -> bool:

@@ -24,7 +24,7 @@ from ..config.grid import SAMPLE, Axis
 from ..config.input_names import InputName
 from ..contact.status import FIRST_FAILURE
 from ..contact.variables import OUTPUTS
-from ..engine.build_impacts import build_impacts, mass_at, restitution_at, velocity_at
+from ..engine.build_impacts import build_impacts, input_at
 from ..engine.inputs import Inputs
 from ..errors import UsageError
 from ..formatting import argument, with_year
@@ -40,8 +40,8 @@ from .report import check_page_path, page_title, template
 SHOWN = ("e_out", "e_error", "v1_post", "v2_post", "v1_error", "v2_error", "peak_force", "contact_time")
 # columns of a trajectory, in the contact's own units, by the names of the outputs that follow from them
 TRAJECTORY = {"e_out": "e_out", "peak_force": "force", "contact_time": "contact_time", "status": "status"}
-# inputs of each ball
-OF_BALLS = {"v": velocity_at, "m": mass_at}
+# inputs that the outputs depend on besides the trajectory
+INPUTS = ("v1", "v2", "m1", "m2", "e")
 MAX_BYTES = 10_000_000
 VALUE_BYTES = 8
 # pixels of a line of one point of the plots
@@ -114,7 +114,7 @@ def _page_of(dataset: xr.Dataset, models: Sequence[str] | None) -> str:
         "first_failure": FIRST_FAILURE,
         "first_axis": _first_axis(axes),
         "axes": axes,
-        "inputs": {name: _array(values) for name, values in _inputs(inputs).items()},
+        "inputs": {name: _array(input_at(inputs, name, inputs.index())) for name in INPUTS},
         "outputs": [_output(name) for name in SHOWN if name in dataset],
         "laws": laws,
     }
@@ -204,13 +204,6 @@ def _stored_values(dataset: xr.Dataset, inputs: Inputs) -> Iterator[dict[str, An
                 for name, array in values.items()
             },
         }
-
-
-def _inputs(inputs: Inputs) -> dict[str, Array]:
-    """What the outputs depend on besides the trajectory, of length 1 along axes on which it does not depend."""
-    index = inputs.index()
-    of_balls = {f"{name}{ball}": at(inputs, ball, index) for name, at in OF_BALLS.items() for ball in "12"}
-    return {**of_balls, "e": restitution_at(inputs, index)}
 
 
 def _array(values: Array) -> dict[str, Any]:

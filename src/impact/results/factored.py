@@ -29,7 +29,7 @@ from ..contact.slip_motion import FrictionKind
 from ..contact.status import FRICTION_STATUSES, STATUSES, Status
 from ..contact.tangential import TangentialResult
 from ..contact.variables import OUTPUTS, Variable
-from ..engine.build_impacts import has_stiffness_rule, mass_at, radius_at, values_at, velocity_at
+from ..engine.build_impacts import has_stiffness_rule, input_at
 from ..engine.inputs import Column, Inputs, index_of
 from ..engine.trajectories import TrajectoryMap
 from ..errors import ResultError, UsageError
@@ -379,11 +379,10 @@ def _check_witnesses_at(
     expanded = witness_values(table, variables, indices)
     cells = indices % table.inputs.cells
     index = index_of(cells, table.inputs.shape)
-    inputs = {name: values_at(table.inputs, name, index) for name in table.inputs.names() if name in SLIP_INPUTS}
-    inputs |= {f"v{ball}": velocity_at(table.inputs, ball, index) for ball in "12"}
-    inputs |= {f"m{ball}": mass_at(table.inputs, ball, index) for ball in "12"}
+    names = {"v1", "v2", "m1", "m2"}.union({*SLIP_INPUTS}.intersection(table.inputs.names()))
     if any(variable.of_friction for variable in variables):
-        inputs |= {f"R{ball}": radius_at(table.inputs, ball, index) for ball in "12"}
+        names |= {"R1", "R2"}
+    inputs = {name: input_at(table.inputs, name, index) for name in names}
     for variable in variables:
         expected, got = stored[f"witness_{variable.name}"].values, expanded[variable.name]
         columns = {**inputs, variable.name: expected}

@@ -10,7 +10,7 @@ import xarray as xr
 
 from ..contact.materials import sphere_mass
 from ..contact.status import Status
-from ..engine.build_impacts import property_at, smaller_radius_at, values_at
+from ..engine.build_impacts import input_at, property_at, smaller_radius_at
 from ..engine.inputs import Inputs
 from ..engine.trajectories import axes_of_arrays, probe_index
 from ..errors import ModelError, ResultError
@@ -53,7 +53,7 @@ def input_notes(inputs: Inputs) -> Iterator[str]:
 def _mass_notes(inputs: Inputs, ball: str) -> Iterator[str]:
     """Say that the mass of a ball is not that of a sphere of its radius and density, where all three are given."""
     index = probe_index(inputs)
-    mass, radius = (values_at(inputs, f"{name}{ball}", index) for name in "mR")
+    mass, radius = (input_at(inputs, f"{name}{ball}", index) for name in "mR")
     stated, R, density = np.broadcast_arrays(mass, radius, property_at(inputs, ball, "rho", index))
     expected = sphere_mass(R, density)
     # an infinite mass is a ball that is held; without a density that of a sphere is NaN, and contradicts none

@@ -24,8 +24,7 @@ from ..config.tables import MATERIAL_KEYS
 from ..contact.fixed_step import EXACT
 from ..contact.materials import effective_mass
 from ..contact.variables import AXES, HISTORY, LAW_DIMS, OUTPUTS, Variable, by_name, default_variables
-from ..engine.build_impacts import mass_at, radius_at, restitution_at, velocity_at
-from ..engine.inputs import Index
+from ..engine.build_impacts import input_at
 from ..engine.plan import Plan
 from ..formatting import number
 from .kinds import Kind
@@ -311,29 +310,29 @@ def plan_coordinates(plan: Plan) -> xr.Coordinates:
     coordinates["exponent"] = (*_exponents(plan), {"units": "1", "long_name": "compliance exponent n"})
     names = plan.inputs.names()
 
-    def derive(name: str, sources: Sequence[str], formula: Callable[[Index], Array], **attributes: str) -> None:
+    def derive(name: str, sources: Sequence[str], **attributes: str) -> None:
         """Add a coordinate that follows from inputs, along their axes."""
         axes = sorted({axis for source in sources for axis in plan.inputs.axes_of(source)})
         region = [slice(None) if axis in axes else slice(1) for axis in range(len(plan.shape))]
-        values = formula(plan.inputs.index(region)).reshape([plan.shape[axis] for axis in axes])
+        values = input_at(plan.inputs, name, plan.inputs.index(region))
         dims = tuple(plan.config.axes[axis].name for axis in axes)
-        coordinates[name] = (dims, values, {**coordinate_attributes(plan, name), **attributes})
+        array = values.reshape([plan.shape[axis] for axis in axes])
+        coordinates[name] = (dims, array, {**coordinate_attributes(plan, name), **attributes})
 
     if "alpha" in names:
         sources = ("alpha", *(("speed", "angle") if "speed" in names else ("v1",)), "v2")
         texts = {"long_name": "requested restitution", "equation": "e = 1 - alpha (v1 - v2)  (24)"}
-        derive("e", sources, partial(restitution_at, plan.inputs), **texts)
+        derive("e", sources, **texts)
     for ball in "12":
         densities = (f"materials.{name}.rho" for name in plan.inputs.materials_of(ball))
         material = ("material", f"material{ball}", *densities)
         equation = "m = (4/3) pi R^3 rho"
         if f"m{ball}" not in names:
-            derive(f"m{ball}", (f"R{ball}", *material), partial(mass_at, plan.inputs, ball), equation=equation)
+            derive(f"m{ball}", (f"R{ball}", *material), equation=equation)
         elif plan.frictions and f"R{ball}" not in names:
-            derive(f"R{ball}", (f"m{ball}", *material), partial(radius_at, plan.inputs, ball), equation=equation)
+            derive(f"R{ball}", (f"m{ball}", *material), equation=equation)
     if "speed" in names:
-        velocity = partial(velocity_at, plan.inputs, "1")
-        derive("v1", ("speed", "angle", "v2"), velocity, equation="v1 = v2 + speed cos(angle)")
+        derive("v1", ("speed", "angle", "v2"), equation="v1 = v2 + speed cos(angle)")
     return xr.Coordinates(coordinates, indexes={})
 
 
