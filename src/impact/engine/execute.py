@@ -23,7 +23,7 @@ from ..contact.frictions import find_friction
 from ..contact.model import ForceModel
 from ..contact.models import catalogue
 from ..contact.numba.dispatch import is_installed
-from ..contact.records import Record
+from ..contact.records import Record, positions
 from ..contact.simulate import simulate
 from ..contact.status import FRICTION_STATUSES, STATUSES
 from ..contact.tangential import TangentialResult, simulate_friction
@@ -159,7 +159,7 @@ def _submit_and_collect(
             limit = capacity()
             while remaining and len(running) < limit and not should_stop():
                 trajectory_range, reused = remaining[0], plan.reused(remaining[0])
-                if reused is not None and reused[0].all():
+                if reused[0].all():
                     remaining.popleft()
                     yield trajectory_range, (reused[1], {})
                     continue
@@ -172,17 +172,14 @@ def _submit_and_collect(
                 # no worker has joined yet
                 time.sleep(POLL_INTERVAL_S if remaining else 0.0)
             for future in wait(running, POLL_INTERVAL_S, FIRST_COMPLETED).done:
-                (trajectory_range, reused), integrated = running[future], future.result()
-                size = trajectory_range.size if reused is None else int(np.count_nonzero(~reused[0]))
-                _check_integrated(trajectory_range, integrated, size)
+                (trajectory_range, (is_reused, reused_part)), integrated = running[future], future.result()
+                _check_integrated(trajectory_range, integrated, int(np.count_nonzero(~is_reused)))
                 del running[future]
                 collisions, errors = integrated
-                if reused is not None:
-                    is_reused, values = reused
-                    values = values.take(np.arange(trajectory_range.size))
-                    values.put(~is_reused, collisions)
-                    collisions = values
-                yield trajectory_range, (collisions, errors)
+                whole = trajectory_range.record.blank(trajectory_range.size)
+                whole.put(~is_reused, collisions)
+                whole.put(is_reused, reused_part)
+                yield trajectory_range, (whole, errors)
     finally:
         for future in running:
             future.cancel()
@@ -228,9 +225,8 @@ def _build_submit(
 
     def submit(executor: Executor, trajectory_range: TrajectoryRange, reused: ReusedPart) -> Future[Integrated]:
         # the arguments are built here, so that waiting ranges take no memory
-        columns = plan.columns_of(trajectory_range)
-        if reused is not None:
-            columns = {name: values[~reused[0]] for name, values in columns.items()}
+        rows = positions(~reused[0])
+        columns = {name: values[rows] for name, values in plan.columns_of(trajectory_range).items()}
         law = plan.laws[trajectory_range.model]
         if spec.shares_memory:
             return executor.submit(integrate_columns, law, columns, context.solver)

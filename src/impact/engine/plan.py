@@ -124,7 +124,7 @@ class Plan:
 
     def reused(self, trajectory_range: TrajectoryRange) -> ReusedPart:
         """Find the trajectories of a range that are not integrated; see `impact.results.extend.ExtendedPlan`."""
-        return None
+        return np.zeros(trajectory_range.size, bool), trajectory_range.record.blank(0)
 
     def check_count(self, most: int, name: str) -> None:
         """Refuse too many trajectories before any array is allocated; `name` is that of the config."""

@@ -36,8 +36,8 @@ RANGE_TRAJECTORIES = 32768
 Columns = dict[str, NDArray[Any]]
 # what a trajectory is of: a model, or its pair with a friction law
 PlanLaw = ForceModel | Pair
-# a mask of the trajectories of a range that are reused from another result, and their results; None for no reuse
-ReusedPart = tuple[NDArray[np.bool_], Record] | None
+# a mask of the trajectories of a range that are reused from another result, and the results of these
+ReusedPart = tuple[NDArray[np.bool_], Record]
 
 
 @dataclass(frozen=True)

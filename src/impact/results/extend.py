@@ -322,20 +322,17 @@ class ExtendedPlan(Plan):
 
     def reused(self, trajectory_range: TrajectoryRange) -> ReusedPart:
         """Find the trajectories of a range that the old result has, or that only points need which it has."""
-        reused = None
-        if self.table is not None:
-            reused = self._from_table(trajectory_range, self.table)
-        elif self.layout == "full":
+        reused = super().reused(trajectory_range)
+        law = self.old_law(trajectory_range.model)
+        if self.table is not None and law is not None:
+            reused = self._from_table(trajectory_range, self.table, law)
+        elif self.table is None and self.layout == "full":
             reused = self._not_needed(trajectory_range)
-        count = 0 if reused is None else int(np.count_nonzero(reused[0]))
-        self.integrated[trajectory_range.number] = trajectory_range.size - count
+        self.integrated[trajectory_range.number] = int(np.count_nonzero(~reused[0]))
         return reused
 
-    def _from_table(self, trajectory_range: TrajectoryRange, table: TrajectoryTable) -> ReusedPart:
-        """Take the trajectories of a range that the old result has in its table."""
-        law = self.old_law(trajectory_range.model)
-        if law is None:
-            return None
+    def _from_table(self, trajectory_range: TrajectoryRange, table: TrajectoryTable, law: int) -> ReusedPart:
+        """Take the trajectories of a range that the old result has in its table, of a law by its number there."""
         old_rows = self._old_rows(trajectory_range, table.maps[law])
         is_known = old_rows >= 0
         stored = table.rows.take(law, np.maximum(old_rows, 0))
@@ -344,9 +341,7 @@ class ExtendedPlan(Plan):
         is_known &= np.where(
             status == STATUS_OK, ~np.isin(stored.status, CHECKED_STATUSES), stored.status == status
         )
-        collisions = trajectory_range.record.blank(trajectory_range.size)
-        collisions.put(np.flatnonzero(is_known), stored.take(np.flatnonzero(is_known)))
-        return is_known, collisions
+        return is_known, stored.take(np.flatnonzero(is_known))
 
     def _not_needed(self, trajectory_range: TrajectoryRange) -> ReusedPart:
         """Mark the trajectories of a range that only points need which the old result holds in full."""
@@ -354,14 +349,14 @@ class ExtendedPlan(Plan):
         others = [axis for axis in range(len(self.positions)) if axis not in trajectory_map.axes]
         is_new_along = [(self.positions[axis].positions < 0).any() for axis in others]
         if self._has_new_law(trajectory_range.model) or any(is_new_along):
-            return None
+            return super().reused(trajectory_range)
         if trajectory_map.of_cell is None:
             is_old = self._is_old(trajectory_map, trajectory_range.rows)
         else:
             needed = np.zeros(trajectory_map.count, bool)
             needed[trajectory_map.of_cell[~self._is_old(trajectory_map, np.arange(trajectory_map.cells))]] = True
             is_old = ~needed[trajectory_range.rows]
-        return is_old, trajectory_range.record.blank(trajectory_range.size)
+        return is_old, trajectory_range.record.blank(int(np.count_nonzero(is_old)))
 
     def _has_new_law(self, number: int) -> bool:
         """Whether a model or a pair, or a pair of the model, is not in the old sweep."""
