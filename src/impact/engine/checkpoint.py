@@ -101,10 +101,10 @@ def remove_stale_work_folder(output: Path, plan: Plan) -> None:
         if folder.is_dir():
             _check_is_work_folder(folder)
             with FileLock(folder / LOCK_FILE, timeout=0):
-                has_plan = os.path.lexists(folder / PLAN_FILE)
-                if not has_plan or _can_resume(folder, _sweep_record(plan), resume=True):
-                    partial_file_of(output).unlink(missing_ok=True)
-                    remove_work_folder(folder)
+                if os.path.lexists(folder / PLAN_FILE):
+                    _check_same_sweep(folder, _sweep_record(plan))
+                partial_file_of(output).unlink(missing_ok=True)
+                remove_work_folder(folder)
 
 
 def _check_is_work_folder(folder: Path) -> None:
@@ -153,7 +153,9 @@ def _prepare_folder(folder: Path, record: Mapping[str, Any], run: Run) -> None:
                 f"{folder}: is left of an interrupted sweep; use {argument('resume', True)} to continue or "
                 f"{argument('overwrite', True)} to start again"
             )
-        if has_leftovers and _can_resume(folder, record, resume=run.resume):
+        # without a plan, the sweep was interrupted before its first range
+        if run.resume and os.path.lexists(folder / PLAN_FILE):
+            _check_same_sweep(folder, record)
             return
         _remove_files(folder)
         # after a power cut, removed ranges must not reappear next to the new plan
@@ -188,16 +190,12 @@ def _remove_files(folder: Path, plan: bool = False) -> None:
         path.unlink(missing_ok=True)
 
 
-def _can_resume(folder: Path, record: Mapping[str, Any], *, resume: bool) -> bool:
-    """Whether the ranges of a folder can be resumed; a `UsageError` if they shall be, and are of another sweep."""
-    if not resume or not os.path.lexists(folder / PLAN_FILE):
-        # without a plan, the sweep was interrupted before its first range
-        return False
+def _check_same_sweep(folder: Path, record: Mapping[str, Any]) -> None:
+    """Raise a `UsageError` if the ranges of a folder are of another sweep."""
     difference = _difference_from(folder, record)
     if difference:
         hint = f"give the sweep that it is of, another output, or {argument('overwrite', True)} to start again"
         raise UsageError(f"{folder}: {difference}; {hint}")
-    return True
 
 
 def _difference_from(folder: Path, record: Mapping[str, Any]) -> str | None:
