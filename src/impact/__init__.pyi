@@ -16,12 +16,14 @@ from .contact.friction import FrictionLaw as FrictionLaw
 from .contact.model import ForceModel as ForceModel, Parameter as Parameter
 from .contact.models.hysteresis import hysteresis as hysteresis
 from .contact.powers import power as power
-from .engine.friction_catalogue import (
+from .engine.law_catalogue import (
     FrictionDescription as FrictionDescription,
     Frictions as Frictions,
+    ModelDescription as ModelDescription,
+    Models as Models,
     frictions as frictions,
+    models as models,
 )
-from .engine.model_catalogue import ModelDescription as ModelDescription, Models as Models, models as models
 from .engine.run import Progress as Progress
 from .errors import (
     ConfigError as ConfigError,

@@ -18,8 +18,7 @@ from .completion import complete_family, complete_model
 
 if TYPE_CHECKING:
     from ..contact.model import ForceModel
-    from ..engine.friction_catalogue import Frictions
-    from ..engine.model_catalogue import Models
+    from ..engine.law_catalogue import Frictions, Models
 
 # units of the properties of a material in a table
 DISPLAY_UNITS = {"E": "GPa", "nu": "-", "rho": "kg/m3", "yield_strength": "MPa"}

@@ -16,7 +16,7 @@ from ..contact.friction import FrictionLaw
 from ..contact.frictions import frictions
 from ..contact.model import ForceModel
 from ..display import LATEX_CHARACTERS, Block, Displayed
-from ..engine.model_catalogue import models
+from ..engine.law_catalogue import models
 from ..errors import UsageError
 from ..formatting import law_keys
 from .selection import chosen_laws

@@ -13,8 +13,7 @@ import xarray as xr
 from ..contact.friction import FrictionLaw
 from ..contact.model import ForceModel
 from ..display import Block, Displayed, Table
-from ..engine.friction_catalogue import FrictionDescription
-from ..engine.model_catalogue import ModelDescription
+from ..engine.law_catalogue import FrictionDescription, ModelDescription
 from ..errors import UsageError
 from . import calibration, sensitivity
 from .attributes import read_attribute

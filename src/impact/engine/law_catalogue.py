@@ -1,4 +1,4 @@
-"""The catalogue of laws, or a part of it, as a table; one law in full."""
+"""The catalogues of laws and of friction laws, or parts of them, as tables; one law in full."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from ..contact.catalogue import look_up
 from ..contact.dimensionless import delivered
 from ..contact.evidence import count_states
 from ..contact.friction import FrictionLaw
+from ..contact.frictions import frictions as friction_catalogue
 from ..contact.model import ForceModel, Parameter
 from ..contact.models import catalogue
 from ..contact.numba.dispatch import serves
@@ -31,6 +32,25 @@ E_WIDTH, EQUATION_WIDTH, DOMAIN_WIDTH, CORE_WIDTH = 8, 32, 26, 7
 COMPILED_AT = (1.0, 1.5, 2.0, 2.5, 3.0)
 # characters of a text about one model, which may be a plug-in
 MAX_TEXT = 2000
+# what the fields of a friction law mean
+STIFFNESS = {
+    "constant": "k_t or kt_over_kn",
+    "mindlin": "8 G* a of the materials, k_t or kt_over_kn",
+    "liggghts": "8 G* a of the materials (n = 3/2), K (n = 1) or kt_over_kn",
+    "kratos": "4 G*/E* of the materials times that of the contact force",
+    "classic": "k_t a",
+}
+MEMORY = {
+    (0.0, 0.0): "the force",
+    (1.0, 1.0): "the displacement",
+    (0.0, 1.0): "the force, rescaled on unloading",
+    (1.0, 2.0): "the displacement, rescaled on unloading",
+}
+CAPS = {
+    "total": "spring and dashpot together",
+    "spring": "the spring alone, without a dashpot where it slips",
+    "both": "the spring, and spring and dashpot together",
+}
 
 Described = TypeVar("Described", bound=ForceModel | FrictionLaw)
 
@@ -74,14 +94,6 @@ class ModelDescription(Displayed):
         model = self.model
         gap = "the permanent indentation" if model.is_permanent else "zero indentation"
         rows = {
-            "model": model.key,
-            "same law as": model.same_as,
-            "title": with_year(model.title, model.year),
-            "family": model.family,
-            "equation": model.equation,
-            "reference": model.reference,
-            "doi": model.doi,
-            "evidence": str(model.evidence),
             "stated domain": model.domain_text or "not stated",
             "exponent": "the sweep's n" if model.exponent is None else f"n = {number(model.exponent)}, its own",
             "ends at": gap if model.release == "gap" else f"zero force, at {gap} at the latest",
@@ -89,7 +101,47 @@ class ModelDescription(Displayed):
         }
         rows |= parameter_rows(f"[model.{model.key}]", model.parameters)
         rows["delivers"] = ", ".join(f"{decimals(out)} for e = {e}" for e, out in self.delivered.items())
-        yield Table([row for row in rows.items() if row[1]], max_cell=MAX_TEXT)
+        yield _description(model, rows)
+
+
+@dataclass(frozen=True)
+class FrictionDescription(Displayed):
+    """One friction law: its declaration."""
+
+    law: FrictionLaw
+
+    def as_dict(self) -> dict[str, Any]:
+        """The declaration as plain data."""
+        return law_record(self.law, "kind", "memory", "cap", *(["scheme"] if self.law.scheme else []))
+
+    def sections(self, width: int) -> Iterator[Block]:
+        """The declaration, one property per line."""
+        law, is_spring = self.law, self.law.kind == "spring"
+        rows = {
+            "only in": f'solver.integrator = "{law.scheme}"' if law.scheme else "",
+            "stiffness": STIFFNESS.get(law.stiffness, ""),
+            "keeps": MEMORY[law.memory] if is_spring else "",
+            "limited": CAPS[law.cap] if is_spring else "",
+            **parameter_rows(f"[friction.{law.key}]", law.parameters),
+        }
+        yield _description(law, rows)
+
+
+def _description(law: ForceModel | FrictionLaw, more: Mapping[str, str]) -> Table:
+    """Tabulate a law, one property per line, without empty ones: what all laws have, and more."""
+    noun, group = ("model", "family") if isinstance(law, ForceModel) else ("friction law", "kind")
+    rows = {
+        noun: law.key,
+        "same law as": law.same_as,
+        "title": with_year(law.title, law.year),
+        group: getattr(law, group),
+        "equation": law.equation,
+        "reference": law.reference,
+        "doi": law.doi,
+        "evidence": str(law.evidence),
+        **more,
+    }
+    return Table([row for row in rows.items() if row[1]], max_cell=MAX_TEXT)
 
 
 def law_record(law: ForceModel | FrictionLaw, *more_fields: str) -> dict[str, Any]:
@@ -200,6 +252,26 @@ class Models(Laws[ForceModel]):
         return html_of([Table(rows, ("model", "family", "equation", "parameters", "stated domain"))])
 
 
+class Frictions(Laws[FrictionLaw]):
+    """Friction laws by key, which a notebook shows as a table."""
+
+    _noun, _describe = "friction law", FrictionDescription
+
+    def sections(self, width: int) -> Iterator[Block]:
+        """One row for each friction law, and how to read the table."""
+        rows = [
+            (key, law.kind, law.equation, ", ".join(parameter.name for parameter in law.parameters))
+            for key, law in self.items()
+        ]
+        yield Table(rows, ("friction law", "kind", "equation", "parameters"), text=(0, 1, 2, 3), max_cell=MAX_TEXT)
+        yield ""
+        yield Wrapped(
+            "f is the friction, F the contact force, g the slip speed. A friction law is combined with any "
+            "contact force; `impact models KEY --frictions` describes one in full."
+        )
+        yield self._evidence_line
+
+
 def _catalogue_columns(width_left: int) -> tuple[tuple[float, ...], tuple[str, ...]]:
     """Choose the values of e, and the other columns, that a table of the catalogue shows next to the keys.
 
@@ -274,6 +346,31 @@ def models(
         raise UsageError(f'{argument("family")}: no family "{family}"; {did_you_mean(family, families)}')
     candidates = {key: model for key, model in all_models.items() if family in (None, model.family)}
     return Models(matching_laws(candidates, "model", pattern, search))
+
+
+def frictions(*, pattern: str = "*", search: str | None = None) -> Frictions:
+    """The catalogue of friction laws, by key, or a part of it.
+
+    Parameters
+    ----------
+    pattern : pattern of the keys, such as "lammps-*"
+    search : words that all have to occur in the key, title, year, equation, reference or DOI, in any case
+
+    Returns
+    -------
+    Frictions : a mapping of keys to laws (`FrictionLaw`); `print` shows a table
+
+    Raises
+    ------
+    UsageError : no friction law matches the pattern or the words
+
+    >>> import impact
+    >>> impact.frictions()["coulomb-1785"].equation
+    'f = μ N sgn g until g = 0, then 0'
+    >>> list(impact.frictions(pattern="yade-*"))
+    ['yade-cundall-strack', 'yade-mindlin', 'yade-viscoelastic']
+    """
+    return Frictions(matching_laws(friction_catalogue(), "friction law", pattern, search))
 
 
 def matching_laws(
