@@ -120,13 +120,18 @@ def integrate_ranges(
     remaining, attempts = deque(todo), Counter[int]()
     reported: set[str] = set()
     with run.executor as spec:
-        submit = _build_submit(plan, spec)
+        values = [plugin.model.key for plugin in plan.plugins.items if plugin.is_value]
+        if values and not spec.shares_memory:
+            raise UsageError(
+                f"{', '.join(values)} is given as a Python value, which cannot be sent to other "
+                "processes; expected the file that it is in, or jobs=1"
+            )
         while True:
             running: Running = {}
             try:
                 with spec.start() as executor:
                     for trajectory_range, (collisions, errors) in _submit_and_collect(
-                        plan, partial(submit, executor), remaining, running, spec.capacity, run.should_stop
+                        plan, spec, executor, remaining, running, run.should_stop
                     ):
                         warn(*(errors[error] for error in errors.keys() - reported))
                         reported |= errors.keys()
@@ -146,24 +151,25 @@ def integrate_ranges(
 
 def _submit_and_collect(
     plan: Plan,
-    submit: Callable[[TrajectoryRange, ReusedPart], Future[Integrated]],
+    spec: ExecutorSpec,
+    executor: Executor,
     remaining: deque[TrajectoryRange],
     running: Running,
-    capacity: Callable[[], int],
     should_stop: Callable[[], bool],
 ) -> Iterator[tuple[TrajectoryRange, Integrated]]:
     """Submit the remaining ranges, as many at a time as the executor takes, and yield each when it is finished."""
     try:
         while remaining or running:
             # called in every round, even if no range remains: it raises if the workers cannot be reached any more
-            limit = capacity()
+            limit = spec.capacity()
             while remaining and len(running) < limit and not should_stop():
                 trajectory_range, reused = remaining[0], plan.reused(remaining[0])
                 if reused[0].all():
                     remaining.popleft()
                     yield trajectory_range, (reused[1], {})
                     continue
-                running[submit(trajectory_range, reused)] = trajectory_range, reused
+                future = _submit(plan, spec, executor, trajectory_range, reused)
+                running[future] = trajectory_range, reused
                 remaining.popleft()
             # ranges already started are finished, unless no worker is left
             if should_stop() and not (running and limit):
@@ -211,28 +217,16 @@ def _dtype_and_shape(array: object) -> str:
     return f"{array.dtype} of shape {array.shape}"
 
 
-def _build_submit(
-    plan: Plan, spec: ExecutorSpec
-) -> Callable[[Executor, TrajectoryRange, ReusedPart], Future[Integrated]]:
-    """Build the function that submits what is not reused of a range to an executor."""
-    values = [plugin.model.key for plugin in plan.plugins.items if plugin.is_value]
-    if values and not spec.shares_memory:
-        raise UsageError(
-            f"{', '.join(values)} is given as a Python value, which cannot be sent to other "
-            "processes; expected the file that it is in, or jobs=1"
-        )
-    context = context_of(plan)
-
-    def submit(executor: Executor, trajectory_range: TrajectoryRange, reused: ReusedPart) -> Future[Integrated]:
-        # the arguments are built here, so that waiting ranges take no memory
-        rows = positions(~reused[0])
-        columns = {name: values[rows] for name, values in plan.columns_of(trajectory_range).items()}
-        law = plan.laws[trajectory_range.model]
-        if spec.shares_memory:
-            return executor.submit(integrate_columns, law, columns, context.solver)
-        return executor.submit(integrate_remotely, keys_of(law), columns, context)
-
-    return submit
+def _submit(
+    plan: Plan, spec: ExecutorSpec, executor: Executor, trajectory_range: TrajectoryRange, reused: ReusedPart
+) -> Future[Integrated]:
+    """Submit what is not reused of a range; its columns are built here, so that waiting ranges take no memory."""
+    rows = positions(~reused[0])
+    columns = {name: values[rows] for name, values in plan.columns_of(trajectory_range).items()}
+    law = plan.laws[trajectory_range.model]
+    if spec.shares_memory:
+        return executor.submit(integrate_columns, law, columns, plan.solver)
+    return executor.submit(integrate_remotely, keys_of(law), columns, context_of(plan))
 
 
 def context_of(plan: Plan) -> WorkerContext:
