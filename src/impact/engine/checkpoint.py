@@ -66,11 +66,26 @@ class WorkFolder:
 
     def load(self, trajectory_range: TrajectoryRange) -> Record | None:
         """Load a finished range; None if it is missing or damaged."""
-        path = self.path(trajectory_range)
+        path, record = self.path(trajectory_range), trajectory_range.record
         # reading something other than a regular file might never end
         if not path.is_file():
             return None
-        return read_range(path, self._header(trajectory_range), trajectory_range.record, trajectory_range.size)
+        try:
+            with np.load(path, allow_pickle=False) as stored:
+                if stored["of"].item() != self._header(trajectory_range):
+                    return None
+                arrays = {name: stored[name] for name in record.columns()}
+        except MemoryError:
+            raise
+        # numpy and zipfile raise almost any exception on a damaged file
+        except Exception:
+            return None
+        blank = record.blank(trajectory_range.size)
+        is_whole = all(
+            (array.shape, array.dtype) == (getattr(blank, name).shape, getattr(blank, name).dtype)
+            for name, array in arrays.items()
+        )
+        return record(**arrays) if is_whole else None
 
 
 @contextlib.contextmanager
@@ -217,26 +232,6 @@ def _difference_from(folder: Path, record: Mapping[str, Any]) -> str | None:
 def write_range(file: Any, header: str, collisions: Record) -> None:
     """Write the results of a range, with the header that identifies it, to a binary file."""
     np.savez(file, of=header, **vars(collisions))
-
-
-def read_range(path: Path, header: str, record: type[Record], size: int) -> Record | None:
-    """Read a range of `size` trajectories; None if it has another header or is damaged."""
-    try:
-        with np.load(path, allow_pickle=False) as stored:
-            if stored["of"].item() != header:
-                return None
-            arrays = {name: stored[name] for name in record.columns()}
-    except MemoryError:
-        raise
-    # numpy and zipfile raise almost any exception on a damaged file
-    except Exception:
-        return None
-    blank = record.blank(size)
-    is_whole = all(
-        (array.shape, array.dtype) == (getattr(blank, name).shape, getattr(blank, name).dtype)
-        for name, array in arrays.items()
-    )
-    return record(**arrays) if is_whole else None
 
 
 def record_differences(stored: object, current: object, path: str = "") -> Iterator[str]:
