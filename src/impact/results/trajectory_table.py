@@ -70,26 +70,23 @@ class TrajectoryRows:
     read: Callable[[int, int, int], Record]
     segment: int = RANGE_TRAJECTORIES
     pick: Callable[[int, NDArray[np.intp]], Record] | None = None
-    # all trajectories of the model and of the pair that were read last, if their cells share them
-    _whole: dict[int, Record] = field(default_factory=dict)
+    # of each type, the law whose trajectories were read last, and all of them, if its cells share them
+    _whole: dict[type[Record], tuple[int, Record]] = field(default_factory=dict)
 
     def take(self, model: int, rows: NDArray[np.intp]) -> Any:
         """Read trajectories of a law by their row numbers, a record of arrays of the shape of `rows`."""
         trajectory_map = self.maps[model]
-        if self.pick is not None and model not in self._whole and rows.size < trajectory_map.count // FEW_ROWS:
+        last, whole = self._whole.get(trajectory_map.record, (None, trajectory_map.record.blank(0)))
+        if self.pick is not None and last != model and rows.size < trajectory_map.count // FEW_ROWS:
             distinct, position = np.unique(rows, return_inverse=True)
             return self.pick(model, distinct).take(position.reshape(rows.shape))
         if not trajectory_map.is_shared:
             flat = self._segments(model, rows.reshape(-1))
             return flat.take(np.arange(rows.size).reshape(rows.shape))
-        whole = self._whole.get(model)
-        if whole is None:
+        if last != model:
             # cells share trajectories in any order: keep all of them
             whole = self._segments(model, np.arange(trajectory_map.count))
-            others = [number for number in self._whole if self.maps[number].record is trajectory_map.record]
-            for number in others:
-                del self._whole[number]
-            self._whole[model] = whole
+            self._whole[trajectory_map.record] = model, whole
         return whole.take(rows)
 
     def _segments(self, model: int, rows: NDArray[np.intp]) -> Record:
