@@ -348,7 +348,10 @@ class ExtendedPlan(Plan):
         trajectory_map = self.maps[trajectory_range.model]
         others = [axis for axis in range(len(self.positions)) if axis not in trajectory_map.axes]
         is_new_along = [(self.positions[axis].positions < 0).any() for axis in others]
-        if self._has_new_law(trajectory_range.model) or any(is_new_along):
+        # a pair needs the trajectories of its model
+        law = self.laws[trajectory_range.model]
+        related = [number for number, other in enumerate(self.laws) if law in (other, model_of(other))]
+        if None in map(self.old_law, related) or any(is_new_along):
             return super().reused(trajectory_range)
         if trajectory_map.of_cell is None:
             is_old = self._is_old(trajectory_map, trajectory_range.rows)
@@ -357,15 +360,6 @@ class ExtendedPlan(Plan):
             needed[trajectory_map.of_cell[~self._is_old(trajectory_map, np.arange(trajectory_map.cells))]] = True
             is_old = ~needed[trajectory_range.rows]
         return is_old, trajectory_range.record.blank(int(np.count_nonzero(is_old)))
-
-    def _has_new_law(self, number: int) -> bool:
-        """Whether a model or a pair, or a pair of the model, is not in the old sweep."""
-        law = self.laws[number]
-        return any(
-            self.old_law(other) is None
-            for other, with_law in enumerate(self.laws)
-            if other == number or model_of(with_law) == law
-        )
 
     def _is_old(self, trajectory_map: TrajectoryMap, cells: IndexArray) -> NDArray[np.bool_]:
         is_old = np.ones(cells.shape, bool)
