@@ -115,14 +115,14 @@ def test_deduplication_within_blocks_changes_no_bit_of_a_result(config: dict[str
 @given(configs())
 def test_the_impacts_of_a_grid_are_those_of_its_points(config: dict[str, object]) -> None:
     plan = read_plan(config, plugins=[DASHPOT, SPEED])
-    at = np.ix_(*map(np.arange, plan.shape)) if plan.shape else ()
-    flat = tuple(np.unravel_index(np.arange(plan.inputs.cells), plan.shape)) if plan.shape else ()
+    at = np.ix_(*map(np.arange, plan.inputs.shape)) if plan.inputs.shape else ()
+    flat = tuple(np.unravel_index(np.arange(plan.inputs.cells), plan.inputs.shape)) if plan.inputs.shape else ()
     for model in plan.models:
         grid, points = (build_impacts(plan.inputs, model, index) for index in (at, flat))
         for name in ("e", "v0", "m", "K", "n", "length", "R1", "E2"):
             with np.errstate(all="ignore"):
                 on_grid, at_points = getattr(grid, name), getattr(points, name)
-            flattened = np.broadcast_to(on_grid, plan.shape or (1,)).reshape(-1)
+            flattened = np.broadcast_to(on_grid, plan.inputs.shape or (1,)).reshape(-1)
             assert flattened.tobytes() == np.broadcast_to(at_points, flattened.shape).tobytes(), name
 
 

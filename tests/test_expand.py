@@ -136,7 +136,7 @@ def test_a_check_that_is_skipped_never_fails(config: dict[str, object]) -> None:
         with np.errstate(all="ignore"):
             expected = check_inputs(model, impacts)
             statuses = check_inputs(model, impacts, checks_that_may_fail(plan.inputs, model))
-        shape = plan.shape or (1,)
+        shape = plan.inputs.shape or (1,)
         assert np.array_equal(np.broadcast_to(statuses, shape), np.broadcast_to(expected, shape)), model.key
 
 

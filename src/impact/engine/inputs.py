@@ -50,7 +50,7 @@ class Inputs:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Sizes of the axes."""
+        """Sizes of the axes, in config order."""
         return tuple(axis.size for axis in self.axes)
 
     @property

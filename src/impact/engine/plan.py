@@ -118,7 +118,7 @@ class Plan:
         cells = rows if trajectory_map.first is None else trajectory_map.first[rows]
         index_along = trajectory_map.index_along(cells)
         # the other axes are at their first value
-        index = tuple(index_along.get(axis, np.zeros(1, np.intp)) for axis in range(len(self.shape)))
+        index = tuple(index_along.get(axis, np.zeros(1, np.intp)) for axis in range(len(self.inputs.axes)))
         columns = columns_at(self.inputs, self.laws[trajectory_range.model], trajectory_map.axes, index)
         return {name: np.broadcast_to(values, cells.shape).copy() for name, values in columns.items()}
 
@@ -132,7 +132,7 @@ class Plan:
             return
         axes = (law_axes(self.inputs, law, self.config.solver.collapse) for law in self.laws)
         # with fewer cells, equal ones are found, and the number of trajectories is not known yet
-        cells = [math.prod(self.shape[axis] for axis in of_law) for of_law in axes]
+        cells = [math.prod(self.inputs.shape[axis] for axis in of_law) for of_law in axes]
         total = sum(count for count in cells if count > MAX_CELLS)
         if total > most:
             raise UsageError(
@@ -158,11 +158,6 @@ class Plan:
         if not combinable:
             raise ConfigError(*(f"{name}: {problem}" for problem in problems))
         return [f"{problem}; these points are NaN" for problem in problems]
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """Sizes of the axes, in config order."""
-        return self.inputs.shape
 
     @property
     def sizes(self) -> dict[str, int]:

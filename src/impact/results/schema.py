@@ -313,10 +313,10 @@ def plan_coordinates(plan: Plan) -> xr.Coordinates:
     def derive(name: str, sources: Sequence[str], **attributes: str) -> None:
         """Add a coordinate that follows from inputs, along their axes."""
         axes = sorted({axis for source in sources for axis in plan.inputs.axes_of(source)})
-        region = [slice(None) if axis in axes else slice(1) for axis in range(len(plan.shape))]
+        region = [slice(None) if axis in axes else slice(1) for axis in range(len(plan.inputs.axes))]
         values = input_at(plan.inputs, name, plan.inputs.index(region))
         dims = tuple(plan.config.axes[axis].name for axis in axes)
-        array = values.reshape([plan.shape[axis] for axis in axes])
+        array = values.reshape([plan.inputs.shape[axis] for axis in axes])
         coordinates[name] = (dims, array, {**coordinate_attributes(plan, name), **attributes})
 
     if "alpha" in names:
