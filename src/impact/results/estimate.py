@@ -28,7 +28,7 @@ from ..formatting import law_name
 from .layouts import LAYOUTS
 from .schema import dataset_template, stored_variables
 from .sweep import read_plan
-from .trajectory_table import expanded_slabs, table_of
+from .trajectory_table import expanded_slabs, table_of_ranges
 
 # numbers of workers for which the time is estimated
 WORKER_COUNTS = (1, 2, 8, 32, 128, 512)
@@ -184,7 +184,7 @@ def estimate(
     positions = np.arange(RANGE_TRAJECTORIES) % chosen.size
     blank = {number: trajectory_map.record.blank(chosen.size) for number, trajectory_map in enumerate(plan.maps)}
     blank[chosen.model] = collisions
-    table = table_of(plan, lambda number, start, stop: blank[number].take(positions[: stop - start]))
+    table = table_of_ranges(plan, lambda block: blank[block.model].take(positions[: block.size]))
     prepared = time.perf_counter()
     values = next(expanded_slabs(table, stored_variables(plan))).values
     for array in values.values():

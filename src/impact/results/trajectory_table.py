@@ -138,17 +138,12 @@ class TrajectoryTable:
         return tuple(checks_that_may_fail(self.inputs, law) for law in self.laws)
 
 
-def table_of(plan: Plan, read: Callable[[int, int, int], Record]) -> TrajectoryTable:
-    """Build the trajectory table of a plan; for `read` see `TrajectoryRows`."""
-    frictions = {friction.key: friction.kind for friction in plan.frictions}
-    rows = TrajectoryRows(plan.maps, read)
-    return TrajectoryTable(plan.inputs, plan.models, plan.maps, rows, frictions=frictions)
-
-
 def table_of_ranges(plan: Plan, load: Callable[[TrajectoryRange], Record]) -> TrajectoryTable:
     """Build the trajectory table of a plan from its finished ranges."""
     range_at = {(finished.model, finished.start): finished for finished in plan.ranges}
-    return table_of(plan, lambda model, start, stop: load(range_at[model, start]))
+    rows = TrajectoryRows(plan.maps, lambda model, start, stop: load(range_at[model, start]))
+    frictions = {friction.key: friction.kind for friction in plan.frictions}
+    return TrajectoryTable(plan.inputs, plan.models, plan.maps, rows, frictions=frictions)
 
 
 def expand(table: TrajectoryTable, number: int, index: Index, names: Sequence[str]) -> tuple[Impacts, Outputs]:
