@@ -11,6 +11,7 @@ from PIL import Image
 
 import impact
 from impact.plots.animation import FRAMES, animation_data
+from impact.plots.draw import get_plot_data
 from impact.plots.kinds import Choice
 from impact.plots.layout import Picture
 
@@ -90,6 +91,18 @@ def test_the_table_has_the_displacement_of_each_ball(single: impact.Impact) -> N
     assert single.history is not None
     columns = list(animation_data([single.history], Choice()).wide_table())
     assert columns[1:3] == [f"x gharib-hurmuzlu-2012 ball{ball} [m]" for ball in (1, 2)]
+
+
+def test_a_ball_may_have_a_mass_by_its_density() -> None:
+    ball = {"R1": 0.01, "R2": 0.02, "K": 1e6, "v1": 1.0, "n": 1.5, "material": "soft"}
+    soft = {"soft": {"E": 1e9, "nu": 0.3, "rho": 1000.0}}
+    shot = impact.run({"models": "hertz", "sweep": ball, "materials": soft})
+    assert shot.history is not None
+    balls = [patch for patch in impact.plot(shot, kind="animation").axes[0].patches if isinstance(patch, Circle)]
+    assert balls[1].radius == pytest.approx(2.0 * balls[0].radius)
+    tau = get_plot_data(shot.history, "impulse", Choice()).panels[0].curves[0].x
+    mass = 1000.0 * 4.0 / 3.0 * np.pi * 0.01**3 * 8.0 / 9.0
+    assert tau[-1] == pytest.approx(2.0 * mass)
 
 
 @pytest.mark.parametrize(("mass", "ratio"), [(0.125, 0.5), (1.0, 1.0), (8.0, 2.0)])

@@ -264,6 +264,11 @@ def test_an_extension_never_drops_a_point(stored_sweep: StoredSweep, layout: str
     assert_refused(stored_sweep(ZIPPED, layout), overrides, "overrides leaves out e=0.3, v1=1.0")
 
 
+@BOTH_LAYOUTS
+def test_an_extension_does_not_take_apart_what_varied_together(stored_sweep: StoredSweep, layout: str) -> None:
+    assert_refused(stored_sweep(ZIPPED, layout), ["sweep.zip=[]"], "r.h5: e, v1 varied together and do not now")
+
+
 def test_the_work_folder_of_another_sweep_is_not_cleared(stored_sweep: StoredSweep, tmp_path: Path) -> None:
     path, folder = stored_sweep(), tmp_path / "r.h5.work"
     folder.mkdir()

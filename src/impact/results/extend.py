@@ -249,9 +249,12 @@ class _AxisPositions:
 
 
 def _check_none_lost(plan: ExtendedPlan) -> None:
-    """Refuse a plan that lacks a value of the old one."""
+    """Refuse a plan that lacks a value of the old one, or takes apart what varied together."""
     for number, axis in enumerate(plan.old.config.axes):
-        kept = (new_axis.positions.tolist() for new_axis in plan.positions if new_axis.axis == number)
+        kept = [new_axis.positions.tolist() for new_axis in plan.positions if new_axis.axis == number]
+        if len(kept) > 1:
+            shown = ", ".join(axis.columns)
+            raise UsageError(f"{plan.name}: {shown} varied together and do not now; sweep the new config")
         lost = {*range(axis.size)}.difference(*kept)
         if lost:
             row = {column: safe_text(str(values[min(lost)]), 40) for column, values in axis.columns.items()}

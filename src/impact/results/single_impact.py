@@ -40,7 +40,7 @@ from ..contact.tangential import RecordedSlip
 from ..contact.units import with_numbers
 from ..contact.variables import CENTRAL_OUTPUTS, HISTORY, LAW_DIMS, OUTPUTS, SLIP_HISTORY, Variable
 from ..display import Block, Displayed, Styled, Table
-from ..engine.build_impacts import build_impacts, build_oblique, fixed_steps_at
+from ..engine.build_impacts import build_impacts, build_oblique, fixed_steps_at, input_at
 from ..engine.plan import Plan
 from ..engine.plugins import Plugins, read_plugins
 from ..errors import ConfigError, UsageError, did_you_mean, warn
@@ -439,7 +439,8 @@ def _derived_quantities(
 def history_dataset(
     history: History, plan: Plan, point: Mapping[str, float | str], slip: SlipHistory | None = None
 ) -> xr.Dataset:
-    """Build the dataset of a time history over t, with the inputs of the impact as an attribute."""
+    """Build the dataset of a time history over t, with the inputs of the impact, and both masses, as an attribute."""
+    masses = {name: input_at(plan.inputs, name, plan.inputs.index()).item() for name in ("m1", "m2")}
     laws = {"model": plan.models[0].key, **({"friction": plan.frictions[0].key} if slip else {})}
     names = [name for name in HISTORY if slip or name not in SLIP_HISTORY]
     arrays = {name: getattr(slip if name in SLIP_HISTORY else history, name) for name in names}
@@ -451,7 +452,7 @@ def history_dataset(
         "title": f"Time history of one impact, {' with '.join(laws.values())}",
         "schema_version": SCHEMA_VERSION,
         "impact_version": __version__,
-        "inputs": json.dumps(dict(point)),
+        "inputs": json.dumps({**point, **masses}),
         "e_kinetic": history.e_kinetic,
         "e_energetic": history.e_energetic,
     }
