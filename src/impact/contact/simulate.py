@@ -20,7 +20,6 @@ from ..array_types import Array
 from ..errors import ModelError
 from ..ode.problem import Params, Problem, Solution, Termination
 from ..ode.rk45 import integrate
-from ..ode.state import Workspace
 from . import motion
 from .deduplicate import deduplicate
 from .dimensionless import LawValues, chi_of, exact_restitution, with_coefficients, with_units
@@ -359,8 +358,7 @@ def integrate_collisions(
     forms: tuple[dispatch.Form | None, dispatch.Form | None] = (None, None)
     if core == "numba" and recorded is None:
         forms = dispatch.approach_form(law), dispatch.restitution_form(back)
-    workspace = None if all(forms) else Workspace.of(n)
-    run = partial(integrate, rtol=rtol, max_steps=max_steps, record=recorded is not None, workspace=workspace)
+    run = partial(integrate, rtol=rtol, max_steps=max_steps, record=recorded is not None)
 
     def solve(
         law: motion.MotionLaw, problem: Problem, start: Array, params: Params, recovery: Recovery | None

@@ -49,12 +49,8 @@ def _nested_weights(row: tuple[Fraction, ...]) -> NestedWeights:
 STAGE_WEIGHTS, ERROR_WEIGHTS = tuple(map(_nested_weights, A[1:])), _nested_weights(E)
 
 
-def _keep_freed_memory() -> None:
-    """Allocate 16 MiB once, so that glibc keeps freed arrays of that size: the first use of new pages is slow."""
-    np.empty(1 << 21)
-
-
-_keep_freed_memory()
+# 16 MiB, once, so that glibc keeps freed arrays of that size: the first use of new pages is slow
+np.empty(1 << 21)
 
 
 def integrate(
@@ -65,7 +61,6 @@ def integrate(
     rtol: float,
     max_steps: int,
     record: bool = False,
-    workspace: Workspace | None = None,
 ) -> Solution:
     """Integrate every trajectory from its start to its event; the state of a failed trajectory is NaN.
 
@@ -76,13 +71,12 @@ def integrate(
     rtol : local error per step, relative to max(|y|, floor)
     max_steps : attempted steps after which a trajectory fails
     record : whether to keep every accepted step for the interpolant; of the first trajectory, all are equal
-    workspace : memory of an earlier call for as many trajectories or more
     """
     n = start.shape[1]
     rows = problem.n_components, problem.n_integrated, len(problem.floor)
     solution = Solution.blank(n, problem.n_integrated)
     recorded: list[Step] = []
-    workspace = Workspace.of(n, *rows) if workspace is None else workspace.narrow(n)
+    workspace = Workspace.of(n, *rows)
     with np.errstate(all="ignore"):
         state = State.begin(problem, start, params, workspace.narrow(n), first_step(problem, rtol))
         for count in range(1, max_steps + 1):

@@ -1,8 +1,9 @@
-"""The running trajectories of an integration, and the memory in which they are compacted."""
+"""The running trajectories of an integration, and the memory of their steps."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -137,28 +138,14 @@ class State:
         solution.steps[index], solution.termination[index] = self.steps[ended], termination
 
     def compacted(self) -> State:
-        """Keep the running trajectories, in the same memory: they are moved into the spare array of each pair."""
+        """Keep the running trajectories."""
         running = np.flatnonzero(self.termination == RUNNING)
-        workspace = self.workspace.narrow(running.size)
-        y = self.y.take(running, 1, workspace.y_end, "clip")
-        k = self.k.take(running, 1, workspace.stages[-1], "clip")
-        workspace.y_end, workspace.stages[-1] = _narrow(self.y, running.size), _narrow(self.k, running.size)
-        return State(
-            index=self.index[running],
-            params=tuple(column[running] for column in self.params),
-            y=y,
-            k=k,
-            h=self.h[running],
-            h_last=self.h_last[running],
-            halvings=self.halvings[running],
-            steps=self.steps[running],
-            termination=self.termination[running],
-            best=self.best[running],
-            peak=self.peak,
-            workspace=workspace,
-            margins=(self.margins[0].take(running, 1), self.margins[1].take(running, 1)),
-            h_free=self.h_free[running],
-        )
+        rows: dict[str, Any] = {
+            name: row.take(running, -1) for name, row in vars(self).items() if isinstance(row, np.ndarray)
+        }
+        for name in ("params", "margins"):
+            rows[name] = tuple(row.take(running, -1) for row in getattr(self, name))
+        return replace(self, **rows, workspace=self.workspace.narrow(running.size))
 
 
 @dataclass(frozen=True)
