@@ -21,7 +21,7 @@ from .dimensionless import with_coefficients, with_units
 from .fixed_step_slip import FixedStepSlip
 from .formula_calls import Formula, argument_names
 from .model import ForceModel
-from .motion import MotionLaw, force_at_peak, indentation, unloading_state
+from .motion import UNLOADING_PARAMS, MotionLaw, force_at_peak, indentation, unloading_state
 from .powers import power
 from .records import CollisionResult
 from .status import Status
@@ -168,29 +168,29 @@ def collide_at_fixed_step(
     law = MotionLaw.of(model, n, strong=False)
     with np.errstate(all="ignore"):
         law_values = with_coefficients(model, with_units(values, n), count)
-        params = tuple(np.broadcast_to(law_values[name], count).copy() for name in law.names)
+        columns = [np.broadcast_to(law_values[name], count) for name in law.names]
+        params = np.array(columns).reshape(len(columns), count)
         limit = np.broadcast_to(np.asarray(max_steps, np.int64), count).copy()
         part = None if slip is None else slip.take(np.arange(count))
-        return _run(_Contacts(law, params, step.copy(), phase * step, np.ones(count), limit, scheme, part), slip)
+        return _run(_Contacts(law, params, step.copy(), phase * step, limit, scheme, part), slip)
 
 
 class _Contacts:
-    """The collisions that go on; arrays of shape (n,), of which those that have ended are removed."""
+    """The collisions that go on; arrays with n along the last axis, without those that have ended."""
 
     def __init__(
         self,
         law: MotionLaw,
-        params: tuple[Array, ...],
+        params: Array,
         step: Array,
         x: Array,
-        u: Array,
         limit: NDArray[np.int64],
         scheme: str,
         slip: FixedStepSlip | None,
     ) -> None:
         self.scheme, self.slip = scheme, slip
-        self.law, self.params, self.step, self.x, self.u, self.limit = law, params, step, x, u, limit
-        self.peak, self.residual = x.copy(), np.zeros_like(x)
+        self.law, self.params, self.step, self.x, self.limit = law, params, step, x, limit
+        self.u, self.peak = np.ones_like(x), x.copy()
         self.largest_force = np.full_like(x, -np.inf)
         # the force before the last step, the displacement in it, and its growing part
         self.last_force, self.displacement, self.approach_displacement = np.zeros_like(x), x.copy(), x.copy()
@@ -198,26 +198,23 @@ class _Contacts:
         self.work, self.approach_work = np.zeros_like(x), np.zeros_like(x)
         self.rows = np.arange(x.size)
         self.unloads = np.zeros(x.size, bool)
-        # what the unloading branch needs besides the law's own params
-        self.branch: tuple[Array, ...] = ()
-        if law.model.unloading is not None:
-            self.branch = tuple(np.zeros_like(x) for _ in range(4))
+        # UNLOADING_PARAMS, zero on approach
+        self.branch = np.zeros((len(UNLOADING_PARAMS), x.size))
+
+    @property
+    def residual(self) -> Array:
+        """The permanent indentation."""
+        return np.asarray(self.branch[UNLOADING_PARAMS.index("residual")])
 
     def force(self) -> Array:
         """Compute the force at the position and velocity before the step."""
         law = self.law
-        force = self._formula(law.model.force, self.params, {})
+        force = self._formula(law.model.force, {})
         unloading = law.model.unloading
         if unloading is not None and self.unloads.any():
-            peak, at_peak, residual, recovered = self.branch
-            extra = {
-                "peak": peak,
-                "force_at_peak": at_peak,
-                "residual": residual,
-                "recovered": recovered,
-                "stretch": np.maximum(self.x - residual, 0.0),
-            }
-            force = np.where(self.unloads, self._formula(unloading, self.params, extra), force)
+            extra = dict(zip(UNLOADING_PARAMS, self.branch, strict=True))
+            extra["stretch"] = np.maximum(self.x - self.residual, 0.0)
+            force = np.where(self.unloads, self._formula(unloading, extra), force)
         is_clamped = law.model.release == "force" or self.scheme != KICK_DRIFT
         # the sum of this force and of that of a cone is clamped
         return np.maximum(force, 0.0) if is_clamped and not self.is_coupled else force
@@ -245,12 +242,11 @@ class _Contacts:
         beyond = self.last_force * (out - self.displacement) + self.force_at(self.residual) * out
         return self.work - self.approach_work + beyond
 
-    def _formula(self, formula: Formula, params: tuple[Array, ...], extra: Mapping[str, Array]) -> Array:
-        names = argument_names(formula)
+    def _formula(self, formula: Formula, extra: Mapping[str, Array]) -> Array:
         arguments: dict[str, Array] = {"x": self.x, "v": self.u, **extra}
-        if "elastic" in names:
+        if "elastic" in argument_names(formula):
             arguments["elastic"] = power(np.maximum(self.x, 0.0), self.law.n)
-        value = self.law.call(formula, params, arguments)
+        value = self.law.call(formula, tuple(self.params), arguments)
         if value.shape not in ((), self.x.shape):
             raise ModelError(f"{self.law.model.key}: the force has shape {value.shape}, expected {self.x.shape}")
         return np.broadcast_to(value, self.x.shape)
@@ -306,22 +302,18 @@ class _Contacts:
     def _turn(self, turned: NDArray[np.bool_]) -> None:
         """Begin the unloading branch of some collisions at the largest indentation that they reached."""
         peak = self.peak[turned]
-        params = tuple(column[turned] for column in self.params)
+        params = tuple(self.params[:, turned])
         s = power(peak, 1.0 / self.law.model.coordinate_power)
         at_peak = force_at_peak(self.law, s, params)
         residual, recovered, _ = unloading_state(self.law, params, indentation(self.law, s), at_peak)
-        for column, new in zip(self.branch, (peak, at_peak, residual, recovered), strict=True):
-            column[turned] = new
-        self.residual[turned] = residual
+        self.branch[:, turned] = peak, at_peak, residual, recovered
         self.unloads |= turned
 
     def keep(self, active: NDArray[np.bool_]) -> None:
         """Remove the collisions that have ended."""
         for name, value in list(vars(self).items()):
             if isinstance(value, np.ndarray):
-                setattr(self, name, value[active])
-        self.params = tuple(column[active] for column in self.params)
-        self.branch = tuple(column[active] for column in self.branch)
+                setattr(self, name, value[..., active])
         self.slip = None if self.slip is None else self.slip.take(active)
 
 
