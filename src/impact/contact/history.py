@@ -94,14 +94,9 @@ def history_of(recorded: RecordedMotion, impacts: Impacts, times: int | Array | 
         restitution_times,
     )
 
-    residual = (
-        back_params[motion.UNLOADING_PARAMS.index("residual") - len(motion.UNLOADING_PARAMS)]
-        if law.model.unloading
-        else np.zeros(1)
-    )
     unit_t = impacts.length / impacts.v0
     t = np.concatenate([approach.t, phases.approach.state[2, :1] + restitution.t]) * unit_t
-    delta = np.concatenate([approach.x, residual + restitution.x]) * impacts.length
+    delta = np.concatenate([approach.x, phases.residual[:1] + restitution.x]) * impacts.length
     v = np.concatenate([approach.v, restitution.v]) * impacts.v0
     force = np.concatenate([approach.F, restitution.F]) * (impacts.m * impacts.v0 / unit_t)
     # the phases meet at the peak, and the last step can be shorter than rounding: each time appears once
