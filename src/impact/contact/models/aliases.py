@@ -17,6 +17,14 @@ def same_law(law: ForceModel, key: str, *, doi: str = "", **about: Any) -> Force
     return replace(law, key=key, doi=doi, domain={}, domain_source="", same_as=law.key, **about)
 
 
+def in_code(
+    law: ForceModel, key: str, title: str, year: int, reference: str, source: str, note: str = ""
+) -> ForceModel:
+    """Make a law of the catalogue under the name that a code has for it, with the law's own rule for K."""
+    evidence = Evidence("seen", source, note=note)
+    return same_law(law, key, title=title, year=year, reference=reference, evidence=evidence, family="codes")
+
+
 MARHEFKA_ORIN_1999 = same_law(
     HUNT_CROSSLEY_1975,
     "marhefka-orin-1999",

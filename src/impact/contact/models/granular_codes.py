@@ -7,9 +7,9 @@ import numpy as np
 from ...array_types import Array
 from ..closed_forms.dashpot import force_damping, gap_damping
 from ..evidence import Evidence
-from ..model import ForceModel, Parameter
+from ..model import Parameter
 from ..powers import power
-from .aliases import same_law
+from .aliases import in_code
 from .cited_sources import CHRONO, DEMLAB_VISCOELASTIC, KRATOS, LIGGGHTS, YADE_2025
 from .dashpot import (
     ANAGNOSTOPOULOS_1988,
@@ -32,14 +32,6 @@ TANGENT_DASHPOT = "F = K δ^(3/2) + 2 β √(m S) δ̇,  S = (3/2) K δ^(1/2)"
 # at this closing speed the linear spring absorbs as much energy as Hertz's
 CHARACTERISTIC_SPEED = (Parameter("vc", "m/s", "characteristic speed of the stiffness", default=1.0, least=1e-9),)
 STIFFNESS_BY_SPEED = "K = (16/15) E* √R* (15 m v_c²/(16 E* √R*))^(1/5)"
-
-
-def in_code(
-    law: ForceModel, key: str, title: str, year: int, reference: str, source: str, note: str = ""
-) -> ForceModel:
-    """Make a law of the catalogue under the name that a code has for it, with the law's own rule for K."""
-    evidence = Evidence("seen", source, note=note)
-    return same_law(law, key, title=title, year=year, reference=reference, evidence=evidence, family="codes")
 
 
 def stiffness_by_speed(E_eff: Array, R_eff: Array, m: Array, vc: Array) -> Array:

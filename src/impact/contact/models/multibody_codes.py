@@ -14,7 +14,7 @@ from ..closed_forms.dashpot import force_restitution, limited_restitution
 from ..evidence import Evidence
 from ..model import ForceModel, Parameter
 from ..powers import power, powers
-from .aliases import same_law
+from .aliases import in_code
 from .asymmetric import approach_dashpot
 from .cited_sources import MAPLESIM_HELP, MBDYN, MODIA3D_DOCUMENTATION, SIMBODY
 from .dashpot import KELVIN_VOIGT_NO_TENSION
@@ -218,14 +218,14 @@ MODELICA_ELASTOGAP = ForceModel(
     family="codes",
 )
 
-MAPLESIM_LINEAR = same_law(
+MAPLESIM_LINEAR = in_code(
     KELVIN_VOIGT_NO_TENSION,
     "maplesim-linear",
-    title="MapleSim, linear",
-    year=2015,
-    reference="MapleSim, contact of the linear spring and damper",
-    evidence=Evidence("seen", MAPLESIM_HELP, note="its first year was not seen"),
-    family="codes",
+    "MapleSim, linear",
+    2015,
+    "MapleSim, contact of the linear spring and damper",
+    MAPLESIM_HELP,
+    "its first year was not seen",
 )
 
 MAPLESIM_LIMITED = replace(
@@ -378,15 +378,15 @@ SIMSCAPE_CONTACT = ForceModel(
 
 def in_mbdyn(law: ForceModel, key: str, formulation: str) -> ForceModel:
     """Make a law of the catalogue under its name in MBDyn."""
-    return same_law(
+    return in_code(
         law,
         key,
-        title=f"MBDyn continuous contact, {formulation} (since 1.5.0)",
-        year=2015,
-        reference=f"MBDyn, module-cont-contact, law continuous contact, formulation {formulation}; no damping "
-        "at a speed of contact up to EpsPrimeTol, by default 1e-6",
-        evidence=Evidence("seen", MBDYN, note="its first year was not seen"),
-        family="codes",
+        f"MBDyn continuous contact, {formulation} (since 1.5.0)",
+        2015,
+        f"MBDyn, module-cont-contact, law continuous contact, formulation {formulation}; no damping at a speed of "
+        "contact up to EpsPrimeTol, by default 1e-6",
+        MBDYN,
+        "its first year was not seen",
     )
 
 
