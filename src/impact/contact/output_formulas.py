@@ -59,7 +59,7 @@ def outputs(
 
 def _replace_nan(values: NDArray[Any]) -> NDArray[Any]:
     """Give every NaN of an array the same bits."""
-    return _replace_where(values, _mask_if_any(np.isnan(values)), np.nan) if values.dtype.kind == "f" else values
+    return _replace_where(values, np.isnan(values), np.nan) if values.dtype.kind == "f" else values
 
 
 def _compute(name: str, computed: dict[str, Any]) -> Any:
@@ -142,30 +142,14 @@ def collide(
     return outputs(model, impacts, result, names, checked, (inputs, tangential, pair.friction.kind))
 
 
-def _mask_if_any(mask: Mask) -> Mask | None:
-    """Return the mask, or None if it is False everywhere, which saves work."""
-    return mask if mask.any() else None
-
-
 def _replace_where(
-    value: NDArray[Any], mask: Mask | None, otherwise: float | np.integer[Any] | NDArray[Any]
+    value: NDArray[Any], mask: Mask, otherwise: float | np.integer[Any] | NDArray[Any]
 ) -> NDArray[Any]:
-    """Replace the value by another one where the mask is True."""
-    return value if mask is None else np.where(mask, otherwise, value)
+    """Replace the value by another one where the mask is True; the shape grows only if it is True somewhere."""
+    return np.where(mask, otherwise, value) if mask.any() else value
 
 
 # ---- intermediate values; the arguments of each function are names of FORMULAS
-
-
-def _status_of_impacts(
-    result: CollisionResult, not_integrated: Mask | None, checked: NDArray[np.int8]
-) -> NDArray[np.int8]:
-    return _replace_where(result.status, not_integrated, checked)
-
-
-def _undefined(failed: Mask | None, missed: Mask | None, status: NDArray[np.int8]) -> Mask | None:
-    """Impacts without a result: they failed or the balls miss."""
-    return failed if missed is None else _mask_if_any(missed | (status >= FIRST_FAILURE))
 
 
 def _asked_e(impacts: Impacts) -> Array:
@@ -174,7 +158,7 @@ def _asked_e(impacts: Impacts) -> Array:
     return e if all_within(e, 0.0, 1.0) else np.where((e >= 0.0) & (e <= 1.0), e, np.nan)
 
 
-def _in_si(failed: Mask | None, missed: Mask | None) -> InSI:
+def _in_si(failed: Mask, missed: Mask) -> InSI:
     """Converts (values, unit) to SI: NaN where the impact failed, 0 where the balls miss each other."""
     return lambda value, unit: _replace_where(_replace_where(value * unit, failed, np.nan), missed, 0.0)
 
@@ -182,20 +166,20 @@ def _in_si(failed: Mask | None, missed: Mask | None) -> InSI:
 # ---- outputs
 
 
-def _damping_ratio(result: CollisionResult, not_integrated: Mask | None) -> Array:
+def _damping_ratio(result: CollisionResult, not_integrated: Mask) -> Array:
     chi = result.chi
-    return _replace_where(_replace_where(chi, not_integrated, np.nan), _mask_if_any(np.isinf(chi)), np.nan)
+    return _replace_where(_replace_where(chi, not_integrated, np.nan), np.isinf(chi), np.nan)
 
 
-def _energy_residual(result: CollisionResult, undefined: Mask | None) -> Array:
+def _energy_residual(result: CollisionResult, undefined: Mask) -> Array:
     work = result.approach_work + result.restitution_work
     return _replace_where(work - (1.0 - result.e_out * result.e_out), undefined, np.nan)
 
 
-def _energetic(result: CollisionResult, undefined: Mask | None) -> Array:
+def _energetic(result: CollisionResult, undefined: Mask) -> Array:
     """sqrt(-W_r/W_c), equation (3), from the integrated works; 0 where the balls stay together."""
     e = np.sqrt(np.maximum(-result.restitution_work, 0.0) / result.approach_work)
-    return _replace_where(_replace_where(e, _mask_if_any(result.status == LIMIT), 0.0), undefined, np.nan)
+    return _replace_where(_replace_where(e, result.status == LIMIT, 0.0), undefined, np.nan)
 
 
 def _in_domain(law: Law, impacts: Impacts, damping_ratio: Array) -> NDArray[np.int8]:
@@ -222,10 +206,10 @@ def _separation_time(
 
 
 def _friction_status(
-    tangential: TangentialResult, status: NDArray[np.int8], not_integrated: Mask | None
+    tangential: TangentialResult, status: NDArray[np.int8], not_integrated: Mask
 ) -> NDArray[np.int8]:
     """Status of the tangential motion: that of the normal motion where it has none of its own."""
-    own = _replace_where(tangential.status, _mask_if_any(tangential.status == STATUS_OK), status)
+    own = _replace_where(tangential.status, tangential.status == STATUS_OK, status)
     return _replace_where(own, not_integrated, status)
 
 
@@ -235,16 +219,16 @@ def _slip_share(
     sliding_impulse: Array,
     kind: str,
     friction_status: NDArray[np.int8],
-    missed: Mask | None,
+    missed: Mask,
 ) -> Array:
     """G1/G0: 1 where nothing changes the slip, NaN where it is not known or G0 is 0."""
     size = np.abs(oblique.G0)
     after = np.maximum(size - sliding_impulse, 0.0) if kind == "coulomb" else slip
-    share = _replace_where(after / size, _mask_if_any(oblique.mu == 0.0), 1.0)
+    share = _replace_where(after / size, oblique.mu == 0.0, 1.0)
     unknown = (friction_status >= FIRST_FAILURE) | (oblique.slip == 0.0)
     if kind != "coulomb":
         unknown = unknown | (friction_status == LIMIT)
-    return _replace_where(_replace_where(share, _mask_if_any(unknown), np.nan), missed, 1.0)
+    return _replace_where(_replace_where(share, unknown, np.nan), missed, 1.0)
 
 
 def _impulse(oblique: ObliqueImpacts, slip_share: Array, friction_status: NDArray[np.int8]) -> Array:
@@ -253,9 +237,9 @@ def _impulse(oblique: ObliqueImpacts, slip_share: Array, friction_status: NDArra
     return _replace_where(impulse, _without_slip(oblique, friction_status), 0.0)
 
 
-def _without_slip(oblique: ObliqueImpacts, friction_status: NDArray[np.int8]) -> Mask | None:
+def _without_slip(oblique: ObliqueImpacts, friction_status: NDArray[np.int8]) -> Mask:
     """Impacts that have an answer and no slip before it."""
-    return _mask_if_any((oblique.slip == 0.0) & (friction_status < FIRST_FAILURE))
+    return np.asarray((oblique.slip == 0.0) & (friction_status < FIRST_FAILURE))
 
 
 def _contact_regime(
@@ -263,16 +247,15 @@ def _contact_regime(
     tangential: TangentialResult,
     kind: str,
     friction_status: NDArray[np.int8],
-    missed: Mask | None,
+    missed: Mask,
 ) -> NDArray[np.int8]:
     """Whether the contact sticks (1), slides (2) or does both (3); 0 where that is not defined."""
     regime = tangential.regime
     if kind == "coulomb":
         regime = np.where(np.abs(oblique.G0) >= tangential.sliding_impulse, SLIDES, STICKS | SLIDES)
-    regime = _replace_where(regime, _mask_if_any(oblique.mu == 0.0), SLIDES)
+    regime = _replace_where(regime, oblique.mu == 0.0, SLIDES)
     regime = _replace_where(regime, _without_slip(oblique, friction_status), STICKS)
-    undefined = friction_status >= FIRST_FAILURE
-    return np.where(undefined if missed is None else undefined | missed, np.int8(0), regime).astype(np.int8)
+    return np.where((friction_status >= FIRST_FAILURE) | missed, np.int8(0), regime).astype(np.int8)
 
 
 def _slip_changes(
@@ -299,7 +282,7 @@ def _beta_error(
     tangential: TangentialResult,
     kind: str,
     friction_status: NDArray[np.int8],
-    missed: Mask | None,
+    missed: Mask,
     beta: Array,
 ) -> Array:
     exact = _slip_share(oblique, tangential.exact, tangential.exact, kind, friction_status, missed)
@@ -323,10 +306,11 @@ def _work(name: str) -> Callable[..., Array]:
 # formulas by the names of their values; their arguments are names of this dict, or law, impacts and result
 FORMULAS: dict[str, Callable[..., Any]] = {
     "checked": lambda law, impacts: check_inputs(law, impacts),
-    "not_integrated": lambda checked: _mask_if_any(checked != STATUS_OK),
-    "missed": lambda checked: _mask_if_any(checked == NO_IMPACT),
-    "failed": lambda status: _mask_if_any(status >= FIRST_FAILURE),
-    "undefined": _undefined,
+    "not_integrated": lambda checked: checked != STATUS_OK,
+    "missed": lambda checked: checked == NO_IMPACT,
+    "failed": lambda status: status >= FIRST_FAILURE,
+    # impacts without a result
+    "undefined": lambda missed, failed: missed | failed,
     "asked_e": _asked_e,
     "in_si": _in_si,
     "velocities": lambda impacts, e_out: velocities_after(impacts, e_out),
@@ -348,7 +332,7 @@ FORMULAS: dict[str, Callable[..., Any]] = {
     "damping_ratio": _damping_ratio,
     "energy_residual": _energy_residual,
     "closed_form_error": lambda e_out, result: e_out - result.exact,
-    "status": _status_of_impacts,
+    "status": lambda result, not_integrated, checked: _replace_where(result.status, not_integrated, checked),
     "in_domain": _in_domain,
     "steps": lambda result, not_integrated: _replace_where(result.steps, not_integrated, np.int32(0)),
     # tau_r/tau_c, equation (2): the phases change the momentum by m v0 and by e_out m v0
@@ -364,9 +348,7 @@ FORMULAS: dict[str, Callable[..., Any]] = {
     ),
     "impulse": _impulse,
     # impacts with a slip, friction and a complete tangential motion
-    "has_works": lambda slip_share, oblique, missed: (
-        np.isfinite(slip_share) & (oblique.mu > 0.0) & (True if missed is None else ~missed)
-    ),
+    "has_works": lambda slip_share, oblique, missed: np.isfinite(slip_share) & (oblique.mu > 0.0) & ~missed,
     "u1_post": lambda oblique, impulse: oblique.u1 - impulse / oblique.impacts.m1,
     "u2_post": lambda oblique, impulse: oblique.u2 + impulse / oblique.impacts.m2,
     "omega1_post": lambda oblique, impulse: oblique.spin_after("1", impulse),
