@@ -12,9 +12,9 @@ import impact
 from impact.contact.closed_forms.dashpot import approach_restitution, force_restitution, limited_restitution
 from impact.contact.closed_forms.hysteresis import delivered_restitution
 from impact.contact.dimensionless import delivered
-from impact.contact.impulse import velocities_after
 from impact.contact.models import find
 from impact.contact.output_formulas import Outputs, collide
+from impact.contact.rigid import velocities_after
 from impact.contact.status import Status
 from impact.errors import ConfigError
 

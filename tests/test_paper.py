@@ -11,10 +11,10 @@ import pytest
 from impact.contact.closed_forms.elastic import peak_indentation
 from impact.contact.history import history_of
 from impact.contact.impacts import Impacts
-from impact.contact.impulse import velocities_after, velocities_at
 from impact.contact.materials import hertz_stiffness, sphere_radius
 from impact.contact.models import find
 from impact.contact.output_formulas import Outputs, collide
+from impact.contact.rigid import velocities_after, velocities_at
 from impact.contact.status import Status
 
 from .problems import LAWS, contact_time_ratio, table1_impacts, with_parameters

@@ -14,11 +14,10 @@ from .fixed_step import EXACT, MUJOCO_CONE
 from .formula_calls import argument_names
 from .friction import Pair, check_friction, friction_values
 from .impacts import Impacts, check_inputs
-from .impulse import velocities_after
 from .model import ForceModel, Law
 from .powers import all_within
 from .records import CollisionResult
-from .rigid import ObliqueImpacts
+from .rigid import ObliqueImpacts, velocities_after
 from .simulate import ComputeCollisions, RecordedMotion, simulate
 from .slip_motion import SLIDES, STICKS
 from .status import FIRST_FAILURE, LIMIT, NO_IMPACT, STATUS_OK

@@ -1,4 +1,4 @@
-"""Oblique impacts of rigid balls: effective tangential mass, slip, and the motion after an impulse."""
+"""Rigid balls: the impulse-momentum solution, and of oblique impacts effective tangential mass, slip and spin."""
 
 from __future__ import annotations
 
@@ -12,6 +12,30 @@ import numpy as np
 from ..array_types import Array
 from .impacts import Impacts
 from .materials import effective_mass
+from .powers import all_within
+
+MAX_FLOAT = float(np.finfo(float).max)
+
+
+def velocities_at(impacts: Impacts, impulse: Array) -> tuple[Array, Array]:
+    """Compute v1, v2 [m/s] once an impulse tau [N s] has passed: equations (8) and (9), shape (n,).
+
+    (9) as printed has a minus, an erratum. An infinite mass (a wall) keeps its velocity.
+    """
+    return impacts.v1 - impulse / impacts.m1, impacts.v2 + impulse / impacts.m2
+
+
+def velocities_after(impacts: Impacts, e: Array) -> tuple[Array, Array]:
+    """Compute v1+, v2+ [m/s] after an impact of restitution e, the reference for every law: equations (6), (7).
+
+    Arrays of shape (n,). Balls that do not approach keep their velocities; an impulse that overflows gives NaN.
+    """
+    impulse = (1.0 + e) * impacts.m * impacts.v0
+    if not impacts.all_approach:
+        impulse = np.where(impacts.v0 > 0.0, impulse, 0.0)
+    if not all_within(impulse, -MAX_FLOAT, MAX_FLOAT):
+        impulse = np.where(np.isfinite(impulse), impulse, np.nan)
+    return velocities_at(impacts, impulse)
 
 
 @dataclass(frozen=True)
@@ -83,19 +107,17 @@ class ObliqueImpacts:
 
         It is NaN where a ball turns whose radius is unknown.
         """
-        omega, mass, R = getattr(self, f"omega{ball}"), getattr(self.impacts, f"m{ball}"), self._radius(ball)
+        omega = getattr(self, f"omega{ball}")
+        mass, R = (getattr(self.impacts, f"{name}{ball}") for name in ("m", "R"))
         inertia = self._inertia_factor(ball) * mass
         # R is not read where nothing turns, since it may be unknown there
         return np.asarray(omega - np.where(np.isinf(inertia), 0.0, impulse / (inertia * R)))
 
-    def _radius(self, ball: Literal["1", "2"]) -> Array:
-        return np.asarray(getattr(self.impacts, f"R{ball}"))
-
     def _inertia_factor(self, ball: Literal["1", "2"]) -> Array:
         """q, infinite for a plane."""
-        q, is_plane = np.asarray(getattr(self, f"inertia_factor{ball}")), np.isinf(self._radius(ball))
+        mass, R = (getattr(self.impacts, f"{name}{ball}") for name in ("m", "R"))
         # a plane of infinite mass is a wall, of which no inertia matters
-        is_plane = is_plane & np.isfinite(getattr(self.impacts, f"m{ball}"))
+        q, is_plane = np.asarray(getattr(self, f"inertia_factor{ball}")), np.isinf(R) & np.isfinite(mass)
         return np.where(is_plane, np.inf, q) if is_plane.any() else q
 
 
