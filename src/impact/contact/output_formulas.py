@@ -212,22 +212,27 @@ def _friction_status(
     return _replace_where(own, not_integrated, status)
 
 
-def _slip_share(
-    oblique: ObliqueImpacts,
-    slip: Array,
-    sliding_impulse: Array,
-    kind: str,
-    friction_status: NDArray[np.int8],
-    missed: Mask,
-) -> Array:
-    """G1/G0: 1 where nothing changes the slip, NaN where it is not known or G0 is 0."""
-    size = np.abs(oblique.G0)
-    after = np.maximum(size - sliding_impulse, 0.0) if kind == "coulomb" else slip
-    share = _replace_where(after / size, oblique.mu == 0.0, 1.0)
-    unknown = (friction_status >= FIRST_FAILURE) | (oblique.slip == 0.0)
-    if kind != "coulomb":
-        unknown = unknown | (friction_status == LIMIT)
-    return _replace_where(_replace_where(share, unknown, np.nan), missed, 1.0)
+def _share(name: str) -> Callable[..., Array]:
+    """Make the formula of G1/G0 from the "slip" of the tangential motion, or from the "exact" one.
+
+    It is 1 where nothing changes the slip, NaN where it is not known or G0 is 0.
+    """
+
+    def share(
+        oblique: ObliqueImpacts, tangential: TangentialResult, kind: str, friction_status: Array, missed: Mask
+    ) -> Array:
+        size, after = np.abs(oblique.G0), getattr(tangential, name)
+        unknown = (friction_status >= FIRST_FAILURE) | (oblique.slip == 0.0)
+        if kind == "coulomb":
+            # its exact value is that of the impulse
+            impulse = after if name == "exact" else tangential.sliding_impulse
+            after = np.maximum(size - impulse, 0.0)
+        else:
+            unknown = unknown | (friction_status == LIMIT)
+        share = _replace_where(after / size, oblique.mu == 0.0, 1.0)
+        return _replace_where(_replace_where(share, unknown, np.nan), missed, 1.0)
+
+    return share
 
 
 def _impulse(oblique: ObliqueImpacts, slip_share: Array, friction_status: NDArray[np.int8]) -> Array:
@@ -274,18 +279,6 @@ def _friction_residual(
     works = tangential.slip_work + tangential.damping_work + tangential.memory_work + tangential.elastic_left
     loss = 1.0 - slip_share * slip_share
     return np.where(has_works, loss - 2.0 * works / np.square(oblique.G0), np.nan)
-
-
-def _beta_error(
-    oblique: ObliqueImpacts,
-    tangential: TangentialResult,
-    kind: str,
-    friction_status: NDArray[np.int8],
-    missed: Mask,
-    beta: Array,
-) -> Array:
-    exact = _slip_share(oblique, tangential.exact, tangential.exact, kind, friction_status, missed)
-    return beta + exact
 
 
 def _work(name: str) -> Callable[..., Array]:
@@ -342,9 +335,8 @@ FORMULAS: dict[str, Callable[..., Any]] = {
     "separation_time": _separation_time,
     # of friction
     "friction_status": _friction_status,
-    "slip_share": lambda oblique, tangential, kind, friction_status, missed: _slip_share(
-        oblique, tangential.slip, tangential.sliding_impulse, kind, friction_status, missed
-    ),
+    "slip_share": _share("slip"),
+    "exact_share": _share("exact"),
     "impulse": _impulse,
     # impacts with a slip, friction and a complete tangential motion
     "has_works": lambda slip_share, oblique, missed: np.isfinite(slip_share) & (oblique.mu > 0.0) & ~missed,
@@ -363,7 +355,7 @@ FORMULAS: dict[str, Callable[..., Any]] = {
     "friction_loss": lambda oblique, slip_post: 0.5 * oblique.m_t * (oblique.slip**2 - slip_post**2),
     "contact_regime": _contact_regime,
     "friction_residual": _friction_residual,
-    "beta_error": _beta_error,
+    "beta_error": lambda beta, exact_share: beta + exact_share,
     "slip_work": _work("slip_work"),
     "tangential_damping_work": _work("damping_work"),
     "memory_work": _work("memory_work"),
