@@ -20,8 +20,8 @@ from ..errors import ModelError, UsageError, require_known
 from .dimensionless import with_coefficients, with_units
 from .fixed_step_slip import FixedStepSlip
 from .formula_calls import Formula, argument_names
-from .model import ForceModel
-from .motion import UNLOADING_PARAMS, MotionLaw, force_at_peak, indentation, unloading_state
+from .model import UNLOADING_ARGUMENTS, ForceModel
+from .motion import MotionLaw, force_at_peak, indentation, unloading_state
 from .powers import power
 from .records import CollisionResult
 from .status import Status
@@ -198,13 +198,13 @@ class _Contacts:
         self.work, self.approach_work = np.zeros_like(x), np.zeros_like(x)
         self.rows = np.arange(x.size)
         self.unloads = np.zeros(x.size, bool)
-        # UNLOADING_PARAMS, zero on approach
-        self.branch = np.zeros((len(UNLOADING_PARAMS), x.size))
+        # UNLOADING_ARGUMENTS, zero on approach
+        self.branch = np.zeros((len(UNLOADING_ARGUMENTS), x.size))
 
     @property
     def residual(self) -> Array:
         """The permanent indentation."""
-        return np.asarray(self.branch[UNLOADING_PARAMS.index("residual")])
+        return np.asarray(self.branch[UNLOADING_ARGUMENTS.index("residual")])
 
     def force(self) -> Array:
         """Compute the force at the position and velocity before the step."""
@@ -212,7 +212,7 @@ class _Contacts:
         force = self._formula(law.model.force, {})
         unloading = law.model.unloading
         if unloading is not None and self.unloads.any():
-            extra = dict(zip(UNLOADING_PARAMS, self.branch, strict=True))
+            extra = dict(zip(UNLOADING_ARGUMENTS, self.branch, strict=True))
             extra["stretch"] = np.maximum(self.x - self.residual, 0.0)
             force = np.where(self.unloads, self._formula(unloading, extra), force)
         is_clamped = law.model.release == "force" or self.scheme != KICK_DRIFT

@@ -40,14 +40,9 @@ BASE_QUANTITIES = {
 NOT_VERIFIED = Evidence("not verified")
 # further inputs that a domain may bound
 DOMAIN_INPUTS = ("v1", "v2", "m1", "m2", "length")
-FORCE_ARGUMENTS = {"x": "indentation", "v": "indentation rate", "elastic": "K δⁿ"}
-UNLOADING_ARGUMENTS = {
-    "peak": "peak indentation",
-    "force_at_peak": "force there",
-    "residual": "permanent indentation",
-    "recovered": "peak indentation above the permanent one",
-}
-STRETCH_ARGUMENTS = {"stretch": "indentation above the permanent one"}
+# arguments of a force, see `ForceModel`, and the further ones of its unloading branch that stay the same in it
+FORCE_ARGUMENTS = ("x", "v", "elastic")
+UNLOADING_ARGUMENTS = ("peak", "force_at_peak", "residual", "recovered")
 # coefficients that a velocity coordinate needs; the first measures the strength of the damping
 COORDINATE_COEFFICIENTS = {"v": (), "log": ("chi",), "force": ("c", "q")}
 
@@ -227,18 +222,16 @@ class ForceModel:
         for name, formula in self.coefficients.items():
             self._check_arguments(f"coefficient {name}", formula, names)
             names.add(name)
-        self._check_arguments("force", self.force, {*names, *FORCE_ARGUMENTS})
-        self._check_arguments(
-            "unloading", self.unloading, {*names, *FORCE_ARGUMENTS, *UNLOADING_ARGUMENTS, *STRETCH_ARGUMENTS}
-        )
+        approach = {*names, *FORCE_ARGUMENTS}
+        restitution = {*approach, *UNLOADING_ARGUMENTS}
+        self._check_arguments("force", self.force, approach)
+        self._check_arguments("unloading", self.unloading, {*restitution, "stretch"})
         for role in ("residual", "recovered"):
             self._check_arguments(role, getattr(self, role), {*names, "peak", "force_at_peak"})
         for formula in self.breakpoints:
-            self._check_arguments("breakpoint", formula, {*names, *FORCE_ARGUMENTS})
+            self._check_arguments("breakpoint", formula, approach)
         for formula in self.unloading_breakpoints:
-            self._check_arguments(
-                "unloading breakpoint", formula, {*names, *FORCE_ARGUMENTS, *UNLOADING_ARGUMENTS}
-            )
+            self._check_arguments("unloading breakpoint", formula, restitution)
         self._check_arguments("oracle", self.oracle, names)
         self._check_arguments("stiffness", self.stiffness, inputs - {"K", "e"})
 
@@ -269,7 +262,7 @@ class ForceModel:
         for name, (is_valid, expected) in allowed.items():
             if not is_valid:
                 raise ModelError(f"model {self.key}: {name}: got {getattr(self, name)!r}, expected {expected}")
-        reserved_names = {*QUANTITIES, *DOMAIN_INPUTS, *FORCE_ARGUMENTS, *UNLOADING_ARGUMENTS, *STRETCH_ARGUMENTS}
+        reserved_names = {*QUANTITIES, *DOMAIN_INPUTS, *FORCE_ARGUMENTS, *UNLOADING_ARGUMENTS, "stretch"}
         for name in (*(parameter.name for parameter in self.parameters), *self.coefficients):
             if name in reserved_names:
                 raise ModelError(f'model {self.key}: "{name}" is the name of a quantity, expected another name')

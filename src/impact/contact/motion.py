@@ -22,7 +22,7 @@ from ..errors import ModelError
 from ..ode.events import choose
 from ..ode.problem import Params, Problem, Rates
 from .formula_calls import Formula, argument_names, call_by_name
-from .model import FORCE_ARGUMENTS, ForceModel
+from .model import FORCE_ARGUMENTS, UNLOADING_ARGUMENTS, ForceModel
 from .piecewise import BREAKPOINT_TOLERANCE, Breakpoint
 from .powers import integer_power, power
 from .velocity_coordinates import VelocityCoordinate, coordinate, force_form, signed_power
@@ -39,8 +39,6 @@ APPROACH_STEP, RESTITUTION_STEP = 2.7, 0.87
 # step of the difference quotient for the rate of the force at the release, relative to s; a step may end at s = 0
 # itself, so that s is taken to be at least the second number
 RELEASE_STEP, MIN_RELEASE_S = 1e-7, 1e-12
-# params of an unloading branch, which follow those of the law
-UNLOADING_PARAMS = ("peak", "force_at_peak", "residual", "recovered")
 # the force of a law without damping is assumed to vanish as a power of s with a smaller exponent
 MAX_FORCE_EXPONENT = 16.0
 # strength of a coordinate without a coefficient
@@ -160,13 +158,13 @@ def breakpoints(
     `start` are components of shape (2, n); `residual` is the permanent indentation, shape (n,), None on approach.
     """
     model, n_law_params = law.model, len(law.names)
-    extra = UNLOADING_PARAMS if residual is not None and model.unloading is not None else ()
+    extra = UNLOADING_ARGUMENTS if residual is not None and model.unloading is not None else ()
     # where both phases have the same force, its breakpoints are crossed again on restitution
     formulas = model.unloading_breakpoints if extra else model.breakpoints
     unloading_values = dict(zip(extra, params[n_law_params:], strict=False))
     phase_breakpoints: list[Breakpoint] = []
     for formula in formulas:
-        if not FORCE_ARGUMENTS.keys().isdisjoint(argument_names(formula)):
+        if not set(FORCE_ARGUMENTS).isdisjoint(argument_names(formula)):
             phase_breakpoints.append(_breakpoint_of_motion(law, formula, extra))
             continue
         x = np.broadcast_to(law.call(formula, params[:n_law_params], unloading_values), start.shape[1])
@@ -230,7 +228,10 @@ def force_at_peak(law: MotionLaw, s: Array, params: Params) -> Array:
 
 
 def unloading_state(law: MotionLaw, params: Params, peak: Array, at_peak: Array) -> tuple[Array, Array, Params]:
-    """Compute the residual and the recovered indentation at each peak, and the params of the restitution phase."""
+    """Compute the residual and the recovered indentation at each peak, and the params of the restitution phase.
+
+    The values of UNLOADING_ARGUMENTS follow the params of the law.
+    """
     model, residual = law.model, np.zeros_like(peak)
     formula = model.residual or model.recovered
     if formula is not None:
@@ -316,7 +317,7 @@ def _formula_of_motion(
 ) -> Callable[[Array, Params], tuple[Array, Array | None, Array]]:
     """Make the function of components and params that computes v, K δⁿ if the formula uses it, and F."""
     branch = law.model.unloading if unloads else None
-    formula, extra = branch or law.model.force, UNLOADING_PARAMS if branch else ()
+    formula, extra = branch or law.model.force, UNLOADING_ARGUMENTS if branch else ()
     names, n_law_params = {*argument_names(formula)}, len(law.names)
 
     def evaluate(y: Array, params: Params) -> tuple[Array, Array | None, Array]:
