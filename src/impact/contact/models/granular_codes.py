@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from ...array_types import Array
@@ -32,6 +34,8 @@ TANGENT_DASHPOT = "F = K δ^(3/2) + 2 β √(m S) δ̇,  S = (3/2) K δ^(1/2)"
 # at this closing speed the linear spring absorbs as much energy as Hertz's
 CHARACTERISTIC_SPEED = (Parameter("vc", "m/s", "characteristic speed of the stiffness", default=1.0, least=1e-9),)
 STIFFNESS_BY_SPEED = "K = (16/15) E* √R* (15 m v_c²/(16 E* √R*))^(1/5)"
+# springs of exponent 1 and 3/2 with a dashpot
+linear_dashpot, hertzian_dashpot = (partial(dashpot, exponent=n, family="codes") for n in (1.0, 1.5))
 
 
 def stiffness_by_speed(E_eff: Array, R_eff: Array, m: Array, vc: Array) -> Array:
@@ -61,7 +65,7 @@ LIGGGHTS_HERTZ_LIMIT = in_code(
     f"{LIGGGHTS}normal_model_hertz.h",
 )
 
-LIGGGHTS_HOOKE = dashpot(
+LIGGGHTS_HOOKE = linear_dashpot(
     "liggghts-hooke",
     title="LIGGGHTS hooke (3.0.0 to 3.8.0)",
     year=2014,
@@ -71,9 +75,7 @@ LIGGGHTS_HOOKE = dashpot(
     parameters=CHARACTERISTIC_SPEED,
     zeta=gap_damping,
     release="gap",
-    exponent=1.0,
     stiffness=stiffness_by_speed,
-    family="codes",
 )
 
 CHRONO_SMC_HOOKE = with_release(
@@ -124,7 +126,7 @@ CHRONO_HERTZ = in_code(
     "the multicore solver does not cut the tension off, as in tsuji-1992",
 )
 
-CHRONO_SMC_PLAINCOULOMB = dashpot(
+CHRONO_SMC_PLAINCOULOMB = hertzian_dashpot(
     "chrono-smc-plaincoulomb",
     title="Chrono SMC, PlainCoulomb (sequential core, 2016 to 2026)",
     year=2016,
@@ -137,9 +139,7 @@ CHRONO_SMC_PLAINCOULOMB = dashpot(
     ),
     zeta=gap_damping,
     release="force",
-    exponent=1.5,
     stiffness=lambda E_eff: 4 / 3 * E_eff,
-    family="codes",
 )
 
 # ---- YADE
@@ -148,7 +148,7 @@ HERTZ_MINDLIN = "YADE, Law2_ScGeom_MindlinPhys_Mindlin"
 MINDLIN_SOURCE = f"{YADE_2025}, HertzMindlin.cpp"
 CLAMPED_SOURCE = "YADE, pkg/dem/HertzMindlin.cpp, commit 45c86581d (September 2013)"
 
-YADE_EN = dashpot(
+YADE_EN = hertzian_dashpot(
     "yade-en",
     title="YADE HertzMindlin en (since 2023.02a)",
     year=2023,
@@ -157,8 +157,6 @@ YADE_EN = dashpot(
     evidence=Evidence("seen", MINDLIN_SOURCE),
     zeta=lambda e: np.where(e < 1.0, thornton_zeta(np.minimum(e, np.nextafter(1.0, 0.0))), 0.0),
     release="force",
-    exponent=1.5,
-    family="codes",
 )
 YADE_EN_CLAMPED = in_code(
     TSUJI_1992_NO_TENSION,
@@ -185,7 +183,7 @@ YADE_EN_AT_SPEED = in_code(
     MINDLIN_SOURCE,
 )
 
-YADE_BETAN = dashpot(
+YADE_BETAN = hertzian_dashpot(
     "yade-betan",
     title="YADE HertzMindlin betan, by the traditional formula (since September 2013)",
     year=2013,
@@ -195,8 +193,6 @@ YADE_BETAN = dashpot(
     # 2 β √(3/2) is α
     zeta=lambda e: np.sqrt(1.2) * gap_damping(e),
     release="force",
-    exponent=1.5,
-    family="codes",
 )
 YADE_BETAN_PULLING = with_release(
     YADE_BETAN,
@@ -206,7 +202,7 @@ YADE_BETAN_PULLING = with_release(
     year=2010,
     evidence=Evidence("seen", f"{CLAMPED_SOURCE}, whose removed lines pull"),
 )
-YADE_BETAN_DIRECT = dashpot(
+YADE_BETAN_DIRECT = hertzian_dashpot(
     "yade-betan-direct",
     title="YADE HertzMindlin betan (since September 2013)",
     year=2013,
@@ -216,8 +212,6 @@ YADE_BETAN_DIRECT = dashpot(
     parameters=(Parameter("betan", "1", "damping ratio β of the tangent stiffness", least=0.0, is_damping=True),),
     zeta=lambda betan: np.sqrt(1.2) * betan,
     release="force",
-    exponent=1.5,
-    family="codes",
 )
 
 VISCO_ELASTIC = "YADE, Law2_ScGeom_ViscElPhys_Basic"
@@ -253,7 +247,7 @@ MFIX = "soufiane92/MFiX-21.3.2, model/check_data/check_solids_dem.f and model/de
 MFIX_LSD = in_code(
     ANAGNOSTOPOULOS_1988, "mfix-lsd", "MFiX DEM, LSD (2016 to 21.3.2)", 2016, "MFiX, DES_COLL_MODEL LSD", MFIX
 )
-MFIX_HERTZ = dashpot(
+MFIX_HERTZ = hertzian_dashpot(
     "mfix-hertz",
     title="MFiX DEM, Hertzian (2014 to 21.3.2)",
     year=2014,
@@ -262,8 +256,6 @@ MFIX_HERTZ = dashpot(
     evidence=Evidence("seen", MFIX),
     zeta=lambda e: 2 / np.sqrt(5.0) * gap_damping(e),
     release="gap",
-    exponent=1.5,
-    family="codes",
 )
 
 # ---- Kratos
@@ -271,7 +263,7 @@ MFIX_HERTZ = dashpot(
 # sphere_strategy.py replaces an e below the first by it, and has no damping above the second
 KRATOS_MIN_E, KRATOS_MAX_E = 0.001, 0.999
 
-KRATOS_HERTZ = dashpot(
+KRATOS_HERTZ = hertzian_dashpot(
     "kratos-hertz",
     title="Kratos DEM, Hertz with viscous damping (law files of 2015)",
     year=2015,
@@ -285,10 +277,8 @@ KRATOS_HERTZ = dashpot(
     ),
     zeta=lambda e: np.where(e <= KRATOS_MAX_E, thornton_zeta(np.clip(e, KRATOS_MIN_E, KRATOS_MAX_E)), 0.0),
     release="force",
-    exponent=1.5,
-    family="codes",
 )
-KRATOS_LINEAR = dashpot(
+KRATOS_LINEAR = linear_dashpot(
     "kratos-linear",
     title="Kratos DEM, linear with viscous damping (law files of 2015)",
     year=2015,
@@ -303,11 +293,9 @@ KRATOS_LINEAR = dashpot(
     ),
     zeta=lambda e: np.where(e <= KRATOS_MAX_E, force_damping(np.maximum(e, KRATOS_MIN_E)), 0.0),
     release="force",
-    exponent=1.0,
     stiffness=lambda E_eff, R_eff, R1, R2: (
         np.where(np.isinf(R1) | np.isinf(R2), 1.0, 1.432) * np.pi * 0.31225 * E_eff * R_eff
     ),
-    family="codes",
 )
 
 # ---- MercuryDPM and DEMLab
@@ -323,7 +311,7 @@ MERCURYDPM_LINEAR = in_code(
     "its first year was not seen",
 )
 
-DEMLAB_TTI = dashpot(
+DEMLAB_TTI = hertzian_dashpot(
     "demlab-tti",
     title="DEMLab TTI (2021 to 2024)",
     year=2021,
@@ -336,6 +324,4 @@ DEMLAB_TTI = dashpot(
     ),
     zeta=lambda e: 2.2664 / np.sqrt(5.0) / np.sqrt(1.0 + 10.1354 / np.square(np.log(e))),
     release="force",
-    exponent=1.5,
-    family="codes",
 )
