@@ -56,9 +56,6 @@ ValueArrays = Mapping[str, Array]
 # simulates impacts with the same n: n, the values and the number of impacts, and `collapse`
 T = TypeVar("T", bound=Record)
 SimulatePart = Callable[..., T]
-# columns of the trajectory table
-TABLE_COLUMNS = CollisionResult.columns()
-
 
 # computes the collisions of distinct impacts, see `integrate_collisions`
 ComputeCollisions = Callable[..., CollisionResult]
@@ -372,7 +369,8 @@ def integrate_collisions(
 
     phases = solve_phases(law, params, n, solve, never_separates)
     approach, restitution, rows = phases.approach, phases.restitution, phases.rows
-    result = CollisionResult(
+    result = replace(
+        CollisionResult.blank(n),
         e_out=phases.e_out,
         peak=phases.peak,
         permanent=phases.residual.copy(),
@@ -382,8 +380,6 @@ def integrate_collisions(
         restitution_work=np.zeros(n),
         steps=approach.steps.copy(),
         status=phases.status,
-        chi=np.full(n, np.nan),
-        exact=np.full(n, np.nan),
     )
     if restitution is not None:
         # balls that are held, or separate at zero speed after infinite time, lose all their energy

@@ -20,8 +20,7 @@ import numpy as np
 from filelock import FileLock, Timeout
 
 from ..atomic import atomic_write, sync_folder
-from ..contact.records import Record
-from ..contact.simulate import TABLE_COLUMNS
+from ..contact.records import CollisionResult, Record
 from ..contact.tangential import TangentialResult
 from ..errors import ImpactError, InUseError, StoreError, UsageError
 from ..formatting import argument, safe_text
@@ -185,7 +184,7 @@ def _sweep_record(plan: Plan, extends: str = "") -> dict[str, Any]:
     """Collect everything that the finished ranges of a sweep depend on."""
     solver = plan.solver
     return {
-        "schema": TABLE_COLUMNS,
+        "schema": CollisionResult.columns(),
         **({"friction_schema": TangentialResult.columns()} if plan.frictions else {}),
         "block": RANGE_TRAJECTORIES,
         "collapse": solver.collapse,

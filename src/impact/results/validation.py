@@ -13,7 +13,7 @@ import xarray as xr
 
 from ..config.input_names import InputName
 from ..config.tables import MATERIAL_KEYS, MATERIAL_QUANTITIES, SWEEP_QUANTITIES
-from ..contact.simulate import TABLE_COLUMNS
+from ..contact.records import CollisionResult
 from ..contact.tangential import TangentialResult
 from ..contact.variables import AXES, LAW_DIMS, OUTPUTS
 from ..errors import ResultError
@@ -37,7 +37,7 @@ TEXT_COORDINATES = frozenset(
 # the trajectory table of a factored file, see `impact.results.factored`
 TABLE_VARIABLES = frozenset(
     {
-        *(f"trajectory_{name}" for name in TABLE_COLUMNS),
+        *(f"trajectory_{name}" for name in CollisionResult.columns()),
         *(f"tangential_{name}" for name in TangentialResult.columns()),
         "trajectory_of_cell",
         "law_stiffness",
