@@ -95,10 +95,9 @@ def history_of(recorded: RecordedMotion, impacts: Impacts, times: int | Array | 
     )
 
     unit_t = impacts.length / impacts.v0
-    t = np.concatenate([approach.t, phases.approach.state[2, :1] + restitution.t]) * unit_t
-    delta = np.concatenate([approach.x, phases.residual[:1] + restitution.x]) * impacts.length
-    v = np.concatenate([approach.v, restitution.v]) * impacts.v0
-    force = np.concatenate([approach.F, restitution.F]) * (impacts.m * impacts.v0 / unit_t)
+    restitution.samples[:2] += [phases.approach.state[2, :1], phases.residual[:1]]
+    units = [unit_t, impacts.length, impacts.v0, impacts.m * impacts.v0 / unit_t]
+    t, delta, v, force = np.hstack([approach.samples, restitution.samples]) * units
     # the phases meet at the peak, and the last step can be shorter than rounding: each time appears once
     next_times = np.append(np.minimum.accumulate(t[::-1])[::-1][1:], np.inf)
     t, delta, v, force = (row[t < next_times] for row in (t, delta, v, force))
@@ -198,12 +197,9 @@ def _coulomb_history(history: History, oblique: ObliqueImpacts, recorded: Sequen
 
 @dataclass(frozen=True)
 class _Phase:
-    """The samples of a phase in the contact's own units, shape (k,), and its integrals; x above the residual."""
+    """Samples of t, x above the residual, v and F in a phase, shape (4, k), and its integrals; in own units."""
 
-    t: Array
-    x: Array
-    v: Array
-    F: Array
+    samples: Array
     impulse: float
     work: float
 
@@ -224,10 +220,7 @@ def _phase(
     _, inside = sample(samples, samples.end * 0.5 * (1.0 + np.tile(nodes, len(steps))))
     share = 0.5 * np.tile(weights, len(steps)) * (samples.end * samples.length)
     return _Phase(
-        t=y[2],
-        x=motion.indentation(law, y[0]),
-        v=law.velocity(y, params),
-        F=rates[4],
+        samples=np.array([y[2], motion.indentation(law, y[0]), law.velocity(y, params), rates[4]]),
         impulse=math.fsum(share * (inside[4] * inside[2])),
         work=math.fsum(share * inside[3]),
     )
