@@ -258,13 +258,11 @@ def _where(mask: Mask, value: FrictionStatus, otherwise: NDArray[np.int8]) -> ND
 
 def _parameter(law: FrictionLaw, oblique: ObliqueImpacts, name: str) -> Array | None:
     """Find the values of a parameter, or its default; None where the law lacks it, or the user does not set it."""
-    parameter = next((parameter for parameter in law.parameters if parameter.name == name), None)
-    if parameter is None:
-        return None
     values = oblique.parameters.get(name)
     if values is not None and not np.isnan(values).all():
         return np.asarray(values)
-    return None if parameter.default is None else _ones(oblique.impacts) * parameter.default
+    default = next((parameter.default for parameter in law.parameters if parameter.name == name), None)
+    return None if default is None else _ones(oblique.impacts) * default
 
 
 def _value(law: FrictionLaw, oblique: ObliqueImpacts, name: str) -> Array:
