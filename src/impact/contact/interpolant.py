@@ -42,8 +42,6 @@ MAX_INTERVALS = 250
 REAL_ROOT, NOISE = 1e-6, 1e-13
 # the intervals of a dimensionless group; other values are integrated
 GROUP_EDGES = np.concatenate([[0.0], 10.0 ** np.arange(-4, 9)])
-# how many values are computed at a time
-BLOCK = 4096
 # the columns of a collision that are interpolated, and their sizes where their values are smaller
 FLOORS = {
     "e_out": 1.0,
@@ -118,6 +116,12 @@ class Interval:
         """The values of the variable at the nodes, ascending, and between them; shape (DEGREE + 1 + checks,)."""
         return from_unit(np.concatenate([NODES, CHECKS]), self.lower, self.upper)
 
+    def __call__(self, x: Array) -> Array:
+        """Compute the polynomials between the bounds, shape (k, columns); NaN if they are not accurate."""
+        if self.coefficients is None or not self.is_accurate:
+            return np.full(x.shape, np.nan)[:, None]
+        return np.asarray(chebyshev.chebval(to_unit(x, self.lower, self.upper), self.coefficients).T)
+
     def tried(self, values: Array, floors: Array) -> Interval:
         """Interpolate the values of the function at all nodes."""
         at_nodes, between = np.split(values, [DEGREE + 1])
@@ -172,16 +176,7 @@ class Interpolant:
         self.function, self.floors, self.max_divisions = function, floors, max_divisions
         self.is_needed = is_needed
         bounds = np.asarray(edges, float).tolist()
-        self._set([Interval(lower, upper) for lower, upper in pairwise(bounds)])
-
-    def _set(self, intervals: list[Interval]) -> None:
-        self.intervals = intervals
-        self._edges = np.array([intervals[0].lower, *(interval.upper for interval in intervals)])
-        self._is_accurate = np.array([interval.is_accurate for interval in intervals])
-        blank = np.zeros((DEGREE + 1, self.floors.size))
-        self._coefficients = np.stack(
-            [blank if i.coefficients is None else i.coefficients for i in intervals], axis=1
-        )
+        self.intervals = [Interval(lower, upper) for lower, upper in pairwise(bounds)]
 
     def __call__(self, x: Array) -> Array:
         """Compute the values, shape (k, columns); NaN where no polynomial is accurate.
@@ -191,10 +186,10 @@ class Interpolant:
         number = self._interval_of(x)
         while self._refine(np.unique(number[number >= 0])):
             number = self._interval_of(x)
-        inside = number >= 0
-        inside[inside] = self._is_accurate[number[inside]]
         values: Array = np.full((x.size, self.floors.size), np.nan)
-        values[inside] = self._polynomials(x[inside], number[inside])
+        for chosen in np.unique(number[number >= 0]).tolist():
+            inside = number == chosen
+            values[inside] = self.intervals[chosen](x[inside])
         return values
 
     def resolve(self) -> None:
@@ -228,18 +223,9 @@ class Interpolant:
 
     def _interval_of(self, x: Array) -> NDArray[np.intp]:
         """Find the number of the interval of each value; -1 outside."""
-        number = np.searchsorted(self._edges[1:-1], x)
-        return np.where((x >= self._edges[0]) & (x <= self._edges[-1]), number, -1)
-
-    def _polynomials(self, x: Array, number: NDArray[np.intp]) -> Array:
-        t = to_unit(x, self._edges[number], self._edges[number + 1])
-        values: Array = np.empty((x.size, self.floors.size))
-        # in blocks whose coefficients stay in the cache
-        for start in range(0, x.size, BLOCK):
-            part = slice(start, start + BLOCK)
-            coefficients = self._coefficients[:, number[part]]
-            values[part] = chebyshev.chebval(t[part, None], coefficients, tensor=False)
-        return values
+        edges = [self.intervals[0].lower, *(interval.upper for interval in self.intervals)]
+        number = np.searchsorted(edges[1:-1], x)
+        return np.where((x >= edges[0]) & (x <= edges[-1]), number, -1)
 
     def _refine(self, numbers: NDArray[np.intp]) -> bool:
         """Try intervals that are untried, and divide those that are not accurate; whether any was."""
@@ -252,7 +238,7 @@ class Interpolant:
         divided = {number for number in numbers.tolist() if self._is_divided(intervals[number])}
         if untried or divided:
             parts = [i.parts() if number in divided else [i] for number, i in enumerate(intervals)]
-            self._set([interval for part in parts for interval in part])
+            self.intervals = [interval for part in parts for interval in part]
         return bool(divided)
 
     def _is_divided(self, interval: Interval) -> bool:
