@@ -7,30 +7,24 @@ import operator
 import re
 from collections.abc import Callable, Mapping
 from functools import cache
-from typing import Any, NamedTuple
+from typing import Any
 
 from ..array_types import Array
 from ..errors import ModelError
 
+# exponents of mass, length and time; arrays where the values in the exponents of the unit are arrays
+Dimension = tuple[Array | float, Array | float, Array | float]
 
-class Dimension(NamedTuple):
-    """Exponents of mass, length and time; arrays where the values in the exponents of the unit are arrays."""
-
-    mass: Array | float
-    length: Array | float
-    time: Array | float
-
-
-UNIT_DIMENSIONS = {
-    "1": Dimension(0, 0, 0),
-    "rad": Dimension(0, 0, 0),
-    "kg": Dimension(1, 0, 0),
-    "m": Dimension(0, 1, 0),
-    "s": Dimension(0, 0, 1),
-    "N": Dimension(1, 1, -2),
-    "Pa": Dimension(1, -1, -2),
-    "J": Dimension(1, 2, -2),
-    "Hz": Dimension(0, 0, -1),
+UNIT_DIMENSIONS: dict[str, Dimension] = {
+    "1": (0, 0, 0),
+    "rad": (0, 0, 0),
+    "kg": (1, 0, 0),
+    "m": (0, 1, 0),
+    "s": (0, 0, 1),
+    "N": (1, 1, -2),
+    "Pa": (1, -1, -2),
+    "J": (1, 2, -2),
+    "Hz": (0, 0, -1),
 }
 
 OPERATORS: dict[type[ast.operator], Callable[[Any, Any], Array | float]] = {
@@ -47,9 +41,9 @@ def dimension(unit: str, values: Mapping[str, Array | float]) -> Dimension:
     """Compute the dimension of an SI unit such as "N/m^n", with the values of the names in its exponents.
 
     >>> dimension("N/m^n", {"n": 1.5})
-    Dimension(mass=1.0, length=-0.5, time=-2.0)
+    (1.0, -0.5, -2.0)
     >>> dimension("N s^p/m^(n+p)", {"n": 1.5, "p": 2.0})
-    Dimension(mass=1.0, length=-2.5, time=0.0)
+    (1.0, -2.5, 0.0)
     """
     total: list[Array | float] = [0.0, 0.0, 0.0]
     position = 0
@@ -62,7 +56,8 @@ def dimension(unit: str, values: Mapping[str, Array | float]) -> Dimension:
             # an exponent that is not finite must not change the dimensions that the factor does not have
             total[axis] += base_exponent * exponent if base_exponent else 0.0
         position = factor.end()
-    return Dimension(*total)
+    mass, length, time = total
+    return mass, length, time
 
 
 def with_numbers(unit: str, values: Mapping[str, float]) -> str:
