@@ -44,7 +44,7 @@ def fixed_step_error(solved: SolvedProblem, count: int, embedded: bool) -> float
     y[:2, 0] = solved.initial_state
     k = rates(y[:2], ())
     for _ in range(count):
-        y, stages = rk_step(solved.problem, y, k, h, (), Workspace.of(h.size))
+        y, stages = rk_step(solved.problem, y, k, h, (), Workspace.of(solved.problem, h.size))
         k = stages[-1]
         if embedded:
             y = y - h * sum(float(e) * stage[:4] for e, stage in zip(tableau.E, stages, strict=True))

@@ -73,10 +73,9 @@ def integrate(
     record : whether to keep every accepted step for the interpolant; of the first trajectory, all are equal
     """
     n = start.shape[1]
-    rows = problem.n_components, problem.n_integrated, len(problem.floor)
     solution = Solution.blank(n, problem.n_integrated)
     recorded: list[Step] = []
-    workspace = Workspace.of(n, *rows)
+    workspace = Workspace.of(problem, n)
     with np.errstate(all="ignore"):
         state = State.begin(problem, start, params, workspace.narrow(n), first_step(problem, rtol))
         for count in range(1, max_steps + 1):

@@ -37,28 +37,25 @@ class PeakCandidate:
 
 @dataclass
 class Workspace:
-    """Memory for the rows and rates of a batch, and of a step: stages after the first, rows at its end, a sum."""
+    """Memory for a step: the rates of the stages after the first, rows at its end, a sum."""
 
-    y: Array
-    k: Array
     stages: list[Array]
     y_end: Array
     part: Array
 
     @classmethod
-    def of(cls, n: int, components: int = 2, integrated: int = 4, judged: int = 2) -> Workspace:
-        """Allocate for n trajectories, in one block of memory; the errors of the `judged` rows are computed."""
+    def of(cls, problem: Problem, n: int) -> Workspace:
+        """Allocate for n trajectories, in one block of memory."""
+        components, integrated = problem.n_components, problem.n_integrated
         stage_rows = (components, *(integrated,) * N_WEIGHTED_STAGES, integrated + 1)
-        rows = (integrated, integrated + 1, *stage_rows, integrated, max(components, judged))
-        block = np.empty((sum(rows), n))
-        y, k, *stages, y_end, part = np.split(block, np.cumsum(rows)[:-1])
-        return cls(y, k, stages, y_end, part)
+        rows = (*stage_rows, integrated, max(components, len(problem.floor)))
+        *stages, y_end, part = np.split(np.empty((sum(rows), n)), np.cumsum(rows)[:-1])
+        return cls(stages, y_end, part)
 
     def narrow(self, n: int) -> Workspace:
         """Use the same memory for fewer trajectories."""
         stages = [_narrow(stage, n) for stage in self.stages]
-        ends = (_narrow(rows, n) for rows in (self.y_end, self.part))
-        return Workspace(_narrow(self.y, n), _narrow(self.k, n), stages, *ends)
+        return Workspace(stages, _narrow(self.y_end, n), _narrow(self.part, n))
 
 
 def put_columns(rows: Array, positions: NDArray[np.intp], values: Array) -> None:
@@ -101,10 +98,10 @@ class State:
     def begin(cls, problem: Problem, start: Array, params: Params, workspace: Workspace, h: float) -> State:
         """Set all trajectories to their start; missing rows of the start are zero."""
         n = start.shape[1]
-        y, k = workspace.y, workspace.k
-        y[: len(start)], y[len(start) :] = start, 0.0
+        y = np.zeros((problem.n_integrated, n))
+        y[: len(start)] = start
         start = start[: problem.n_components]
-        np.copyto(k, problem.rates(start, params, k))
+        k = problem.rates(start, params)
         margins: Margins = np.zeros((0, n)), np.zeros((0, n))
         if problem.switch is not None:
             # the modes are written to the columns
