@@ -174,7 +174,7 @@ def test_the_integration_stops_after_max_steps_attempts():
 def test_at_most_one_step_of_an_approach_is_rejected(rtol):
     law = motion.MotionLaw.of(find("hunt-crossley-1975"), 1.5, strong=False)
     for chi in np.linspace(0.0, 2.0, 9):
-        start = motion.start_of_approach(law, (), 1)
+        start = motion.components_at(law, (), np.zeros(1), 1.0)
         integrate_approach = partial(integrate, motion.approach_problem(law), start, (np.array([chi]),), rtol=rtol)
         steps = int(integrate_approach(max_steps=1000).steps[0])
         assert integrate_approach(max_steps=steps + 1).termination[0] == Termination.EVENT_REACHED

@@ -197,19 +197,9 @@ def restitution_law(law: MotionLaw) -> MotionLaw:
     return law if law.model.unloading is None else replace(law, coordinate=VelocityCoordinate())
 
 
-def start_of_approach(law: MotionLaw, params: Params, n: int) -> Array:
-    """Make the components at first contact, shape (2, n): s = 0, v = 1."""
-    return _components_at(law, params, np.zeros(1), 1.0, n)
-
-
-def start_of_restitution(law: MotionLaw, params: Params, recovered: Array) -> Array:
-    """Make the components at the peak, shape (2, n): s of the recovered indentation, shape (n,), and v = 0."""
-    return _components_at(law, params, power(recovered, 1.0 / law.model.coordinate_power), 0.0, recovered.size)
-
-
-def _components_at(law: MotionLaw, params: Params, s: Array, v: float, n: int) -> Array:
-    """Compute the components, shape (2, n), at s of shape (n,) or (1,) and a velocity that all have."""
-    y = np.empty((2, n))
+def components_at(law: MotionLaw, params: Params, s: Array, v: float) -> Array:
+    """Compute the components, shape (2, n), at s of shape (n,) and a velocity that all have."""
+    y = np.empty((2, s.size))
     y[0] = s
     y[1] = law.coordinate.of(s, v, law.strength(params))
     return y
@@ -222,7 +212,7 @@ def indentation(law: MotionLaw, s: Array) -> Array:
 
 def force_at_peak(law: MotionLaw, s: Array, params: Params) -> Array:
     """Compute the force at the end of the approach, at s of shape (n,) and v = 0."""
-    at_rest, formula = _components_at(law, params, s, 0.0, s.size), law.model.force
+    at_rest, formula = components_at(law, params, s, 0.0), law.model.force
     force = law.call(formula, params, _formula_arguments(law, {*argument_names(formula)}, (), at_rest, params))
     return np.broadcast_to(force, s.shape)
 

@@ -29,7 +29,7 @@ from .formula_calls import argument_names, describe_error
 from .model import ForceModel
 from .numba import dispatch
 from .piecewise import in_parts
-from .powers import distinct_values
+from .powers import distinct_values, power
 from .records import CollisionResult, Positions, Record, positions
 from .slip_motion import TangentialForm
 from .status import LIMIT, STATUS_OK, Status
@@ -438,7 +438,8 @@ def solve_phases(
 ) -> Phases:
     """Solve approach and restitution of n impacts, see `integrate_collisions`."""
     back = motion.restitution_law(law)
-    approach = solve(law, motion.approach_problem(law), motion.start_of_approach(law, params, n), params, None)
+    start = motion.components_at(law, params, np.zeros(n), 1.0)
+    approach = solve(law, motion.approach_problem(law), start, params, None)
     peak = motion.indentation(law, approach.state[0])
     at_peak = motion.force_at_peak(law, approach.state[0], params)
     residual, recovered, params = motion.unloading_state(law, params, peak, at_peak)
@@ -452,7 +453,7 @@ def solve_phases(
     params, recovered = tuple(column[rows] for column in params), recovered[rows]
     restitution = None
     if recovered.size:
-        start = motion.start_of_restitution(back, params, recovered)
+        start = motion.components_at(back, params, power(recovered, 1.0 / back.model.coordinate_power), 0.0)
         recovery = Recovery(rows, residual[rows])
         restitution = solve(back, motion.restitution_problem(back), start, params, recovery)
         _mark_never_separating(back, restitution, params, recovered)
