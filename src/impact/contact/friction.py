@@ -27,7 +27,7 @@ from .formula_calls import Formula, argument_names, call_by_name
 from .impacts import Impacts
 from .materials import effective_shear_modulus
 from .model import COORDINATE_COEFFICIENTS, NOT_VERIFIED, ForceModel, Parameter
-from .powers import distinct_values
+from .powers import distinct_values, replace_where
 from .rigid import ObliqueImpacts
 from .slip_motion import FrictionKind, TangentialForm
 from .status import FrictionStatus
@@ -189,11 +189,11 @@ def check_friction(pair: Pair, oblique: ObliqueImpacts) -> NDArray[np.int8]:
     law = pair.friction
     status = np.full((1,) * max(1, len(oblique.impacts.shape)), FrictionStatus.OK, np.int8)
     for value in _spring_values(pair, oblique).values():
-        status = _where(~(value >= 0.0), FrictionStatus.OUT_OF_RANGE, status)
+        status = replace_where(status, ~(value >= 0.0), np.int8(FrictionStatus.OUT_OF_RANGE))
     for mask in _invalid(law, oblique):
-        status = _where(mask, FrictionStatus.INVALID_PARAMETER, status)
+        status = replace_where(status, mask, np.int8(FrictionStatus.INVALID_PARAMETER))
     for mask, _ in _problems(pair, oblique):
-        status = _where(mask, FrictionStatus.NOT_COMBINABLE, status)
+        status = replace_where(status, mask, np.int8(FrictionStatus.NOT_COMBINABLE))
     return status
 
 
@@ -249,11 +249,6 @@ def required_inputs(law: FrictionLaw, given: Collection[str], exponents: Collect
 def _ones(impacts: Impacts) -> Array:
     """1, of length one along all axes of the impacts."""
     return np.ones((1,) * max(1, len(impacts.shape)))
-
-
-def _where(mask: Mask, value: FrictionStatus, otherwise: NDArray[np.int8]) -> NDArray[np.int8]:
-    """Replace a status where a mask is True; the shape grows only if it is True somewhere."""
-    return np.where(mask, np.int8(value), otherwise) if np.any(mask) else otherwise
 
 
 def _parameter(law: FrictionLaw, oblique: ObliqueImpacts, name: str) -> Array | None:

@@ -15,7 +15,7 @@ from .formula_calls import argument_names
 from .friction import Pair, check_friction, friction_values
 from .impacts import Impacts, check_inputs
 from .model import ForceModel, Law
-from .powers import all_within
+from .powers import all_within, replace_where
 from .records import CollisionResult
 from .rigid import ObliqueImpacts, velocities_after
 from .simulate import ComputeCollisions, RecordedMotion, simulate
@@ -58,7 +58,7 @@ def outputs(
 
 def _replace_nan(values: NDArray[Any]) -> NDArray[Any]:
     """Give every NaN of an array the same bits."""
-    return _replace_where(values, np.isnan(values), np.nan) if values.dtype.kind == "f" else values
+    return replace_where(values, np.isnan(values), np.nan) if values.dtype.kind == "f" else values
 
 
 def _compute(name: str, computed: dict[str, Any]) -> Any:
@@ -141,13 +141,6 @@ def collide(
     return outputs(model, impacts, result, names, checked, (inputs, tangential, pair.friction.kind))
 
 
-def _replace_where(
-    value: NDArray[Any], mask: Mask, otherwise: float | np.integer[Any] | NDArray[Any]
-) -> NDArray[Any]:
-    """Replace the value by another one where the mask is True; the shape grows only if it is True somewhere."""
-    return np.where(mask, otherwise, value) if mask.any() else value
-
-
 # ---- intermediate values; the arguments of each function are names of FORMULAS
 
 
@@ -159,7 +152,7 @@ def _asked_e(impacts: Impacts) -> Array:
 
 def _in_si(failed: Mask, missed: Mask) -> InSI:
     """Converts (values, unit) to SI: NaN where the impact failed, 0 where the balls miss each other."""
-    return lambda value, unit: _replace_where(_replace_where(value * unit, failed, np.nan), missed, 0.0)
+    return lambda value, unit: replace_where(replace_where(value * unit, failed, np.nan), missed, 0.0)
 
 
 # ---- outputs
@@ -167,18 +160,18 @@ def _in_si(failed: Mask, missed: Mask) -> InSI:
 
 def _damping_ratio(result: CollisionResult, not_integrated: Mask) -> Array:
     chi = result.chi
-    return _replace_where(_replace_where(chi, not_integrated, np.nan), np.isinf(chi), np.nan)
+    return replace_where(replace_where(chi, not_integrated, np.nan), np.isinf(chi), np.nan)
 
 
 def _energy_residual(result: CollisionResult, undefined: Mask) -> Array:
     work = result.approach_work + result.restitution_work
-    return _replace_where(work - (1.0 - result.e_out * result.e_out), undefined, np.nan)
+    return replace_where(work - (1.0 - result.e_out * result.e_out), undefined, np.nan)
 
 
 def _energetic(result: CollisionResult, undefined: Mask) -> Array:
     """sqrt(-W_r/W_c), equation (3), from the integrated works; 0 where the balls stay together."""
     e = np.sqrt(np.maximum(-result.restitution_work, 0.0) / result.approach_work)
-    return _replace_where(_replace_where(e, result.status == LIMIT, 0.0), undefined, np.nan)
+    return replace_where(replace_where(e, result.status == LIMIT, 0.0), undefined, np.nan)
 
 
 def _in_domain(law: Law, impacts: Impacts, damping_ratio: Array) -> NDArray[np.int8]:
@@ -208,8 +201,8 @@ def _friction_status(
     tangential: TangentialResult, status: NDArray[np.int8], not_integrated: Mask
 ) -> NDArray[np.int8]:
     """Status of the tangential motion: that of the normal motion where it has none of its own."""
-    own = _replace_where(tangential.status, tangential.status == STATUS_OK, status)
-    return _replace_where(own, not_integrated, status)
+    own = replace_where(tangential.status, tangential.status == STATUS_OK, status)
+    return replace_where(own, not_integrated, status)
 
 
 def _share(name: str) -> Callable[..., Array]:
@@ -229,8 +222,8 @@ def _share(name: str) -> Callable[..., Array]:
             after = np.maximum(size - impulse, 0.0)
         else:
             unknown = unknown | (friction_status == LIMIT)
-        share = _replace_where(after / size, oblique.mu == 0.0, 1.0)
-        return _replace_where(_replace_where(share, unknown, np.nan), missed, 1.0)
+        share = replace_where(after / size, oblique.mu == 0.0, 1.0)
+        return replace_where(replace_where(share, unknown, np.nan), missed, 1.0)
 
     return share
 
@@ -238,7 +231,7 @@ def _share(name: str) -> Callable[..., Array]:
 def _impulse(oblique: ObliqueImpacts, slip_share: Array, friction_status: NDArray[np.int8]) -> Array:
     """P [N s], 0 without a slip."""
     impulse = oblique.m_t * oblique.slip * (1.0 - slip_share)
-    return _replace_where(impulse, _without_slip(oblique, friction_status), 0.0)
+    return replace_where(impulse, _without_slip(oblique, friction_status), 0.0)
 
 
 def _without_slip(oblique: ObliqueImpacts, friction_status: NDArray[np.int8]) -> Mask:
@@ -257,8 +250,8 @@ def _contact_regime(
     regime = tangential.regime
     if kind == "coulomb":
         regime = np.where(np.abs(oblique.G0) >= tangential.sliding_impulse, SLIDES, STICKS | SLIDES)
-    regime = _replace_where(regime, oblique.mu == 0.0, SLIDES)
-    regime = _replace_where(regime, _without_slip(oblique, friction_status), STICKS)
+    regime = replace_where(regime, oblique.mu == 0.0, SLIDES)
+    regime = replace_where(regime, _without_slip(oblique, friction_status), STICKS)
     return np.where((friction_status >= FIRST_FAILURE) | missed, np.int8(0), regime).astype(np.int8)
 
 
@@ -313,20 +306,20 @@ FORMULAS: dict[str, Callable[..., Any]] = {
     "v2_reference": lambda references: references[1],
     "v1_error": lambda v1_post, v1_reference: v1_post - v1_reference,
     "v2_error": lambda v2_post, v2_reference: v2_post - v2_reference,
-    "e_out": lambda result, undefined: _replace_where(result.e_out, undefined, np.nan),
+    "e_out": lambda result, undefined: replace_where(result.e_out, undefined, np.nan),
     "e_error": lambda e_out, asked_e: e_out - asked_e,
     "peak_indentation": lambda result, impacts, in_si: in_si(result.peak, impacts.length),
     "permanent_indentation": lambda result, impacts, in_si: in_si(result.permanent, impacts.length),
     "peak_force": lambda result, impacts, in_si: in_si(result.force, impacts.energy / impacts.length),
     "contact_time": lambda result, impacts, in_si: in_si(result.contact_time, impacts.time),
     "energy_loss": lambda result, impacts, in_si: in_si(1.0 - result.e_out * result.e_out, 0.5 * impacts.energy),
-    "stiffness": lambda impacts, failed: _replace_where(impacts.K, failed, np.nan),
+    "stiffness": lambda impacts, failed: replace_where(impacts.K, failed, np.nan),
     "damping_ratio": _damping_ratio,
     "energy_residual": _energy_residual,
     "closed_form_error": lambda e_out, result: e_out - result.exact,
-    "status": lambda result, not_integrated, checked: _replace_where(result.status, not_integrated, checked),
+    "status": lambda result, not_integrated, checked: replace_where(result.status, not_integrated, checked),
     "in_domain": _in_domain,
-    "steps": lambda result, not_integrated: _replace_where(result.steps, not_integrated, np.int32(0)),
+    "steps": lambda result, not_integrated: replace_where(result.steps, not_integrated, np.int32(0)),
     # tau_r/tau_c, equation (2): the phases change the momentum by m v0 and by e_out m v0
     "e_kinetic": lambda e_out: e_out,
     "e_energetic": _energetic,
@@ -346,7 +339,7 @@ FORMULAS: dict[str, Callable[..., Any]] = {
     "omega2_post": lambda oblique, impulse: oblique.spin_after("2", impulse),
     "slip_post": lambda oblique, impulse: oblique.slip - impulse / oblique.m_t,
     # 0 rather than -0 where the contact sticks
-    "beta": lambda slip_share, missed: _replace_where(0.0 - slip_share, missed, np.nan),
+    "beta": lambda slip_share, missed: replace_where(0.0 - slip_share, missed, np.nan),
     "e_t": lambda oblique, u1_post, u2_post: np.where(
         oblique.u1 == oblique.u2, np.nan, (u1_post - u2_post) / (oblique.u1 - oblique.u2)
     ),

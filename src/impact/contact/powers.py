@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..array_types import Array
+from ..array_types import Array, Mask
 
 
 def power(base: Array, exponent: float) -> Array:
@@ -94,6 +95,13 @@ def all_within(values: Array, least: float, most: float) -> bool:
     (True, False)
     """
     return bool(least <= values.min(initial=most) and values.max(initial=least) <= most)
+
+
+def replace_where(
+    value: NDArray[Any], mask: Mask, otherwise: float | np.integer[Any] | NDArray[Any]
+) -> NDArray[Any]:
+    """Replace the value by another one where the mask is True; the shape grows only if it is True somewhere."""
+    return np.where(mask, otherwise, value) if mask.any() else value
 
 
 def integer_power(base: Array, exponent: int) -> Array:
