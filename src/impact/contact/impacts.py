@@ -13,7 +13,7 @@ from ..array_types import Array
 from .closed_forms.elastic import peak_indentation
 from .materials import effective_compliance, effective_mass, effective_radius
 from .model import ForceModel, Law
-from .powers import all_within, powers
+from .powers import powers, replace_where
 from .status import Status
 from .units import dimension
 
@@ -90,11 +90,6 @@ class Impacts:
     def v0(self) -> Array:
         """Closing speed v1 - v2 [m/s]."""
         return self.v1 - self.v2
-
-    @cached_property
-    def all_approach(self) -> bool:
-        """Whether all pairs of balls approach each other."""
-        return all_within(self.v0, float(np.nextafter(0.0, 1.0)), np.inf)
 
     @cached_property
     def m(self) -> Array:
@@ -196,6 +191,4 @@ def _unless(
     values: Array, least: float, most: float, status: NDArray[np.int8], otherwise: Status
 ) -> NDArray[np.int8]:
     """Replace the status by another one where a value is not within bounds."""
-    if all_within(values, least, most):
-        return status
-    return np.where((values >= least) & (values <= most), status, otherwise)
+    return replace_where(status, ~((values >= least) & (values <= most)), np.int8(otherwise))

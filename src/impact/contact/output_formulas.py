@@ -15,7 +15,7 @@ from .formula_calls import argument_names
 from .friction import Pair, check_friction, friction_values
 from .impacts import Impacts, check_inputs
 from .model import ForceModel, Law
-from .powers import all_within, replace_where
+from .powers import replace_where
 from .records import CollisionResult
 from .rigid import ObliqueImpacts, velocities_after
 from .simulate import ComputeCollisions, RecordedMotion, simulate
@@ -142,12 +142,6 @@ def collide(
 
 
 # ---- intermediate values; the arguments of each function are names of FORMULAS
-
-
-def _asked_e(impacts: Impacts) -> Array:
-    """Return the required restitution, NaN where it is not within [0, 1]."""
-    e = impacts.e
-    return e if all_within(e, 0.0, 1.0) else np.where((e >= 0.0) & (e <= 1.0), e, np.nan)
 
 
 def _in_si(failed: Mask, missed: Mask) -> InSI:
@@ -296,7 +290,8 @@ FORMULAS: dict[str, Callable[..., Any]] = {
     "failed": lambda status: status >= FIRST_FAILURE,
     # impacts without a result
     "undefined": lambda missed, failed: missed | failed,
-    "asked_e": _asked_e,
+    # NaN where the required restitution is not within [0, 1]
+    "asked_e": lambda impacts: replace_where(impacts.e, ~((impacts.e >= 0.0) & (impacts.e <= 1.0)), np.nan),
     "in_si": _in_si,
     "velocities": lambda impacts, e_out: velocities_after(impacts, e_out),
     "references": lambda impacts, asked_e: velocities_after(impacts, asked_e),

@@ -88,15 +88,6 @@ def distinct_values(values: Array) -> Array:
     return values[:1] if (values == values[:1]).all() else np.unique(values)
 
 
-def all_within(values: Array, least: float, most: float) -> bool:
-    """Return whether all values are within bounds, by the least and the largest; False if any is NaN.
-
-    >>> all_within(np.array([0.0, 0.5]), 0.0, 1.0), all_within(np.array([0.5, np.nan]), 0.0, 1.0)
-    (True, False)
-    """
-    return bool(least <= values.min(initial=most) and values.max(initial=least) <= most)
-
-
 def replace_where(
     value: NDArray[Any], mask: Mask, otherwise: float | np.integer[Any] | NDArray[Any]
 ) -> NDArray[Any]:

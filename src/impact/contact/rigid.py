@@ -12,9 +12,7 @@ import numpy as np
 from ..array_types import Array
 from .impacts import Impacts
 from .materials import effective_mass
-from .powers import all_within
-
-MAX_FLOAT = float(np.finfo(float).max)
+from .powers import replace_where
 
 
 def velocities_at(impacts: Impacts, impulse: Array) -> tuple[Array, Array]:
@@ -30,12 +28,8 @@ def velocities_after(impacts: Impacts, e: Array) -> tuple[Array, Array]:
 
     Arrays of shape (n,). Balls that do not approach keep their velocities; an impulse that overflows gives NaN.
     """
-    impulse = (1.0 + e) * impacts.m * impacts.v0
-    if not impacts.all_approach:
-        impulse = np.where(impacts.v0 > 0.0, impulse, 0.0)
-    if not all_within(impulse, -MAX_FLOAT, MAX_FLOAT):
-        impulse = np.where(np.isfinite(impulse), impulse, np.nan)
-    return velocities_at(impacts, impulse)
+    impulse = replace_where((1.0 + e) * impacts.m * impacts.v0, ~(impacts.v0 > 0.0), 0.0)
+    return velocities_at(impacts, replace_where(impulse, ~np.isfinite(impulse), np.nan))
 
 
 @dataclass(frozen=True)
