@@ -439,7 +439,7 @@ def _derived_quantities(
 def history_dataset(
     history: History, plan: Plan, point: Mapping[str, float | str], slip: SlipHistory | None = None
 ) -> xr.Dataset:
-    """Build the dataset of a time history over t, with the inputs and both masses of the impact as an attribute."""
+    """Build the dataset of a time history over t, with the inputs and masses of the impact as an attribute."""
     masses = {name: input_at(plan.inputs, name, plan.inputs.index()).item() for name in ("m1", "m2")}
     laws = {"model": plan.models[0].key, **({"friction": plan.frictions[0].key} if slip else {})}
     names = [name for name in HISTORY if slip or name not in SLIP_HISTORY]
