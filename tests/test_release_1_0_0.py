@@ -122,3 +122,6 @@ def test_a_calibration_without_the_variables_added_since_is_read() -> None:
     assert not {"p_value", "loo_residual"} & set(stored.variables)
     assert [(row[2], row[5]) for row in fit_rows(stored)] == [("0.5", "–")]
     assert largest_residuals(stored) == []
+    table = impact.describe(stored).to_dataframe()
+    assert np.isnan(table["p_value"]).all()
+    assert not np.isnan(table["aicc"]).any()

@@ -285,6 +285,13 @@ def test_the_ends_of_a_range_of_materials_are_named() -> None:
     assert [condition["material1"] for condition in result.over or ()] == range_of["material1"]
 
 
+def test_a_stiffness_is_found_over_a_range_of_masses() -> None:
+    masses = [1.0, 2.0]
+    result = impact.solve("hertz", "K", {"contact_time": 1e-3}, over={"m1": masses})
+    shots = [impact.run(model="hertz", at={"K": result.roots[0].value, "m1": m1}) for m1 in masses]
+    assert np.mean([shot.values["contact_time"] for shot in shots]) == pytest.approx(1e-3, rel=1e-6)
+
+
 def test_a_range_that_does_not_count_is_refused() -> None:
     with pytest.raises(UsageError, match="over: alpha does not count if e is solved for"):
         impact.solve("tsuji-1992", "e", {"e_out": 0.6}, over={"alpha": [0.1, 0.2]})

@@ -441,6 +441,12 @@ def csv_form(table: Mapping[Any, Any]) -> CsvForm:
     return CsvForm(separator if separator in SEPARATORS else "", decimal if decimal in DECIMALS else "")
 
 
+def _has_csv_form(table: Mapping[Any, Any]) -> bool:
+    """Whether a table that names a file has valid keys alone; another one is left as it is, and reported."""
+    form = CsvForm(table.get("separator", ""), table.get("decimal", ""))
+    return table.keys() <= FILE_KEYS and form == csv_form(table)
+
+
 def read_files(draft: Draft) -> tuple[dict[KeyPath, object], list[ConfigError], list[str]]:
     """Read the CSV files of cases and of single columns: the values that replace their names, errors, notes."""
     open_csv = cache(partial(read_csv_of, draft))
@@ -449,7 +455,7 @@ def read_files(draft: Draft) -> tuple[dict[KeyPath, object], list[ConfigError], 
     notes: tuple[str, ...] = ()
     cases, form = draft.table("sweep").get("cases"), CsvForm()
     table = as_table(cases)
-    if isinstance(table.get("file"), str) and table.keys() <= FILE_KEYS:
+    if isinstance(table.get("file"), str) and _has_csv_form(table):
         cases, form = table["file"], csv_form(table)
     if isinstance(cases, str):
         try:
@@ -511,7 +517,7 @@ def _file_columns(data: Mapping[str, Any]) -> Iterator[tuple[InputName, str, str
     """Yield name, file, column and form of every `{ file = ..., column = ... }` and `{ empirical = file }`."""
     for name, reference in input_values(data):
         match reference:
-            case {"file": str(file), "column": str(column), **others} if others.keys() <= FILE_KEYS:
+            case {"file": str(file), "column": str(column), **others} if _has_csv_form(others):
                 yield name, file, column, csv_form(others)
             case {"empirical": str(file), **others} if not others:
                 yield name, file, None, CsvForm()

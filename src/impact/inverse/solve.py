@@ -485,7 +485,10 @@ class SolveProblem:
         if self.unknown.name in ("e", "mu"):
             return 1.0
         # without a stiffness in the config that of the materials, else of the radii, is the scale
-        inputs = trial_inputs(self.config, {} if self.unknown.name == "K" else self.columns(np.ones(1)))
+        columns = self.columns(np.ones(1))
+        if self.unknown.name == "K":
+            del columns[self.name]
+        inputs = trial_inputs(self.config, columns)
         impacts = build_impacts(inputs, self.model, inputs.index())
         if self.unknown.name == "K":
             size = float(impacts.K[0])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -55,7 +56,7 @@ class Fits(Displayed):
                 "status": calibration.fit_status(law),
                 "parameters": parameters,
                 "determined": [group for group in str(law["determined"].item()).split("; ") if group],
-                **{name: float(law[name]) for name in CRITERIA},
+                **{name: float(law.get(name, math.nan)) for name in CRITERIA},
             }
 
     def records(self) -> Sequence[Mapping[str, Any]]:
