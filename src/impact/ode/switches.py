@@ -148,7 +148,8 @@ def _shorten(
         is_shorter, np.fmax(state.h_free[positions], h_next), state.h_free[positions]
     )
     shorter = np.where(crossed, state.h[positions] + offset, offset)
-    trial.h_next[positions] = np.where(is_shorter, shorter, h_next)
+    # a zero nearer to the start of the step is located at the end of one of this length
+    trial.h_next[positions] = np.where(is_shorter, np.fmax(shorter, SWITCH_ATOL), h_next)
     back = positions[crossed]
     trial.is_accurate[back], state.termination[back] = False, RUNNING
 
