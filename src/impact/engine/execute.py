@@ -182,10 +182,12 @@ def _submit_and_collect(
                 _check_integrated(trajectory_range, integrated, int(np.count_nonzero(~is_reused)))
                 del running[future]
                 collisions, errors = integrated
-                whole = trajectory_range.record.blank(trajectory_range.size)
-                whole.put(~is_reused, collisions)
-                whole.put(is_reused, reused_part)
-                yield trajectory_range, (whole, errors)
+                if is_reused.any():
+                    whole = trajectory_range.record.blank(trajectory_range.size)
+                    whole.put(~is_reused, collisions)
+                    whole.put(is_reused, reused_part)
+                    collisions = whole
+                yield trajectory_range, (collisions, errors)
     finally:
         for future in running:
             future.cancel()
