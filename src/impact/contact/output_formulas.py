@@ -195,8 +195,8 @@ def _friction_status(
     tangential: TangentialResult, status: NDArray[np.int8], not_integrated: Mask
 ) -> NDArray[np.int8]:
     """Status of the tangential motion: that of the normal motion where it has none of its own."""
-    own = replace_where(tangential.status, tangential.status == STATUS_OK, status)
-    return replace_where(own, not_integrated, status)
+    slip_status = replace_where(tangential.status, tangential.status == STATUS_OK, status)
+    return replace_where(slip_status, not_integrated, status)
 
 
 def _share(name: str) -> Callable[..., Array]:
