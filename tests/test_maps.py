@@ -203,6 +203,13 @@ def test_where_laws_are_exact_none_of_them_is_the_closest() -> None:
     assert "10.0%  several models, equally close" in texts
 
 
+def test_errors_of_the_solver_have_the_colour_of_no_error() -> None:
+    sweep = {"e": [0.5, 0.7], "v1": [0.1, 1.0], "m1": 1.0, "m2": 1.0, "K": 6e9}
+    figure = impact.plot(impact.sweep({"models": ["tsuji-1992"], "sweep": sweep}), kind="map")
+    mesh = next(part for part in figure.axes[0].collections if isinstance(part, QuadMesh))
+    assert mesh.get_clim() == (-1e-9, 1e-9)
+
+
 def test_edges_lie_half_way_between_values() -> None:
     assert edges_of([1.0, 2.0, 6.0], log=False).tolist() == [0.5, 1.5, 4.0, 8.0]
     assert edges_of([1.0, 4.0, 64.0], log=True) == pytest.approx([0.5, 2.0, 16.0, 256.0])

@@ -372,9 +372,11 @@ def test_other_pictures_do_not_depend_on_friction(beads: xr.Dataset) -> None:
 
 @pytest.mark.slow
 def test_a_map_of_friction_has_a_panel_for_each_pair(beads: xr.Dataset) -> None:
-    plane = get_plot_data(beads, "map", Choice(variable="beta", models=[TSUJI], frictions=[COULOMB, MINDLIN]))
+    plane = get_plot_data(beads, "map", Choice(models=[TSUJI], frictions=[COULOMB, MINDLIN]))
     assert isinstance(plane, MapData)
-    assert (plane.x, plane.y) == ("angle", "mu")
+    assert (plane.x, plane.y, plane.variable) == ("angle", "mu", "beta")
+    # the panels name the friction laws alone
+    assert conditions_of(plane).startswith("Tsuji, Tanaka and Ishida (1992), speed = 3.9 m/s")
     for panel, key in zip(plane.panels, (COULOMB, MINDLIN), strict=True):
         assert panel.law == f"{TSUJI} with {key}"
         stored = beads["beta"].sel(model=TSUJI, friction=key).transpose("mu", "angle").values

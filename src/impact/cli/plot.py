@@ -49,7 +49,9 @@ def plot(
     variable: Annotated[
         str | None,
         options.value(
-            "NAME", "Variable of a map or of bands. \\[default: e_error of a map, e_out of bands]", complete_output
+            "NAME",
+            "Variable of a map or of bands. \\[default: e_error of a map, beta of an oblique one, e_out of bands]",
+            complete_output,
         ),
     ] = None,
     sel: options.Select = None,

@@ -70,7 +70,8 @@ def plot(
         inputs, "loop" for an impact, or "calibration" or "sensitivity" for the result of that function
     x : the coordinate to draw over; by default e, else the first numeric axis
     y : second axis of a map, or of the kind validity; by default the next one
-    variable : name of the variable that a map or a band shows; by default e_error for a map, e_out for a band
+    variable : name of the variable that a map or a band shows; by default e_error for a map, or beta if the result
+        has it, and e_out for a band
     sel : values of the other axes, such as `{"m2": 1.0}`; the default is the first value. A loop, a history
         or an impulse may be at a point that is not on the grid, and is at the middle of an axis of e by default
     models : keys of the models to show; by default all

@@ -35,6 +35,7 @@ from .labels import (
     pretty_conditions,
     split_by_law,
     symbol,
+    with_model,
     words_of,
 )
 from .layout import Picture
@@ -44,7 +45,7 @@ from .style import is_geometric, model_styles, tint
 # a value at each y and x
 Plane = tuple[tuple[float, ...], ...]
 MAX_PANELS = 12
-# the smallest error on a logarithmic scale: smaller ones are errors of the solver
+# the smallest error that has a colour: smaller ones are errors of the solver
 MIN_DRAWN_DISTANCE = 1e-9
 # a map of more cells is stored as an image
 MAX_VECTOR_CELLS = 2_000
@@ -213,7 +214,9 @@ class MapData(PlotData):
         values = np.ma.masked_invalid([panel.values for panel in self.panels])
         low, top = float(values.min()), float(values.max())
         if self.signed:
-            low, top = -max(abs(low), abs(top)), max(abs(low), abs(top))
+            least = MIN_DRAWN_DISTANCE if self.variable == "e_error" else 0.0
+            top = max(abs(low), abs(top), least)
+            low = -top
         norm = Normalize(low, top) if low < top else Normalize(low - 0.5, low + 0.5)
         return self._draw_values(axes, values, norm, "RdBu_r" if self.signed else "viridis")
 
@@ -291,7 +294,8 @@ class MapData(PlotData):
 
 def field_map(dataset: xr.Dataset, choice: Choice) -> MapData:
     """Read a variable over two axes, for at most MAX_PANELS models or pairs."""
-    plot_data = _map_data("map", dataset, choice.variable or "e_error", choice, MAX_PANELS)
+    default = "beta" if "beta" in dataset.data_vars else "e_error"
+    plot_data = _map_data("map", dataset, choice.variable or default, choice, MAX_PANELS)
     if not plot_data.left_out:
         return plot_data
     laws = "pairs" if plot_data.panels[0].friction else "models"
@@ -353,7 +357,7 @@ def _map_data(
     title = safe_text(f"{label if kind == 'map' else 'Closest model'} over {x} and {y}")
     return MapData(
         f"{title}: {heading_text}" if heading_text else title,
-        conditions_of(data, x, y),
+        with_model(conditions_of(data, x, y), data, numbered=choice.equations),
         variable,
         x,
         y,
@@ -398,7 +402,7 @@ def _tied() -> dict[str, Any]:
 
 MAP = Kind(
     "map",
-    "Error of the restitution over two axes, a panel for each model.",
+    "Error of the restitution, or beta of oblique impacts, over two axes; a panel for each model or pair.",
     field_map,
     choose_plane,
     along=("x", "y"),
