@@ -166,6 +166,17 @@ def test_a_model_is_named_with_its_best_parameters_and_their_units() -> None:
     assert "units" not in row.record
 
 
+def test_with_a_target_of_e_out_the_table_lists_the_e_to_ask_for(figure6: xr.Dataset) -> None:
+    laws = ["lankarani-nikravesh-1994", "lankarani-nikravesh-1990"]
+    ranking = impact.recommend(figure6, target={"e_out": 0.8}, models=laws, tol=0.011)
+    assert ranking.headings[-1] == "e within 0.011"
+    assert {ranked.model for ranked in ranking} == {*laws}
+    for ranked in ranking:
+        delivered = figure6["e_out"].sel(model=ranked.model).values
+        served = figure6["e"].values[np.abs(delivered - 0.8) <= 0.011]
+        assert ranked.served == ((served.min(), served.max()),)
+
+
 def test_a_law_without_e_is_ranked_by_a_target_with_its_best_parameter() -> None:
     sweep = {"v1": [0.5, 1.0], "m1": 1.0, "m2": 1.0, "K": 1e6, "n": 1.0}
     parameters = {"kelvin-voigt": {"C": [100.0, 300.0, 900.0]}}

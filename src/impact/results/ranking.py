@@ -49,21 +49,20 @@ MAX_RANGES, MAX_NAMED = 8, 3
 
 @dataclass(frozen=True)
 class Criterion:
-    """What laws are ranked by: the distance of an output from a target; without one, of e_out from the asked e."""
+    """What laws are ranked by: the distance of an output from a target; without one, of e_out from the asked e.
+
+    `along` is the input whose ranges are listed in which all points are within the tolerance.
+    """
 
     output: str = "e_out"
     target: float | None = None
+    along: str = "e"
 
     @property
     def names(self) -> tuple[str, str]:
         """The variable whose values are judged, and the status that explains its NaNs."""
         name = "e_error" if self.target is None else self.output
         return name, OUTPUTS[name].status
-
-    @property
-    def along(self) -> str:
-        """The input whose ranges are listed in which all points are within the tolerance."""
-        return "e" if self.target is None else "angle"
 
     @property
     def text(self) -> str:
@@ -94,8 +93,8 @@ class Ranked:
         exact, rounded once: it depends neither on the order of the points nor on slabs
     at, e_out : the swept inputs by config name, and e, at the point with the largest error, empty if all failed,
         and the value of `output` there
-    served : the ranges of e, or with a target of the angle, in which all points are within the tolerance; None
-        unless it varies along one axis
+    served : the ranges of e, or with a target of the angle if there is one, in which all points are within the
+        tolerance; None unless it varies along one axis
     friction : key of the friction law; "" for a model alone
     output : the output that is ranked
     along : the input that `served` has ranges of
@@ -321,7 +320,7 @@ def recommend(
     """
     dataset = result_of(dataset)
     require_sweep(dataset, "recommend")
-    criterion = BY_ERROR if target is None else _criterion_of(target)
+    criterion = BY_ERROR if target is None else _criterion_of(target, dataset)
     tol = read_number(tol, criterion.tolerance, argument("tol"))
     if as_keys(frictions, "frictions") and not OUTPUTS[criterion.names[0]].of_friction:
         origin, of = argument("frictions"), argument("target")
@@ -329,13 +328,13 @@ def recommend(
     return rank_laws(dataset, tol, criterion, sel, models, frictions)
 
 
-def _criterion_of(target: Mapping[str, object]) -> Criterion:
-    """Check a target."""
+def _criterion_of(target: Mapping[str, object], dataset: xr.Dataset) -> Criterion:
+    """Check a target for the laws of a result."""
     name, value = only_target(target)
     if name not in TARGETS:
         expected = f"an output of the order of 1; {did_you_mean(name, TARGETS)}"
         raise UsageError(f'{argument("target")}: got "{name}", expected {expected}')
-    return Criterion(name, target_value(name, value))
+    return Criterion(name, target_value(name, value), "angle" if "angle" in dataset.variables else "e")
 
 
 def only_target(target: Mapping[str, object]) -> tuple[str, object]:
