@@ -250,6 +250,22 @@ def test_sliders_laws_the_cursor_and_the_numbers_follow_the_controls(
 
 
 # of each curve to the paper, by the definition of WCAG
+@pytest.mark.slow
+def test_errors_of_the_solver_make_no_curve_and_angles_are_in_degrees(browser: Page, tmp_path: Path) -> None:
+    inputs = {"speed": 2.0, "angle": ["10 deg", "30 deg", "50 deg"], "e": 0.8, "mu": 0.2, "m1": 1.0, "R1": 0.1}
+    result = impact.sweep(
+        {"models": "tsuji-1992", "frictions": "coulomb-1785", "sweep": {**inputs, "m2": math.inf, "K": 1e6}}
+    )
+    assert 0.0 < abs(result["e_error"]).max() < 1e-9
+    show(browser, result, tmp_path / "page.html")
+    heights = browser.evaluate(
+        "[...document.querySelectorAll('svg .curve')].flatMap("
+        "curve => curve.getAttribute('d').match(/[0-9.]+ [0-9.]+/g).map(point => +point.split(' ')[1]))"
+    )
+    assert max(heights) - min(heights) < 0.1
+    assert browser.evaluate("document.getElementById('note').textContent") == "at angle = 30°"
+
+
 CONTRASTS = """
 (() => {
   const context = document.createElement('canvas').getContext('2d', {willReadFrequently: true});

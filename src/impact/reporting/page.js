@@ -63,13 +63,15 @@ function value(output, law, at) {
 const PREFIXES = {"-9": "n", "-6": "µ", "-3": "m", 0: "", 3: "k", 6: "M", 9: "G"};
 const digits = number => Number.isFinite(number) ? String(+number.toPrecision(6)).replace("-", "−") : "–";
 
-// a factor, and a unit with its prefix, for values up to `largest`
+// a factor, and a unit with its prefix, for values up to `largest`; degrees for angles
 function scale(unit, largest) {
   if (unit === "1") return [1, ""];
+  if (unit === "rad") return [180 / Math.PI, "°"];
   const power = largest > 0 ? 3 * Math.floor(Math.log10(largest) / 3 + 1e-4) : 0;
   const limited = Math.min(9, Math.max(-9, power));
   return [10 ** -limited, PREFIXES[limited] + unit];
 }
+const withUnit = (number, unit) => `${digits(number)}${unit === "°" ? "" : " "}${unit}`.trim();
 const heading = (name, unit) => unit ? `${name} [${unit}]` : name;
 
 // ---- state: the output, the axis to draw over, the positions along all axes, the laws, and the cursor
@@ -98,6 +100,8 @@ function curves() {
 
 // of a curve
 const MAX_MARKERS = 60;
+// values are equal that differ by less, relative to the largest
+const FLAT = 1e-6;
 const SVG = "http://www.w3.org/2000/svg";
 function add(parent, name, attributes, text = "") {
   const element = parent.appendChild(document.createElementNS(SVG, name));
@@ -152,7 +156,9 @@ function draw() {
     return list();
   }
   let [low, high] = [Math.min(...numbers), Math.max(...numbers)];
-  const room = 0.05 * (high - low || Math.abs(high) || 1);
+  const size = Math.max(Math.abs(low), Math.abs(high));
+  // errors of the solver do not make a curve of a constant
+  const room = 0.05 * (high - low > FLAT * size ? high - low : size || 1);
   [low, high] = [low - room, high + room];
   const [factor, unit] = scale(output.unit, Math.max(Math.abs(low), Math.abs(high)));
   const [xFactor, xUnit] = scale(axis.unit, isLog ? 0 : Math.max(...x.map(Math.abs)));
@@ -215,15 +221,15 @@ function list() {
   const {target, before, after, share, isOnGrid} = atCursor(picture);
   const ends = {x1: toX(target), x2: toX(target), y1: top, y2: bottom};
   for (const [name, content] of Object.entries(ends)) cursor.setAttribute(name, content);
-  const text = axis.has_words ? axis.texts[target] : `${digits(target * xFactor)} ${xUnit}`;
+  const text = axis.has_words ? axis.texts[target] : withUnit(target * xFactor, xUnit);
   const remark = isOnGrid ? "" : ": between values of the grid, interpolated";
-  note.textContent = `at ${axis.label} = ${text.trim()}${remark}`;
+  note.textContent = `at ${axis.label} = ${text}${remark}`;
   for (const {law, y} of drawn) {
     const number = isOnGrid ? y[share >= 1 ? after : before] : y[before] + share * (y[after] - y[before]);
     const row = body.insertRow(), name = row.insertCell();
     name.textContent = law ? law.label : page.reference;
     name.style.borderLeft = `4px solid ${colorOf(law)}`;
-    row.insertCell().textContent = `${isOnGrid ? "" : "≈ "}${digits(number * factor)} ${unit}`.trim();
+    row.insertCell().textContent = `${isOnGrid ? "" : "≈ "}${withUnit(number * factor, unit)}`;
   }
 }
 
