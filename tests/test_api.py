@@ -40,8 +40,8 @@ def _mine(chi: object = lambda e: (1 - e * e) / e) -> impact.ForceModel:
 def test_each_public_function_documents_what_it_returns() -> None:
     functions = filter(inspect.isfunction, (getattr(impact, name) for name in impact.__all__))
     returning = [function for function in functions if inspect.signature(function).return_annotation != "None"]
-    assert [f.__name__ for f in returning if "Returns\n    -------\n" not in (f.__doc__ or "")] == []
-    assert "Raises\n    ------\n" in (impact.load.__doc__ or "")
+    assert [f.__name__ for f in returning if "Returns\n-------\n" not in (inspect.getdoc(f) or "")] == []
+    assert "Raises\n------\n" in (inspect.getdoc(impact.load) or "")
 
 
 def test_types_of_results_and_errors_are_public() -> None:
