@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..array_types import Array, Mask
 from .dimensionless import dimensionless_values
-from .fixed_step import EXACT, MUJOCO_CONE
+from .fixed_step import MUJOCO_CONE
 from .formula_calls import argument_names
 from .friction import Pair, check_friction, friction_values
 from .impacts import Impacts, check_inputs
@@ -18,7 +18,7 @@ from .model import ForceModel, Law
 from .powers import replace_where
 from .records import CollisionResult
 from .rigid import ObliqueImpacts, velocities_after
-from .simulate import ComputeCollisions, RecordedMotion, simulate
+from .simulate import ComputeCollisions, RecordedMotion, Settings, simulate
 from .slip_motion import SLIDES, STICKS
 from .status import FIRST_FAILURE, LIMIT, NO_IMPACT, STATUS_OK
 from .tangential import RecordedSlip, TangentialResult, simulate_friction
@@ -73,11 +73,6 @@ def collide(
     model: ForceModel,
     impacts: Impacts,
     *,
-    rtol: float,
-    max_steps: int,
-    collapse: bool = True,
-    core: str = "numpy",
-    integrator: str = EXACT,
     fixed_step: Mapping[str, Array] | None = None,
     errors: dict[str, str] | None = None,
     names: Iterable[str] = CENTRAL_OUTPUTS,
@@ -85,6 +80,7 @@ def collide(
     compute: ComputeCollisions | None = None,
     recorded: list[RecordedMotion] | None = None,
     recorded_slip: list[RecordedSlip] | None = None,
+    **settings: Unpack[Settings],
 ) -> Outputs:
     """Simulate impacts by a law: their `outputs`; one that fails has NaN and a status, and affects no other.
 
@@ -108,16 +104,12 @@ def collide(
     result = simulate(
         model,
         impacts.n,
-        values | of_friction if integrator == MUJOCO_CONE else values,
+        values | of_friction if settings.get("integrator") == MUJOCO_CONE else values,
         checked,
-        rtol=rtol,
-        max_steps=max_steps,
-        collapse=collapse,
-        core=core,
-        integrator=integrator,
         errors=errors,
         compute=compute,
         recorded=recorded,
+        **settings,
     )
     if oblique is None:
         return outputs(model, impacts, result, names, checked)
@@ -131,12 +123,9 @@ def collide(
         np.broadcast_to(impacts.n, shape),
         {name: np.broadcast_to(column, shape) for name, column in columns.items()},
         np.broadcast_to(own, shape),
-        rtol=rtol,
-        max_steps=max_steps,
-        collapse=collapse,
-        integrator=integrator,
         errors=errors,
         recorded=recorded_slip,
+        **settings,
     )
     return outputs(model, impacts, result, names, checked, (inputs, tangential, pair.friction.kind))
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple, NotRequired, TypedDict, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,6 +59,16 @@ SimulatePart = Callable[..., T]
 
 # computes the collisions of distinct impacts, see `integrate_collisions`
 ComputeCollisions = Callable[..., CollisionResult]
+
+
+class Settings(TypedDict):
+    """How impacts are integrated, see `impact.contact.output_formulas.collide`."""
+
+    rtol: float
+    max_steps: int
+    collapse: NotRequired[bool]
+    core: NotRequired[str]
+    integrator: NotRequired[str]
 
 
 def simulate(

@@ -11,7 +11,7 @@ import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import lru_cache, partial
 
 import numpy as np
@@ -66,12 +66,8 @@ def integrate_columns(law: PlanLaw, columns: Columns, solver: Solver) -> Integra
         columns["n"],
         values,
         columns["status"],
-        rtol=solver.rtol,
-        max_steps=solver.max_steps,
-        collapse=solver.collapse,
-        core=solver.core,
-        integrator=solver.integrator,
         errors=errors,
+        **asdict(solver),
     )
     return collisions, errors
 

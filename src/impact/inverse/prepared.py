@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -41,17 +41,12 @@ from ..results.single_impact import open_source, single_point
 DERIVED = ("m1", "m2", "R1", "R2", "K")
 
 
-def core_of(config: Config) -> str:
-    """Choose the core of a few trajectories at a time: NumPy unless the config names numba."""
-    return "numba" if config.solver.core == "numba" else "numpy"
-
-
 def interpolated(config: Config, law: PlanLaw, outputs: Sequence[str]) -> InterpolatedCollisions | None:
     """Interpolate the collisions of a law; None with friction, which has kinks."""
     if isinstance(law, Pair):
         return None
     solver = config.solver
-    return InterpolatedCollisions(law, outputs, rtol=solver.rtol, max_steps=solver.max_steps, core=core_of(config))
+    return InterpolatedCollisions(law, outputs, rtol=solver.rtol, max_steps=solver.max_steps, core=solver.core)
 
 
 def trial_inputs(config: Config, columns: Mapping[str, NDArray[Any]]) -> Inputs:
@@ -75,7 +70,7 @@ def outputs_at(
     An output is of that length, or of length 1 if no column has an effect; NaN where the law has no result.
     `compute` is that of `impact.contact.simulate.simulate`. A warning states each distinct error of the law.
     """
-    inputs, model, solver = trial_inputs(config, columns), model_of(law), config.solver
+    inputs, model = trial_inputs(config, columns), model_of(law)
     index = inputs.index()
     impacts = build_impacts(inputs, model, index).broadcast()
     steps = fixed_steps_at(inputs, impacts, index)
@@ -86,15 +81,12 @@ def outputs_at(
     outputs = collide(
         model,
         impacts,
-        rtol=solver.rtol,
-        max_steps=solver.max_steps,
-        core=core_of(config),
-        integrator=solver.integrator,
         fixed_step={name: np.broadcast_to(values, impacts.n.shape) for name, values in steps.items()},
         errors=errors,
         names=names,
         oblique=oblique,
         compute=compute,
+        **asdict(config.solver),
     )
     warn(*errors.values())
     return outputs
@@ -138,7 +130,8 @@ class PreparedProblem:
             shapes = ", ".join(f"{name} {column.shape}" for name, column in read.items())
             raise UsageError(f"got the shapes {shapes}, expected shapes that broadcast") from None
         columns = {name: np.broadcast_to(column, shape).ravel() for name, column in read.items()}
-        names = (*self.outputs, *self._statuses)
+        statuses = (OUTPUTS[name].status for name in self.outputs)
+        names = [*dict.fromkeys((*self.outputs, "status", *statuses))]
         collisions = outputs_at(self.config, self.law, columns, names, self._collisions)
         result = {}
         for name in names:
@@ -150,12 +143,6 @@ class PreparedProblem:
     def _collisions(self) -> InterpolatedCollisions | None:
         """What polynomials replace, from one call to the next."""
         return interpolated(self.config, self.law, self.outputs)
-
-    @property
-    def _statuses(self) -> list[str]:
-        """The names of the statuses of the outputs."""
-        names = ["status", *(OUTPUTS[name].status for name in self.outputs)]
-        return [name for name in dict.fromkeys(names) if name not in self.outputs]
 
     @cached_property
     def _quantities(self) -> dict[str, tuple[str, Quantity]]:

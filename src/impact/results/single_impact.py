@@ -357,16 +357,14 @@ def run_single_impact(plan: Plan, first: tuple[str, ...], times: int | None = No
     if config.frictions:
         pair = Pair(law, config.frictions[0])
         oblique = pair, build_oblique(plan.inputs, impacts, (), pair.friction)
-    solver = config.solver
+    # what is recorded is not compiled
+    solver = replace(config.solver, core="numpy")
     errors: dict[str, str] = {}
     recorded: list[RecordedMotion] = []
     recorded_slip: list[RecordedSlip] = []
     collision = collide(
         law,
         impacts,
-        rtol=solver.rtol,
-        max_steps=solver.max_steps,
-        integrator=solver.integrator,
         fixed_step=fixed_steps_at(plan.inputs, impacts, ()),
         errors=errors,
         names=OUTPUTS if oblique else CENTRAL_OUTPUTS,
@@ -374,6 +372,7 @@ def run_single_impact(plan: Plan, first: tuple[str, ...], times: int | None = No
         # a history is that of the continuous law
         recorded=recorded if solver.integrator == EXACT else None,
         recorded_slip=recorded_slip,
+        **asdict(solver),
     )
     values = {name: array[0].item() for name, array in collision.items()}
     warn(*errors.values())
