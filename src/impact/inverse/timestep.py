@@ -124,12 +124,16 @@ class TimestepRow:
         status = self.status.replace("_", " ")
         return f"{status} at {self.failed} of {phases} phases, {Status[self.status.upper()].meaning}"
 
-    @property
-    def cells(self) -> tuple[str, ...]:
-        """Format the row of a table; a step at which a collision fails has its status."""
-        mean = self.status if self.failed else decimals(self.e_mean)
-        others = map(decimals, (self.e_least, self.e_largest, self.e_to_ask))
-        return (number(self.steps_per_contact), number(self.dt), mean, *others)
+    def cells(self, rayleigh_time: float, has_friction: bool) -> dict[str, str]:
+        """Format the row of a table, by its headings; a step at which a collision fails has its status."""
+        cells = {"steps per contact": number(self.steps_per_contact), "dt [s]": number(self.dt)}
+        if rayleigh_time == rayleigh_time:
+            cells["dt / T_R"] = number(self.dt / rayleigh_time, 3)
+        cells["e mean"] = self.status if self.failed else decimals(self.e_mean)
+        numbers = {"e least": self.e_least, "e largest": self.e_largest, "e to enter": self.e_to_ask}
+        if has_friction:
+            numbers |= {"beta mean": self.beta_mean, "least": self.beta_least, "largest": self.beta_largest}
+        return cells | {heading: decimals(value) for heading, value in numbers.items()}
 
     def as_dict(self, has_friction: bool) -> dict[str, Any]:
         """Convert to plain data, without a tangential restitution if there is no friction."""
@@ -257,17 +261,8 @@ class TimestepResult(Displayed):
         yield f"{law}: {e}e_out = {number(self.e_continuous)}{beta} in a contact time of {contact_time}"
         yield f"scheme: {self.scheme}"
         yield ""
-        headings = ["steps per contact", "dt [s]", "e mean", "e least", "e largest", "e to enter"]
-        cells = [[*row.cells] for row in self.rows]
-        if self.rayleigh_time == self.rayleigh_time:
-            headings.insert(2, "dt / T_R")
-            for row, texts in zip(self.rows, cells, strict=True):
-                texts.insert(2, number(row.dt / self.rayleigh_time, 3))
-        if self.friction:
-            headings += ["beta mean", "least", "largest"]
-            for row, texts in zip(self.rows, cells, strict=True):
-                texts += map(decimals, (row.beta_mean, row.beta_least, row.beta_largest))
-        yield Table(cells, headings, text=())
+        cells = [row.cells(self.rayleigh_time, bool(self.friction)) for row in self.rows]
+        yield Table([[*row.values()] for row in cells], [*cells[0]], text=())
         if self.rayleigh_time == self.rayleigh_time:
             yield f"T_R = {quantity(self.rayleigh_time, 's', 4)}: the smaller Rayleigh time of the two balls"
         if self.tol is None:
@@ -397,6 +392,7 @@ class FixedStepLaw:
     rayleigh_time : the smaller one of both balls [s]
     """
 
+    config: Config
     model: ForceModel
     impact: Impacts
     continuous: Mapping[str, float]
@@ -459,31 +455,21 @@ class FixedStepLaw:
 def timestep_rows(law: FixedStepLaw, dt: Sequence[float]) -> tuple[TimestepRow, ...]:
     """Find what a law delivers at steps dt [s], and the e to ask for."""
     steps = np.array(dt)
-    delivered, statuses, *friction = law.outputs(steps, "e_out", "status", *(["beta"] if law.oblique else []))
-    betas = friction[0] if friction else np.full(delivered.shape, np.nan)
-    e_compensated = compensated_e(law, steps)
-    return tuple(
-        TimestepRow(
-            dt=float(steps[row]),
-            steps_per_contact=law.contact_time / float(steps[row]),
-            e_mean=float(e.mean()),
-            e_least=float(e.min()),
-            e_largest=float(e.max()),
-            e_to_ask=float(e_compensated[row]),
-            status=_shared_status(statuses[row]).name.lower(),
-            failed=int(np.count_nonzero(statuses[row] >= FIRST_FAILURE)),
-            beta_mean=float(betas[row].mean()),
-            beta_least=float(betas[row].min()),
-            beta_largest=float(betas[row].max()),
-        )
-        for row, e in enumerate(delivered)
-    )
-
-
-def _shared_status(statuses: NDArray[np.int8]) -> Status:
-    """Find the most frequent status of the collisions that fail; OK if none fails."""
-    failures = statuses[statuses >= FIRST_FAILURE]
-    return Status(int(np.bincount(failures).argmax())) if failures.size else Status.OK
+    statuses, *delivered = law.outputs(steps, "status", "e_out", *(["beta"] if law.oblique else []))
+    rows = []
+    for row, e_to_ask in enumerate(compensated_e(law, steps).tolist()):
+        failures = statuses[row][statuses[row] >= FIRST_FAILURE]
+        # that of most of the collisions that fail
+        status = Status(int(np.bincount(failures).argmax())) if failures.size else Status.OK
+        values = {
+            f"{name}_{statistic}": float(reduce(of_phase[row]))
+            for name, of_phase in zip(("e", "beta"), delivered, strict=False)
+            for statistic, reduce in (("mean", np.mean), ("least", np.min), ("largest", np.max))
+        }
+        step = float(steps[row])
+        contact = {"dt": step, "steps_per_contact": law.contact_time / step, "e_to_ask": e_to_ask}
+        rows.append(TimestepRow(**contact, **values, status=status.name.lower(), failed=failures.size))
+    return tuple(rows)
 
 
 def compensated_e(law: FixedStepLaw, dt: Array) -> Array:
@@ -575,46 +561,46 @@ def needed_parameter(
         return _needed_relaxation_time(point, dt, tol, law, needed)
     config, model = point.config, law.model
     e = None if point.solved is None else float(config.scalars["e"])
-    unknown, path, value = _seek(config, law, name)
+    unknown, path, value = _seek(law, name)
     base, damping_path = law, f"{model.key}.{model.damping}"
     law_of = partial(fixed_step_law, phases=base.phases, scheme=base.scheme, of_friction=base.is_coupled)
 
     def damping_of(impact: Impacts) -> float:
         return float(impact.dimensionless(model, model.damping)[0])
 
-    def collide_at(value: float) -> tuple[Config, FixedStepLaw]:
+    def collide_at(value: float) -> FixedStepLaw:
         changed = replace(config, scalars={**config.scalars, path: value})
         if e is None:
-            return changed, law_of(changed)
+            return law_of(changed)
         damping = damping_of(build_impacts(Plan(changed).inputs, model, ()))
         scaled = float(changed.scalars[damping_path]) * (damping_of(base.impact) / damping if damping else 1.0)
         changed = replace(changed, scalars={**changed.scalars, damping_path: scaled})
         law = law_of(changed)
-        if abs(law.continuous["e_out"] - e) < HELD_E:
-            return changed, law
-        changed = solve_damping(changed, e)
-        return changed, law_of(changed)
+        return law if abs(law.continuous["e_out"] - e) < HELD_E else law_of(solve_damping(changed, e))
 
     slope = 0.0
     # e is what the tolerance is of
     if name != "e":
-        nearby = collide_at(NEARBY * value)[1]
+        nearby = collide_at(NEARBY * value)
         slope = math.log(nearby.contact_time / law.contact_time) / math.log(NEARBY)
     if abs(slope) < MIN_SLOPE:
         raise UsageError(f"{argument('parameter')}: {name} does not set the contact time of {model.key}")
-    changed = config
     for _ in range(MAX_SECANTS):
         needed = needed_steps(law, tol, MAX_SECANT_STEPS, needed)
         if needed is None:
             return None
         distance = math.log(law.contact_time / (needed.steps_per_contact * dt))
         if abs(distance) < SECANT_TOLERANCE:
+            companion = ""
+            if e is not None:
+                unit = with_numbers(model.unit_of(model.damping), {"n": model.exponent or math.nan})
+                companion = f"{model.damping} = {quantity(float(law.config.scalars[damping_path]), unit, 4)}"
             return NeededParameter(
                 parameter=name,
                 value=value,
                 unit=with_numbers(unknown.unit, {"n": float(law.impact.n[0])}),
                 is_least=slope > 0.0,
-                companion="" if e is None else _named(model, float(changed.scalars[damping_path])),
+                companion=companion,
                 dt=dt,
                 contact_time=law.contact_time,
                 peak_indentation=law.continuous["peak_indentation"],
@@ -626,7 +612,7 @@ def needed_parameter(
             return None
         before, value = law.contact_time, value * math.exp(logarithm)
         try:
-            changed, law = collide_at(value)
+            law = collide_at(value)
         except UsageError:
             # no rebound there
             return None
@@ -670,15 +656,9 @@ def _relaxation_time(law: FixedStepLaw) -> float:
     return float(law.impact.parameters["C"][0] / law.impact.K[0])
 
 
-def _named(model: ForceModel, damping: float) -> str:
-    """Write the damping parameter of a law with a value."""
-    unit = with_numbers(model.unit_of(model.damping), {"n": model.exponent or math.nan})
-    return f"{model.damping} = {quantity(damping, unit, 4)}"
-
-
-def _seek(config: Config, law: FixedStepLaw, name: str) -> tuple[Parameter, str, float]:
+def _seek(law: FixedStepLaw, name: str) -> tuple[Parameter, str, float]:
     """Describe a parameter that may set the time scale: its bounds, its config name and its value."""
-    parsed = InputName.parse(name)
+    config, parsed = law.config, InputName.parse(name)
     if parsed.material in config.materials and parsed.key == "E":
         modulus = config.materials[parsed.material].E
         return Parameter(name, "Pa", "Young's modulus"), name, float(config.scalars.get(name, modulus))
@@ -750,7 +730,7 @@ def fixed_step_law(
     if friction_status >= FIRST_FAILURE and oblique is not None:
         raise UsageError(f"{oblique.pair.key} has no answer at these inputs: {friction_status.meaning}")
     wave_time = float(rayleigh_time_at(plan.inputs, ()).item()) if _takes_moduli(config, model) else math.nan
-    return FixedStepLaw(model, impact, values, phases, scheme, wave_time, oblique)
+    return FixedStepLaw(config, model, impact, values, phases, scheme, wave_time, oblique)
 
 
 def time_steps(contact_time: float, steps_per_contact: Sequence[float], dt: Sequence[float]) -> list[float]:
