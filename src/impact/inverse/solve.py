@@ -223,7 +223,15 @@ def solve(
             raise UsageError(f"{argument('over', key=over_name)}: got one value, expected a list or a range")
     if over and not config.axes:
         raise UsageError(f"{argument('over')}: {next(iter(over))} does not count if {unknown.name} is solved for")
-    return solve_input(config, unknown, target)
+    names = [name for name, variable in OUTPUTS.items() if variable.dtype == "f8" and variable.per_model]
+    variable, value = only_target(target)
+    require_known([variable], names, f"{argument('target')}: no output")
+    if OUTPUTS[variable].of_friction and not config.frictions:
+        expected = argument("friction", "KEY")
+        raise UsageError(f"{argument('target', key=variable)}: got no friction law, expected {expected}")
+    Plan(config).pair_notes("frictions")
+    problem, wanted = SolveProblem(config, unknown, variable), target_value(variable, value)
+    return _best_over_axis(problem, wanted) if config.axes else _all_roots(problem, wanted)
 
 
 def unknown_of(model: ForceModel, name: str, friction: FrictionLaw | None = None) -> Parameter:
@@ -330,21 +338,6 @@ def solve_damping(config: Config, e: float) -> Config:
     lower, upper = map(number, _all_roots(problem, e).attainable)
     asked = argument("at", number(e), key="e")
     raise UsageError(f"{asked}: {law.key} delivers {lower} to {upper} at any {law.damping}")
-
-
-def solve_input(config: Config, unknown: Parameter, target: Mapping[str, object]) -> SolveResult:
-    """Find all values of an input that give a target; with an axis, the value nearest to it everywhere."""
-    names = [name for name, variable in OUTPUTS.items() if variable.dtype == "f8" and variable.per_model]
-    name, value = only_target(target)
-    require_known([name], names, f"{argument('target')}: no output")
-    if OUTPUTS[name].of_friction and not config.frictions:
-        raise UsageError(
-            f"{argument('target', key=name)}: got no friction law, expected {argument('friction', 'KEY')}"
-        )
-    Plan(config).pair_notes("frictions")
-    wanted = target_value(name, value)
-    problem = SolveProblem(config, unknown, name)
-    return _best_over_axis(problem, wanted) if config.axes else _all_roots(problem, wanted)
 
 
 @dataclass(frozen=True)
