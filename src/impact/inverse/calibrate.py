@@ -273,10 +273,7 @@ def determined_groups(config: Config, model: ForceModel, names: Sequence[str], f
     units = [_quantity(config, name).unit for name in involved]
     groups = []
     for row in _reduced(complement[:, ::-1])[:, ::-1].tolist():
-        powers = {
-            InputName.parse(name).key: Fraction(power).limit_denominator(MAX_DENOMINATOR)
-            for name, power in zip(involved, row, strict=True)
-        }
+        powers = {InputName.parse(name).key: _fraction(power) for name, power in zip(involved, row, strict=True)}
         groups.append(_product(_completion(list(powers.values()), units, config, model) | powers))
     return groups
 
@@ -291,7 +288,11 @@ def _completion(
     powers: Sequence[Fraction], units: Sequence[str], config: Config, model: ForceModel
 ) -> dict[str, Fraction]:
     """Find the powers of m and v0 that make a product of powers dimensionless; empty if none do."""
-    dimensions = {_dimension_of_product(powers, units, exponents) for exponents in _exponents(config, model)}
+    dimensions = set()
+    for exponents in _exponents(config, model):
+        of_units = [dimension(unit, exponents) for unit in units]
+        fractions = np.vectorize(_fraction, otypes=[object])(of_units)
+        dimensions.add(tuple(np.array(powers, object) @ fractions))
     mass, length, time = dimensions.pop()
     if dimensions or length != -time:
         return {}
@@ -315,16 +316,9 @@ def _exponents(config: Config, model: ForceModel) -> Iterator[dict[str, float]]:
         yield dict(zip(ends, values, strict=True))
 
 
-def _dimension_of_product(
-    powers: Sequence[Fraction], units: Sequence[str], exponents: Mapping[str, float]
-) -> tuple[Fraction, Fraction, Fraction]:
-    """Add up the powers of mass, length and time."""
-    dimensions = [
-        [Fraction(float(power)).limit_denominator(MAX_DENOMINATOR) for power in dimension(unit, exponents)]
-        for unit in units
-    ]
-    mass, length, time = np.array(powers, object) @ np.array(dimensions, object)
-    return mass, length, time
+def _fraction(power: float) -> Fraction:
+    """Find the simple fraction that an exponent is."""
+    return Fraction(float(power)).limit_denominator(MAX_DENOMINATOR)
 
 
 def _reduced(rows: Array) -> Array:

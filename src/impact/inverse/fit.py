@@ -370,40 +370,6 @@ LOSS_DERIVATIVES: Mapping[str, Callable[[Array], tuple[Array, Array, Array]]] = 
 }
 
 
-def profile_end(
-    problem: FitProblem,
-    best: Estimate,
-    taken: Array | None,
-    parameter: int,
-    rise: float,
-    width: float,
-    direction: int,
-    evaluate: Evaluate,
-) -> float:
-    """Find the u, about `width` from the best, where the least objective over the others is `rise` higher."""
-    bound = 0.0 if direction < 0 else 1.0
-    inner = centre = float(best.u[parameter])
-    # a root finder needs a function: a search from another start may end elsewhere
-    known = {centre: (-rise, best.u)}
-
-    def surplus(value: float) -> float:
-        if value not in known:
-            start = known[min(known, key=lambda other: abs(other - value))][1].copy()
-            start[parameter] = value
-            estimate = minimize(problem, start, evaluate, fixed=parameter, taken=taken, tolerance=COARSE_TOLERANCE)
-            known[value] = estimate.objective - best.objective - rise, estimate.u
-        return known[value][0]
-
-    for number in range(MAX_BRACKETS):
-        outer = min(max(centre + direction * width * 1.5**number, 0.0), 1.0)
-        if surplus(outer) > 0.0:
-            return float(brentq(surplus, inner, outer, xtol=PROFILE_XTOL * width, rtol=1e-12))
-        if outer == bound:
-            break
-        inner = outer
-    return bound
-
-
 def final_jacobian(problem: FitProblem, evaluate: Evaluate, u: Array) -> tuple[Array, Array]:
     """Predict by the final function, shape (n,), with derivatives by u, shape (n, p), of fourth order inside."""
     count = problem.count
@@ -427,18 +393,6 @@ def final_jacobian(problem: FitProblem, evaluate: Evaluate, u: Array) -> tuple[A
     predicted = problem.predict(evaluate, np.clip(rows, 0.0, 1.0), is_final=True)
     jacobian = np.einsum("pk,pkn->np", weights, predicted[:-1].reshape(count, 4, predicted.shape[1]))
     return predicted[-1], jacobian
-
-
-def information(problem: FitProblem, objective: float) -> float:
-    """Compute the AICc of the largest likelihood with normal errors, or of a loss; NaN with too few points."""
-    data = problem.data
-    n, parameters = data.values.size, problem.count + (data.noise != "given")
-    if n - parameters - 1 <= 0:
-        return math.nan
-    # with a scale, that of the largest likelihood
-    misfit = n * math.log(max(objective, 1e-300) / n) + n if data.noise == "scale" else objective
-    twice = misfit + float(np.log(2.0 * np.pi * data.sigma**2).sum())
-    return 2.0 * parameters + twice + 2.0 * parameters * (parameters + 1) / (n - parameters - 1)
 
 
 def degrees_of_freedom(variance: Array, deviation: Array) -> Array:
@@ -545,6 +499,19 @@ class _Minimum:
         squares, mean = float(slope @ slope) / max(self.freedom, 1), float(curvature.mean())
         return (squares / mean**2, squares / mean) if mean > 0.0 else (math.nan, math.nan)
 
+    @property
+    def aicc(self) -> float:
+        """Compute the AICc of the largest likelihood with normal errors, or of a loss; NaN with too few points."""
+        data, misfit = self.problem.data, self.objective
+        n, parameters = data.values.size, self.problem.count + (data.noise != "given")
+        if n - parameters - 1 <= 0:
+            return math.nan
+        if data.noise == "scale":
+            # that of the largest likelihood
+            misfit = n * math.log(max(misfit, 1e-300) / n) + n
+        twice = misfit + float(np.log(2.0 * np.pi * data.sigma**2).sum())
+        return 2.0 * parameters + twice + 2.0 * parameters * (parameters + 1) / (n - parameters - 1)
+
     @cached_property
     def inverse(self) -> Array:
         """Invert J^T V^(-1) J without the directions that are not identified, shape (p, p)."""
@@ -601,9 +568,36 @@ class _Minimum:
             rises[finite] = freedom[finite] * np.log1p(rises[finite] / freedom[finite])
         for parameter in np.flatnonzero(variances > 0.0).tolist():
             width = float(quantiles[parameter] * math.sqrt(variances[parameter]))
-            end = partial(profile_end, self.problem, best, self.taken, parameter, float(rises[parameter]), width)
+            end = partial(self._end, best, parameter, float(rises[parameter]), width)
             tasks += [partial(end, direction) for direction in (-1, 1)]
         return tasks
+
+    def _end(
+        self, best: Estimate, parameter: int, rise: float, width: float, direction: int, evaluate: Evaluate
+    ) -> float:
+        """Find the u, about `width` from the best, where the least objective over the others is `rise` higher."""
+        bound = 0.0 if direction < 0 else 1.0
+        inner = centre = float(best.u[parameter])
+        # a root finder needs a function: a search from another start may end elsewhere
+        known = {centre: (-rise, best.u)}
+        search = partial(minimize, self.problem, fixed=parameter, taken=self.taken, tolerance=COARSE_TOLERANCE)
+
+        def surplus(value: float) -> float:
+            if value not in known:
+                start = known[min(known, key=lambda other: abs(other - value))][1].copy()
+                start[parameter] = value
+                estimate = search(start, evaluate=evaluate)
+                known[value] = estimate.objective - best.objective - rise, estimate.u
+            return known[value][0]
+
+        for number in range(MAX_BRACKETS):
+            outer = min(max(centre + direction * width * 1.5**number, 0.0), 1.0)
+            if surplus(outer) > 0.0:
+                return float(brentq(surplus, inner, outer, xtol=PROFILE_XTOL * width, rtol=1e-12))
+            if outer == bound:
+                break
+            inner = outer
+        return bound
 
     @cached_property
     def loo_residual(self) -> Array:
@@ -657,7 +651,7 @@ class _Minimum:
             chi2_reduced=squares / self.freedom if self.freedom > 0 else math.nan,
             p_value=float(chi2.sf(squares, self.freedom)) if data.noise == "given" else math.nan,
             excess=best.excess,
-            aicc=information(problem, self.objective),
+            aicc=self.aicc,
             loo=float(np.sqrt(np.mean(left_out**2))),
             loo_residual=self.loo_residual if problem.is_determined else np.full(data.values.size, np.nan),
         )
