@@ -13,7 +13,7 @@ from ..array_types import Array
 from ..display import Block, Displayed, Styled, Table
 from ..errors import warn
 from ..formatting import number
-from .impacts import INPUTS, Impacts, stiffness
+from .impacts import Impacts, stiffness
 from .materials import effective_mass, hertz_stiffness, sphere_radius
 from .model import QUANTITIES, ForceModel, Parameter
 from .output_formulas import Outputs, collide
@@ -46,34 +46,22 @@ def sample(model: ForceModel) -> Impacts:
     """Make forty dissimilar impacts: walls, heavy and light, slow and fast, soft and hard, e from 0.05 to 1."""
     count = 40
     index = np.arange(float(count))
-    e = np.linspace(0.05, 1.0, count)
     v1, v2 = np.power(10.0, index % 7 - 3.0), -0.3 * np.power(10.0, index % 5 - 3.0)
     m1 = np.power(10.0, index % 9 - 4.0)
     m2 = np.where(index % 6 == 5, np.inf, np.power(10.0, index % 4 - 2.0))
-    E1, E2 = np.where(index % 2 == 0, 56e9, 210e9), np.where(index % 3 == 0, 2e6, 70e9)
-    nu1, nu2, rho = np.full(count, 0.3), np.full(count, 0.49), np.full(count, 2712.0)
-    R1, R2 = sphere_radius(m1, rho), sphere_radius(m2, rho)
-    n = np.full(count, 1.5 if model.exponent is None else model.exponent)
-    hertz = hertz_stiffness(E1, nu1, E2, nu2, R1, R2)
-    strength = np.full(count, 3e8)
-    impacts = Impacts(
-        e=e,
-        v1=v1,
-        v2=v2,
-        m1=m1,
-        m2=m2,
-        R1=R1,
-        R2=R2,
-        n=n,
-        E1=E1,
-        nu1=nu1,
-        yield_strength1=strength,
-        E2=E2,
-        nu2=nu2,
-        yield_strength2=strength,
-        K=stiffness(n, hertz, effective_mass(m1, m2), v1 - v2),
-        parameters={parameter.name: np.ones(count) for parameter in model.parameters},
-    )
+    rho, strength, n = (np.full(count, value) for value in (2712.0, 3e8, model.exponent or 1.5))
+    elastic = {
+        "E1": np.where(index % 2 == 0, 56e9, 210e9),
+        "nu1": np.full(count, 0.3),
+        "E2": np.where(index % 3 == 0, 2e6, 70e9),
+        "nu2": np.full(count, 0.49),
+        "R1": sphere_radius(m1, rho),
+        "R2": sphere_radius(m2, rho),
+    }
+    K = stiffness(n, hertz_stiffness(**elastic), effective_mass(m1, m2), v1 - v2)
+    balls = {"v1": v1, "v2": v2, "m1": m1, "m2": m2, "yield_strength1": strength, "yield_strength2": strength}
+    ones = {parameter.name: np.ones(count) for parameter in model.parameters}
+    impacts = Impacts(e=np.linspace(0.05, 1.0, count), n=n, K=K, parameters=ones, **balls, **elastic)
     values = {parameter.name: _parameter_values(model, parameter, impacts) for parameter in model.parameters}
     return replace(impacts, parameters=values)
 
@@ -175,8 +163,7 @@ def _check_clauses(model: ForceModel) -> Iterator[ClauseResult]:
         impacts,
         v1=-impacts.v2,
         v2=-impacts.v1,
-        **{f"{name}1": getattr(impacts, f"{name}2") for name in PROPERTIES_OF_A_BALL},
-        **{f"{name}2": getattr(impacts, f"{name}1") for name in PROPERTIES_OF_A_BALL},
+        **{name + a: getattr(impacts, name + b) for name in PROPERTIES_OF_A_BALL for a, b in ("12", "21")},
     )
     base, exchanged, elastic = collided(impacts, swapped, replace(impacts, e=np.ones(len(impacts))))
     ended = base["status"] < FIRST_FAILURE
@@ -237,8 +224,7 @@ def in_other_units(model: ForceModel, impacts: Impacts) -> Impacts:
         mass, length, time = dimension(units[name], exponents)
         return np.asarray(value * 1e3**mass * (1 / 0.3048) ** length * (1 / 60.0) ** time)
 
-    arrays = {name: changed(name, getattr(impacts, name)) for name in INPUTS}
-    return Impacts(**arrays, parameters={name: changed(name, value) for name, value in impacts.parameters.items()})
+    return impacts.changed(changed)
 
 
 def _alone_differs(collided: Callable[[Impacts], list[Outputs]], impacts: Impacts, base: Outputs) -> int:

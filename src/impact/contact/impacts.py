@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 
@@ -61,24 +61,22 @@ class Impacts:
         return len(self.e)
 
     def __getitem__(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> Impacts:
-        arrays = {name: getattr(self, name)[chosen] for name in INPUTS}
-        return Impacts(**arrays, parameters={name: a[chosen] for name, a in self.parameters.items()})
+        return self.changed(lambda name, array: array[chosen])
+
+    def changed(self, change: Callable[[str, Array], Array]) -> Impacts:
+        """Replace each input and parameter by a function of its name and its values."""
+        arrays = {name: change(name, getattr(self, name)) for name in INPUTS}
+        return Impacts(**arrays, parameters={name: change(name, array) for name, array in self.parameters.items()})
 
     @classmethod
     def joined(cls, batches: Sequence[Impacts]) -> Impacts:
         """Make one batch of several by the same law."""
-        arrays = {name: np.concatenate([getattr(batch, name) for batch in batches]) for name in INPUTS}
-        parameters = {
-            name: np.concatenate([batch.parameters[name] for batch in batches]) for name in batches[0].parameters
-        }
-        return cls(**arrays, parameters=parameters)
+        return batches[0].changed(lambda name, _: np.concatenate([batch.quantity(name) for batch in batches]))
 
     def broadcast(self, shape: tuple[int, ...] | None = None) -> Impacts:
         """Give every field a shape, by default that of all of them."""
         shape = self.shape if shape is None else shape
-        arrays = {name: np.broadcast_to(getattr(self, name), shape) for name in INPUTS}
-        parameters = {name: np.broadcast_to(array, shape) for name, array in self.parameters.items()}
-        return Impacts(**arrays, parameters=parameters)
+        return self.changed(lambda name, array: np.broadcast_to(array, shape))
 
     @cached_property
     def shape(self) -> tuple[int, ...]:
