@@ -36,12 +36,9 @@ from .status import LIMIT, STATUS_OK, Status
 from .velocity_coordinates import VelocityCoordinate, is_strong
 
 # the status that belongs to each termination, by its number; no trajectory ends running
-STATUS_OF_TERMINATION = np.zeros(len(Termination), np.int8)
-STATUS_OF_TERMINATION[Termination.EVENT_REACHED] = Status.OK
-STATUS_OF_TERMINATION[Termination.EVENT_UNREACHABLE] = Status.NOT_SEPARATED
-STATUS_OF_TERMINATION[Termination.MAX_STEPS] = Status.MAX_STEPS
-STATUS_OF_TERMINATION[Termination.STEP_UNDERFLOW] = Status.STEP_UNDERFLOW
-STATUS_OF_TERMINATION[Termination.NOT_FINITE] = Status.NOT_FINITE
+STATUS_OF_TERMINATION = np.array(
+    [0, Status.OK, Status.NOT_SEPARATED, Status.MAX_STEPS, Status.STEP_UNDERFLOW, Status.NOT_FINITE], np.int8
+)
 
 # names of the values of a fixed step, which no value of a law has: steps in the contact time of the continuous
 # law, or the step in the contact's unit of time; and the phase
@@ -453,7 +450,7 @@ def solve_phases(
     peak = motion.indentation(law, approach.state[0])
     at_peak = motion.force_at_peak(law, approach.state[0], params)
     residual, recovered, params = motion.unloading_state(law, params, peak, at_peak)
-    e_out, status = np.full(n, np.nan), _status_of_solution(approach)
+    e_out, status = np.full(n, np.nan), STATUS_OF_TERMINATION.take(approach.termination)
     # without a recovered indentation the balls stay at their peak
     stays = (status == STATUS_OK) & (recovered <= 0.0)
     if stays.any():
@@ -467,7 +464,8 @@ def solve_phases(
         recovery = Recovery(rows, residual[rows])
         restitution = solve(back, motion.restitution_problem(back), start, params, recovery)
         _mark_never_separating(back, restitution, params, recovered)
-        velocity, ended = -back.velocity(restitution.state, params), _status_of_solution(restitution)
+        velocity = -back.velocity(restitution.state, params)
+        ended = STATUS_OF_TERMINATION.take(restitution.termination)
         # the balls are held, or separate at zero speed after infinite time
         at_limit = restitution.termination == Termination.EVENT_UNREACHABLE
         if at_limit.any():
@@ -487,7 +485,3 @@ def _mark_never_separating(law: motion.MotionLaw, solution: Solution, params: Pa
     unfinished_params = tuple(column[unfinished] for column in params)
     never = motion.never_separates(force_at, unfinished_params, recovered[unfinished], law.model.coordinate_power)
     solution.termination[unfinished[never]] = Termination.EVENT_UNREACHABLE
-
-
-def _status_of_solution(solution: Solution) -> NDArray[np.int8]:
-    return STATUS_OF_TERMINATION.take(solution.termination)
