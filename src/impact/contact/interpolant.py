@@ -44,13 +44,9 @@ REAL_ROOT, NOISE = 1e-6, 1e-13
 GROUP_EDGES = np.concatenate([[0.0], 10.0 ** np.arange(-4, 9)])
 # the columns of a collision that are interpolated, and their sizes where their values are smaller
 FLOORS = {
-    "e_out": 1.0,
-    "approach_work": 1.0,
-    "restitution_work": 1.0,
-    "peak": 0.0,
-    "permanent": 0.0,
-    "force": 0.0,
-    "contact_time": 0.0,
+    **dict.fromkeys(("e_out", "approach_work", "restitution_work"), 1.0),
+    **dict.fromkeys(("peak", "permanent", "force", "contact_time"), 0.0),
+    "status": 1.0,
 }
 # the columns that outputs need; others need all
 COLUMNS_OF = {
@@ -266,8 +262,8 @@ class InterpolatedCollisions:
     def __init__(
         self, model: ForceModel, outputs: Sequence[str], *, rtol: float, max_steps: int, core: str
     ) -> None:
-        needed = {column for name in outputs for column in COLUMNS_OF.get(name, tuple(FLOORS))}
-        self.columns = (*(column for column in FLOORS if column in needed), "status")
+        needed = {"status"}.union(*(COLUMNS_OF.get(name, FLOORS) for name in outputs))
+        self.columns = tuple(column for column in FLOORS if column in needed)
         self.model = model
         self.settings: dict[str, Any] = {"rtol": rtol, "max_steps": max_steps, "core": core}
         # the exponent and the params of the first call, shape (params, 1)
@@ -286,7 +282,7 @@ class InterpolatedCollisions:
         differs = table != self.first[1]
         varying = np.flatnonzero(differs.any(axis=1))
         if self.group is None and (varying.size == 1 or len(params) == 1):
-            floors = np.array([{**FLOORS, "status": 1.0}[column] for column in self.columns])
+            floors = np.array([FLOORS[column] for column in self.columns])
             number = int(varying[0]) if varying.size else 0
             self.group = number, Interpolant(self._outcomes, GROUP_EDGES, floors)
         others = differs
