@@ -84,20 +84,16 @@ def history_of(recorded: RecordedMotion, impacts: Impacts, times: int | Array | 
         uniform = np.linspace(0.0, peak_time + duration, times) if isinstance(times, int) else times
         approach_times = uniform[uniform <= peak_time]
         restitution_times = np.minimum(uniform[uniform > peak_time] - peak_time, duration)
-    approach = _phase(law, motion.approach_problem(law), phases.approach.recorded, params, approach_times)
+    problem, steps = motion.approach_problem(law), phases.approach.recorded
+    approach, tau_c, W_c = _phase(law, problem, steps, params, approach_times)
     back_law = motion.restitution_law(law)
-    restitution = _phase(
-        back_law,
-        motion.restitution_problem(back_law),
-        phases.restitution.recorded,
-        back_params,
-        restitution_times,
-    )
+    problem, steps = motion.restitution_problem(back_law), phases.restitution.recorded
+    restitution, tau_r, W_r = _phase(back_law, problem, steps, back_params, restitution_times)
 
     unit_t = impacts.length / impacts.v0
-    restitution.samples[:2] += [phases.approach.state[2, :1], phases.residual[:1]]
+    restitution[:2] += [phases.approach.state[2, :1], phases.residual[:1]]
     units = [unit_t, impacts.length, impacts.v0, impacts.m * impacts.v0 / unit_t]
-    t, delta, v, force = np.hstack([approach.samples, restitution.samples]) * units
+    t, delta, v, force = np.hstack([approach, restitution]) * units
     # the phases meet at the peak, and the last step can be shorter than rounding: each time appears once
     next_times = np.append(np.minimum.accumulate(t[::-1])[::-1][1:], np.inf)
     t, delta, v, force = (row[t < next_times] for row in (t, delta, v, force))
@@ -112,12 +108,12 @@ def history_of(recorded: RecordedMotion, impacts: Impacts, times: int | Array | 
         x2=impacts.v2 * t + mass_share2 * (impacts.v0 * t - delta),
         v1=impacts.v1 - mass_share1 * (impacts.v0 - v),
         v2=impacts.v2 + mass_share2 * (impacts.v0 - v),
-        tau_c=approach.impulse * momentum,
-        tau_r=restitution.impulse * momentum,
-        W_c=approach.work * energy,
-        W_r=restitution.work * energy,
-        e_kinetic=restitution.impulse / approach.impulse,
-        e_energetic=math.sqrt(-restitution.work / approach.work) if restitution.work <= 0.0 else math.nan,
+        tau_c=tau_c * momentum,
+        tau_r=tau_r * momentum,
+        W_c=W_c * energy,
+        W_r=W_r * energy,
+        e_kinetic=tau_r / tau_c,
+        e_energetic=math.sqrt(-W_r / W_c) if W_r <= 0.0 else math.nan,
     )
 
 
@@ -195,19 +191,13 @@ def _coulomb_history(history: History, oblique: ObliqueImpacts, recorded: Sequen
     )
 
 
-@dataclass(frozen=True)
-class _Phase:
-    """Samples of t, x above the residual, v and F in a phase, shape (4, k), and its integrals; in own units."""
-
-    samples: Array
-    impulse: float
-    work: float
-
-
 def _phase(
     law: motion.MotionLaw, problem: Problem, steps: tuple[Step, ...], params: Params, times: Array | None
-) -> _Phase:
-    """Sample the interpolant of a phase, and integrate force and power over it by Gauss points."""
+) -> tuple[Array, float, float]:
+    """Sample t, x above the residual, v and F in a phase, shape (4, k), and integrate it by Gauss points.
+
+    Returns also the impulse and the work, all in the contact's own units.
+    """
 
     def sample(step: Step, fractions: Array) -> tuple[Array, Array]:
         y = step.at(fractions)
@@ -219,11 +209,8 @@ def _phase(
     samples = Step.each(steps, np.repeat(np.arange(len(steps)), GAUSS_POINTS))
     _, inside = sample(samples, samples.end * 0.5 * (1.0 + np.tile(nodes, len(steps))))
     share = 0.5 * np.tile(weights, len(steps)) * (samples.end * samples.length)
-    return _Phase(
-        samples=np.array([y[2], motion.indentation(law, y[0]), law.velocity(y, params), rates[4]]),
-        impulse=math.fsum(share * (inside[4] * inside[2])),
-        work=math.fsum(share * inside[3]),
-    )
+    sampled = np.array([y[2], motion.indentation(law, y[0]), law.velocity(y, params), rates[4]])
+    return sampled, math.fsum(share * (inside[4] * inside[2])), math.fsum(share * inside[3])
 
 
 def _fractions(steps: Sequence[Step]) -> tuple[NDArray[np.intp], Array]:
