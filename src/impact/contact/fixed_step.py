@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from copy import copy
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -175,21 +175,20 @@ def collide_at_fixed_step(
         return _run(_Contacts(law, params, step.copy(), phase * step, limit, scheme, part), slip)
 
 
+@dataclass
 class _Contacts:
     """The collisions that go on; arrays with n along the last axis, without those that have ended."""
 
-    def __init__(
-        self,
-        law: MotionLaw,
-        params: Array,
-        step: Array,
-        x: Array,
-        limit: NDArray[np.int64],
-        scheme: str,
-        slip: FixedStepSlip | None,
-    ) -> None:
-        self.scheme, self.slip = scheme, slip
-        self.law, self.params, self.step, self.x, self.limit = law, params, step, x, limit
+    law: MotionLaw
+    params: Array
+    step: Array
+    x: Array
+    limit: NDArray[np.int64]
+    scheme: str
+    slip: FixedStepSlip | None
+
+    def __post_init__(self) -> None:
+        x = self.x
         self.u, self.peak = np.ones_like(x), x.copy()
         self.largest_force = np.full_like(x, -np.inf)
         # the force before the last step, the displacement in it, and its growing part
