@@ -193,12 +193,14 @@ class _Contacts:
         self.largest_force = np.full_like(x, -np.inf)
         # the force before the last step, the displacement in it, and its growing part
         self.last_force, self.displacement, self.approach_displacement = np.zeros_like(x), x.copy(), x.copy()
-        # twice the work against the force, and its part while the indentation grows
-        self.work, self.approach_work = np.zeros_like(x), np.zeros_like(x)
         self.rows = np.arange(x.size)
         self.unloads = np.zeros(x.size, bool)
         # UNLOADING_ARGUMENTS, zero on approach
         self.branch = np.zeros((len(UNLOADING_ARGUMENTS), x.size))
+        # twice the work against the force, and its part while the indentation grows: at first the work between the
+        # first touch and the first step, half of it of the force at the touch
+        self.work = 0.0 + self.force_at(np.zeros_like(x)) * x
+        self.approach_work = 0.0 + self.work
 
     @property
     def residual(self) -> Array:
@@ -230,11 +232,6 @@ class _Contacts:
         force = other.force()
         return np.where(np.isfinite(force), force, 0.0)
 
-    def begin_work(self) -> None:
-        """Add the work between the first touch and the first step, half of it of the force at the touch."""
-        self.work += self.force_at(np.zeros_like(self.x)) * self.x
-        self.approach_work += self.work
-
     def restitution_work(self) -> Array:
         """Twice the work while the indentation falls, of contacts that end in this step, inside it."""
         out = self.residual - (self.x - self.displacement)
@@ -262,7 +259,12 @@ class _Contacts:
         self.u = velocity
         displacement = self.step * self.u
         self.x = self.x + displacement
-        self._add_work(force, displacement)
+        np.maximum(self.largest_force, force, out=self.largest_force)
+        # half of the work of the force before a step is in the step before, half in the step itself
+        approach_displacement = np.maximum(displacement, 0.0)
+        self.work += force * (self.displacement + displacement)
+        self.approach_work += force * (self.approach_displacement + approach_displacement)
+        self.last_force, self.displacement, self.approach_displacement = force, displacement, approach_displacement
         np.maximum(self.peak, self.x, out=self.peak)
         if self.law.model.unloading is not None:
             turned = ~self.unloads & (self.u <= 0.0)
@@ -290,14 +292,6 @@ class _Contacts:
             return np.where(x + reach * u <= 0.0, u, (u - h * x) / (1.0 + h * reach))
         return u - h * force
 
-    def _add_work(self, force: Array, displacement: Array) -> None:
-        """Add the work of the force before a step: half of it in the step before, half in the step itself."""
-        np.maximum(self.largest_force, force, out=self.largest_force)
-        approach_displacement = np.maximum(displacement, 0.0)
-        self.work += force * (self.displacement + displacement)
-        self.approach_work += force * (self.approach_displacement + approach_displacement)
-        self.last_force, self.displacement, self.approach_displacement = force, displacement, approach_displacement
-
     def _turn(self, turned: NDArray[np.bool_]) -> None:
         """Begin the unloading branch of some collisions at the largest indentation that they reached."""
         peak = self.peak[turned]
@@ -321,7 +315,6 @@ def _run(contacts: _Contacts, slip: FixedStepSlip | None) -> CollisionResult:
     result = CollisionResult.blank(count)
     result.steps[:], result.status[:] = contacts.limit, Status.NOT_SEPARATED
     active = np.ones(count, bool)
-    contacts.begin_work()
     for step in range(1, int(contacts.limit.max(initial=0)) + 1):
         contacts.advance()
         is_finite = np.isfinite(contacts.x) & np.isfinite(contacts.u)
