@@ -53,12 +53,11 @@ def outputs(
     with np.errstate(all="ignore"):
         values = {name: _compute(name, computed) for name in names}
     # which of two NaN an operation passes on, with its sign, depends on the position of an element in its array
-    return values if friction is None else {name: _replace_nan(array) for name, array in values.items()}
-
-
-def _replace_nan(values: NDArray[Any]) -> NDArray[Any]:
-    """Give every NaN of an array the same bits."""
-    return replace_where(values, np.isnan(values), np.nan) if values.dtype.kind == "f" else values
+    if friction is None:
+        return values
+    return {
+        name: replace_where(a, np.isnan(a), np.nan) if a.dtype.kind == "f" else a for name, a in values.items()
+    }
 
 
 def _compute(name: str, computed: dict[str, Any]) -> Any:
@@ -130,20 +129,7 @@ def collide(
     return outputs(model, impacts, result, names, checked, (inputs, tangential, pair.friction.kind))
 
 
-# ---- intermediate values; the arguments of each function are names of FORMULAS
-
-
-def _in_si(failed: Mask, missed: Mask) -> InSI:
-    """Converts (values, unit) to SI: NaN where the impact failed, 0 where the balls miss each other."""
-    return lambda value, unit: replace_where(replace_where(value * unit, failed, np.nan), missed, 0.0)
-
-
-# ---- outputs
-
-
-def _damping_ratio(result: CollisionResult, not_integrated: Mask) -> Array:
-    chi = result.chi
-    return replace_where(replace_where(chi, not_integrated, np.nan), np.isinf(chi), np.nan)
+# ---- outputs; the arguments of each function are names of FORMULAS
 
 
 def _energy_residual(result: CollisionResult, undefined: Mask) -> Array:
@@ -238,14 +224,6 @@ def _contact_regime(
     return np.where((friction_status >= FIRST_FAILURE) | missed, np.int8(0), regime).astype(np.int8)
 
 
-def _slip_changes(
-    oblique: ObliqueImpacts, tangential: TangentialResult, kind: str, contact_regime: NDArray[np.int8]
-) -> NDArray[np.int32]:
-    if kind == "coulomb":
-        return np.where(contact_regime == STICKS | SLIDES, np.int32(1), np.int32(0))
-    return np.where(contact_regime == 0, np.int32(0), tangential.slip_changes)
-
-
 def _friction_residual(
     oblique: ObliqueImpacts, tangential: TangentialResult, kind: str, slip_share: Array, has_works: Mask
 ) -> Array:
@@ -281,7 +259,10 @@ FORMULAS: dict[str, Callable[..., Any]] = {
     "undefined": lambda missed, failed: missed | failed,
     # NaN where the required restitution is not within [0, 1]
     "asked_e": lambda impacts: replace_where(impacts.e, ~((impacts.e >= 0.0) & (impacts.e <= 1.0)), np.nan),
-    "in_si": _in_si,
+    # converts (values, unit) to SI: NaN where the impact failed, 0 where the balls miss each other
+    "in_si": lambda failed, missed: (
+        lambda value, unit: replace_where(replace_where(value * unit, failed, np.nan), missed, 0.0)
+    ),
     "velocities": lambda impacts, e_out: velocities_after(impacts, e_out),
     "references": lambda impacts, asked_e: velocities_after(impacts, asked_e),
     "v1_post": lambda velocities: velocities[0],
@@ -298,7 +279,9 @@ FORMULAS: dict[str, Callable[..., Any]] = {
     "contact_time": lambda result, impacts, in_si: in_si(result.contact_time, impacts.time),
     "energy_loss": lambda result, impacts, in_si: in_si(1.0 - result.e_out * result.e_out, 0.5 * impacts.energy),
     "stiffness": lambda impacts, failed: replace_where(impacts.K, failed, np.nan),
-    "damping_ratio": _damping_ratio,
+    "damping_ratio": lambda result, not_integrated: replace_where(
+        replace_where(result.chi, not_integrated, np.nan), np.isinf(result.chi), np.nan
+    ),
     "energy_residual": _energy_residual,
     "closed_form_error": lambda e_out, result: e_out - result.exact,
     "status": lambda result, not_integrated, checked: replace_where(result.status, not_integrated, checked),
@@ -339,5 +322,9 @@ FORMULAS: dict[str, Callable[..., Any]] = {
     "elastic_left": _work("elastic_left"),
     "psi1": lambda tangential, oblique: tangential.stiffness * oblique.G0,
     "psi2": lambda tangential, oblique, slip_share: tangential.stiffness * oblique.G0 * slip_share,
-    "slip_changes": _slip_changes,
+    "slip_changes": lambda tangential, kind, contact_regime: (
+        (contact_regime == STICKS | SLIDES).astype(np.int32)
+        if kind == "coulomb"
+        else np.where(contact_regime == 0, np.int32(0), tangential.slip_changes)
+    ),
 }
