@@ -308,21 +308,18 @@ class InterpolatedCollisions:
 
     def _outcomes(self, x: Array) -> Array:
         """Compute the columns at values of the group, shape (k,) to (k, columns); NaN where the law raises."""
-        try:
-            return self._at_nodes(x)
-        except ModelError:
-            if x.size == 1:
-                return np.full((1, len(self.columns)), np.nan)
-            return np.concatenate([self._outcomes(half) for half in np.array_split(x, 2)])
-
-    def _at_nodes(self, x: Array) -> Array:
         assert self.first is not None
         assert self.group is not None
         n, base = self.first
         table = np.repeat(base, x.size, axis=1)
         table[self.group[0]] = x
         rtol, max_steps = min(self.settings["rtol"], NODE_RTOL), min(self.settings["max_steps"], NODE_MAX_STEPS)
-        collisions = self._integrate(table, n, **{**self.settings, "rtol": rtol, "max_steps": max_steps})
+        try:
+            collisions = self._integrate(table, n, **{**self.settings, "rtol": rtol, "max_steps": max_steps})
+        except ModelError:
+            if x.size == 1:
+                return np.full((1, len(self.columns)), np.nan)
+            return np.concatenate([self._outcomes(half) for half in np.array_split(x, 2)])
         return np.stack([getattr(collisions, name) for name in self.columns], axis=1).astype(float)
 
     def _integrate(self, table: Array, n: float, never: Mask | None = None, **settings: Any) -> CollisionResult:
