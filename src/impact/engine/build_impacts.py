@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -30,10 +31,7 @@ def build_impacts(inputs: Inputs, model: Law, index: Index) -> Impacts:
     """
     names = set(inputs.names())
     missing = np.full((1,) * dimensions(index), np.nan)
-
-    def value(name: str) -> Array:
-        return input_at(inputs, name, index)
-
+    value = partial(input_at, inputs, index=index)
     balls = {f"{name}{ball}": value(f"{name}{ball}") for name in "vmR" for ball in "12"}
     properties = ("E", "nu", "yield_strength")
     materials = {f"{key}{ball}": property_at(inputs, ball, key, index) for key in properties for ball in "12"}
@@ -66,10 +64,7 @@ def build_oblique(
     inputs: Inputs, impacts: Impacts, index: Index, friction: FrictionLaw | None = None
 ) -> ObliqueImpacts:
     """Build the tangential inputs of impacts at cells, with the parameters of a friction law."""
-
-    def value(name: str) -> Array:
-        return input_at(inputs, name, index)
-
+    value = partial(input_at, inputs, index=index)
     u1, u2, tangent = (value(name) for name in ("u1", "u2", "angle"))
     if "angle" in inputs.names():
         tangent = np.tan(tangent)
@@ -110,10 +105,7 @@ def input_at(inputs: Inputs, name: str, index: Index) -> Array:
     ModelError : the config has neither the mass nor a radius and density to derive it from
     """
     names, ball = inputs.names(), name[-1]
-
-    def value(other: str) -> Array:
-        return input_at(inputs, other, index)
-
+    value = partial(input_at, inputs, index=index)
     if name == "v1" and "speed" in names:
         return value("v2") + value("speed") * (np.cos(value("angle")) if "angle" in names else 1.0)
     if name in names:

@@ -386,8 +386,8 @@ def matching_laws(
     if not matching:
         raise UsageError(f'no {noun} matches "{pattern}"; {did_you_mean(pattern.strip("*?"), list(laws))}')
     if search is not None:
-        words = search.casefold().split()
-        matching = {key: law for key, law in matching.items() if _contains(law, words)}
+        for word in search.casefold().split():
+            matching = {key: law for key, law in matching.items() if word in _search_text(law)}
         if not matching:
             raise UsageError(
                 f'{argument("search")}: no {noun} has "{search[:60]}" in its title, equation or reference'
@@ -395,8 +395,7 @@ def matching_laws(
     return matching
 
 
-def _contains(law: ForceModel | FrictionLaw, words: Sequence[str]) -> bool:
-    """Whether all words occur in the description of a law."""
+def _search_text(law: ForceModel | FrictionLaw) -> str:
+    """Join what a search looks at."""
     group = law.family if isinstance(law, ForceModel) else law.kind
-    text = " ".join((law.key, group, law.title, str(law.year), law.equation, law.reference, law.doi)).casefold()
-    return all(word in text for word in words)
+    return " ".join((law.key, group, law.title, str(law.year), law.equation, law.reference, law.doi)).casefold()

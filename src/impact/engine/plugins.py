@@ -246,17 +246,13 @@ def _execute_module(source: PythonFile, sha256: str) -> ModuleType:
         sys.modules.pop(module.__name__, None)
         frames = traceback.walk_tb(error.__traceback__)
         line = [number for frame, number in frames if frame.f_code.co_filename == file][-1]
-        raise ModelError(f"{source.name}:{line}: {_error_message(error)}") from None
+        text, kind = safe_text(str(error), MAX_ERROR_LENGTH), type(error).__name__
+        if not isinstance(error, ImpactError):
+            text = f"{kind}: {text}" if text else kind
+        if isinstance(error, SystemExit):
+            text += "; expected a file that only declares models"
+        raise ModelError(f"{source.name}:{line}: {text}") from None
     return module
-
-
-def _error_message(error: BaseException) -> str:
-    """State an error that a plug-in raised."""
-    text = safe_text(str(error), MAX_ERROR_LENGTH)
-    if isinstance(error, ImpactError):
-        return text
-    kind = type(error).__name__ + (f": {text}" if text else "")
-    return f"{kind}; expected a file that only declares models" if isinstance(error, SystemExit) else kind
 
 
 def value_hash(model: ForceModel) -> str | None:

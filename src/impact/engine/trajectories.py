@@ -159,13 +159,6 @@ def even_size(count: int, most: int) -> int:
     return -(-count // -(-count // most))
 
 
-def coupled_pair(inputs: Inputs, model: ForceModel) -> Pair | None:
-    """Find the friction law that changes the normal motion of a model in the scheme of the inputs."""
-    names = inputs.names()
-    is_coupled = "phase" in names and f"friction.{MUJOCO_ELLIPTIC.key}.impratio" in names
-    return Pair(model, MUJOCO_ELLIPTIC) if is_coupled else None
-
-
 def columns_at(inputs: Inputs, law: PlanLaw, axes: Sequence[int], index: Index) -> Columns:
     """Build the problems of a law at cells, arrays that broadcast; only inputs along `axes` are checked."""
     model = model_of(law)
@@ -184,8 +177,10 @@ def _values_at(inputs: Inputs, law: PlanLaw, index: Index) -> tuple[Impacts, Col
     impacts, status = build_impacts(inputs, model, index), np.full((1,) * dimensions(index), STATUS_OK, np.int8)
     with np.errstate(all="ignore"):
         values = {"n": impacts.n, **dimensionless_values(model, impacts), **fixed_steps_at(inputs, impacts, index)}
-        pair = law if isinstance(law, Pair) else coupled_pair(inputs, law)
-        if pair is not None:
+        # the friction law that changes the normal motion of a model in the scheme of the inputs
+        is_coupled = {"phase", f"friction.{MUJOCO_ELLIPTIC.key}.impratio"} <= {*inputs.names()}
+        if is_coupled or isinstance(law, Pair):
+            pair = law if isinstance(law, Pair) else Pair(law, MUJOCO_ELLIPTIC)
             oblique = build_oblique(inputs, impacts, index, pair.friction)
             values |= friction_values(pair, oblique)
             status = check_friction(pair, oblique)
