@@ -7,19 +7,13 @@ from collections.abc import Callable, Iterable, Mapping
 from importlib import import_module
 from pkgutil import iter_modules
 from types import MappingProxyType
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 from ..errors import ModelError, did_you_mean
+from .friction import FrictionLaw
+from .model import ForceModel
 
-
-class Keyed(Protocol):
-    """What has a key."""
-
-    @property
-    def key(self) -> str: ...
-
-
-Law = TypeVar("Law", bound=Keyed)
+Law = TypeVar("Law", bound=ForceModel | FrictionLaw)
 
 
 def declared_laws(package: str, path: Iterable[str], kind: type[Law]) -> list[Law]:
