@@ -73,18 +73,13 @@ class WorkFolder:
             with np.load(path, allow_pickle=False) as stored:
                 if stored["of"].item() != self._header(trajectory_range):
                     return None
-                arrays = {name: stored[name] for name in record.columns()}
+                loaded = record(**{name: stored[name] for name in record.columns()})
         except MemoryError:
             raise
         # numpy and zipfile raise almost any exception on a damaged file
         except Exception:
             return None
-        blank = record.blank(trajectory_range.size)
-        is_whole = all(
-            (array.shape, array.dtype) == (getattr(blank, name).shape, getattr(blank, name).dtype)
-            for name, array in arrays.items()
-        )
-        return record(**arrays) if is_whole else None
+        return None if loaded.misfit(trajectory_range.size) else loaded
 
 
 @contextlib.contextmanager

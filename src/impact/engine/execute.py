@@ -197,22 +197,12 @@ def _check_integrated(trajectory_range: TrajectoryRange, integrated: object, siz
         raise StoreError(f"{prefix}: got {type(collisions).__name__}, expected {kind.__name__}")
     if not isinstance(errors, dict):
         raise StoreError(f"{prefix}: got {type(errors).__name__}, expected a dict of errors")
-    blank = kind.blank(size)
-    for name in kind.columns():
-        got, expected = (_dtype_and_shape(getattr(result, name)) for result in (collisions, blank))
-        if got != expected:
-            raise StoreError(f"{prefix}: {name}: got {got}, expected {expected}")
+    if misfit := collisions.misfit(size):
+        raise StoreError(f"{prefix}: {misfit}")
     statuses = FRICTION_STATUSES if kind is TangentialResult else STATUSES
     unknown = np.setdiff1d(collisions.status, statuses)
     if unknown.size:
         raise StoreError(f"{prefix}: status: got {unknown[0]}, expected one of {list(statuses)}")
-
-
-def _dtype_and_shape(array: object) -> str:
-    """Describe an array, or name the type of something else."""
-    if not isinstance(array, np.ndarray):
-        return type(array).__name__
-    return f"{array.dtype} of shape {array.shape}"
 
 
 def _submit(
