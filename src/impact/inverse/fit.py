@@ -241,8 +241,7 @@ def scan(problem: FitProblem, evaluate: Evaluate) -> Array:
     # the sequence begins at 0; half a cell away from it, no bound is tried
     u = qmc.Sobol(problem.count, scramble=False).random(N_SCAN) + 0.5 / N_SCAN
     cost = (problem.residuals(evaluate, u) ** 2).sum(axis=1)
-    best: Array = u[np.argsort(cost, kind="stable")[:N_STARTS]]
-    return best
+    return np.asarray(u[np.argsort(cost, kind="stable")[:N_STARTS]])
 
 
 def minimize(
@@ -413,8 +412,7 @@ def half_widths(covariance: Array, covariance_deviation: Array, directions: Arra
         np.maximum(np.einsum("kp,pq,kq->k", directions, matrix, directions), 0.0)
         for matrix in (covariance, covariance_deviation)
     )
-    widths: Array = t_quantile(degrees_of_freedom(variance, deviation)) * np.sqrt(variance)
-    return widths
+    return np.asarray(t_quantile(degrees_of_freedom(variance, deviation)) * np.sqrt(variance))
 
 
 def best_of(estimates: Sequence[Estimate]) -> Estimate:
@@ -441,15 +439,11 @@ class _Minimum:
         """Predict the measurements, shape (n,)."""
         return self.all_predicted[: self.problem.data.values.size]
 
-    @property
-    def jacobian(self) -> Array:
-        """Differentiate the predictions of the measurements by u, shape (n, p)."""
-        return self.all_slopes[: self.problem.data.values.size]
-
     @cached_property
     def scaled_jacobian(self) -> Array:
-        """Scale the derivatives to given standard deviations, shape (n, p)."""
-        return np.where(np.isfinite(self.jacobian), self.jacobian, 0.0) / self.problem.data.sigma[:, None]
+        """Scale the derivatives of the measurements to given standard deviations, shape (n, p)."""
+        slopes = self.all_slopes[: self.problem.data.values.size]
+        return np.where(np.isfinite(slopes), slopes, 0.0) / self.problem.data.sigma[:, None]
 
     @cached_property
     def scaled_residual(self) -> Array:
@@ -474,13 +468,11 @@ class _Minimum:
         slope = np.where(bounds.lower > 0.0, bounds.values(u) / bounds.slope(u), 1.0)
         _, sizes, directions = np.linalg.svd(self.white_jacobian * slope, full_matrices=True)
         sizes = np.concatenate([sizes, np.zeros(slope.size - sizes.size)])
-        unidentified: Array = directions[sizes <= RANK_RTOL * sizes.max(initial=0.0)]
-        return unidentified
+        return np.asarray(directions[sizes <= RANK_RTOL * sizes.max(initial=0.0)])
 
     @property
     def identifiable(self) -> Mask:
-        identifiable: Mask = ~np.any(np.abs(self.unidentified) > PARTICIPATION_TOL, axis=0)
-        return identifiable
+        return np.asarray(~np.any(np.abs(self.unidentified) > PARTICIPATION_TOL, axis=0))
 
     @property
     def freedom(self) -> int:
@@ -542,8 +534,7 @@ class _Minimum:
         product, leverage = cross @ cross.T @ self.inverse, np.einsum("pg,pq,qg->g", cross, self.inverse, cross)
         # half of this is the information of the restricted likelihood about the variance between specimens
         information = float((diagonal**2 - 2.0 * diagonal * leverage).sum() + np.trace(product @ product))
-        deviation: Array = self.inverse @ product * math.sqrt(2.0 / max(information, 1e-300))
-        return deviation
+        return np.asarray(self.inverse @ product * math.sqrt(2.0 / max(information, 1e-300)))
 
     @cached_property
     def taken(self) -> Array | None:
@@ -630,7 +621,7 @@ class _Minimum:
         covariance, deviation = (
             matrix * np.outer(slope, slope) for matrix in (self.covariance, self.covariance_deviation)
         )
-        other_slopes = (self.all_slopes / slope)[data.values.size :]
+        jacobian, other_slopes = np.split(self.all_slopes / slope, [data.values.size])
         half_width = np.full(len(other_slopes), np.nan)
         if np.isfinite(covariance).all() and problem.is_determined:
             half_width = half_widths(covariance, deviation, other_slopes)
@@ -645,7 +636,7 @@ class _Minimum:
             unidentified=self.unidentified,
             predicted=self.predicted,
             residual=data.values - self.predicted,
-            jacobian=self.jacobian / slope,
+            jacobian=jacobian,
             other_predicted=self.all_predicted[data.values.size :],
             other_half_width=half_width,
             chi2_reduced=squares / self.freedom if self.freedom > 0 else math.nan,

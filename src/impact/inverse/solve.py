@@ -583,8 +583,7 @@ def _polished(problem: SolveProblem, interpolant: Interpolant | None, roots: Arr
     with np.errstate(divide="ignore", invalid="ignore"):
         step = distance * 2.0 * SLOPE_STEP * roots / (above - below)
     is_small = np.abs(step) <= SLOPE_STEP * np.abs(roots)
-    polished: Array = np.clip(roots - np.where(is_small, step, 0.0), problem.unknown.least, problem.unknown.most)
-    return polished
+    return np.asarray(np.clip(roots - np.where(is_small, step, 0.0), problem.unknown.least, problem.unknown.most))
 
 
 def _with_extrema(
