@@ -131,6 +131,7 @@ def check_scheme(model: ForceModel, n: float, scheme: str) -> None:
         raise UsageError(law_problem(model, scheme))
 
 
+@np.errstate(all="ignore")
 def collide_at_fixed_step(
     model: ForceModel,
     n: float,
@@ -166,13 +167,43 @@ def collide_at_fixed_step(
     check_scheme(model, n, scheme)
     count = step.size
     law = MotionLaw.of(model, n, strong=False)
-    with np.errstate(all="ignore"):
-        law_values = with_coefficients(model, with_units(values, n), count)
-        columns = [np.broadcast_to(law_values[name], count) for name in law.names]
-        params = np.array(columns).reshape(len(columns), count)
-        limit = np.broadcast_to(np.asarray(max_steps, np.int64), count).copy()
-        part = None if slip is None else slip.take(np.arange(count))
-        return _run(_Contacts(law, params, step.copy(), phase * step, limit, scheme, part), slip)
+    law_values = with_coefficients(model, with_units(values, n), count)
+    columns = [np.broadcast_to(law_values[name], count) for name in law.names]
+    params = np.array(columns).reshape(len(columns), count)
+    limit = np.broadcast_to(np.asarray(max_steps, np.int64), count).copy()
+    part = None if slip is None else slip.take(np.arange(count))
+    contacts = _Contacts(law, params, step.copy(), phase * step, limit, scheme, part)
+    result = CollisionResult.blank(count)
+    result.steps[:], result.status[:] = limit, Status.NOT_SEPARATED
+    active = np.ones(count, bool)
+    for number in range(1, int(limit.max(initial=0)) + 1):
+        contacts.advance()
+        is_finite = np.isfinite(contacts.x) & np.isfinite(contacts.u)
+        has_ended = active & ((contacts.x <= contacts.residual) | ~is_finite)
+        is_over = has_ended | (contacts.limit <= number)
+        if is_over.any():
+            ended = copy(contacts)
+            ended.keep(has_ended)
+            rows = ended.rows
+            status = np.where(-ended.u > MAX_RESTITUTION, Status.UNSTABLE, Status.OK)
+            status[~is_finite[has_ended]] = Status.NOT_FINITE
+            result.e_out[rows] = np.where(status == Status.OK, -ended.u, np.nan)
+            result.peak[rows] = ended.peak
+            result.permanent[rows] = ended.residual
+            result.force[rows] = ended.largest_force
+            result.approach_work[rows] = ended.approach_work
+            result.restitution_work[rows] = ended.restitution_work()
+            result.steps[rows] = number
+            result.status[rows] = status
+            if slip is not None and ended.slip is not None:
+                slip.put(rows, ended.slip)
+            active &= ~is_over
+            if not active.any():
+                break
+            if np.count_nonzero(active) < (1.0 - COMPACTION_SHARE) * active.size:
+                contacts.keep(active)
+                active = np.ones(contacts.x.size, bool)
+    return replace(result, contact_time=result.steps * step)
 
 
 @dataclass
@@ -308,38 +339,3 @@ class _Contacts:
             if isinstance(value, np.ndarray):
                 setattr(self, name, value[..., active])
         self.slip = None if self.slip is None else self.slip.take(active)
-
-
-def _run(contacts: _Contacts, slip: FixedStepSlip | None) -> CollisionResult:
-    count, step_size = contacts.x.size, contacts.step
-    result = CollisionResult.blank(count)
-    result.steps[:], result.status[:] = contacts.limit, Status.NOT_SEPARATED
-    active = np.ones(count, bool)
-    for step in range(1, int(contacts.limit.max(initial=0)) + 1):
-        contacts.advance()
-        is_finite = np.isfinite(contacts.x) & np.isfinite(contacts.u)
-        has_ended = active & ((contacts.x <= contacts.residual) | ~is_finite)
-        is_over = has_ended | (contacts.limit <= step)
-        if is_over.any():
-            ended = copy(contacts)
-            ended.keep(has_ended)
-            rows = ended.rows
-            status = np.where(-ended.u > MAX_RESTITUTION, Status.UNSTABLE, Status.OK)
-            status[~is_finite[has_ended]] = Status.NOT_FINITE
-            result.e_out[rows] = np.where(status == Status.OK, -ended.u, np.nan)
-            result.peak[rows] = ended.peak
-            result.permanent[rows] = ended.residual
-            result.force[rows] = ended.largest_force
-            result.approach_work[rows] = ended.approach_work
-            result.restitution_work[rows] = ended.restitution_work()
-            result.steps[rows] = step
-            result.status[rows] = status
-            if slip is not None and ended.slip is not None:
-                slip.put(rows, ended.slip)
-            active &= ~is_over
-            if not active.any():
-                break
-            if np.count_nonzero(active) < (1.0 - COMPACTION_SHARE) * active.size:
-                contacts.keep(active)
-                active = np.ones(contacts.x.size, bool)
-    return replace(result, contact_time=result.steps * step_size)
