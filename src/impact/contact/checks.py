@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -15,7 +15,7 @@ from ..errors import warn
 from ..formatting import number
 from .impacts import Impacts, stiffness
 from .materials import effective_mass, hertz_stiffness, sphere_radius
-from .model import QUANTITIES, ForceModel, Parameter
+from .model import QUANTITIES, ForceModel
 from .output_formulas import Outputs, collide
 from .status import FIRST_FAILURE, Status
 from .units import dimension
@@ -62,18 +62,16 @@ def sample(model: ForceModel) -> Impacts:
     balls = {"v1": v1, "v2": v2, "m1": m1, "m2": m2, "yield_strength1": strength, "yield_strength2": strength}
     ones = {parameter.name: np.ones(count) for parameter in model.parameters}
     impacts = Impacts(e=np.linspace(0.05, 1.0, count), n=n, K=K, parameters=ones, **balls, **elastic)
-    values = {parameter.name: _parameter_values(model, parameter, impacts) for parameter in model.parameters}
+    values = {}
+    for p in model.parameters:
+        if p.default is not None:
+            values[p.name] = np.full(count, p.default)
+            continue
+        # from its least value upwards, by the size that is 1 in the contact's own units
+        size = 1.0 / impacts.dimensionless(model, p.name) if p.typical is None else p.typical
+        least = p.least if math.isfinite(p.least) else min(0.0, p.most)
+        values[p.name] = np.minimum(least + np.linspace(0.0, 4.0, count) * size, p.most)
     return replace(impacts, parameters=values)
-
-
-def _parameter_values(model: ForceModel, parameter: Parameter, impacts: Impacts) -> Array:
-    """Choose values of a parameter for the impacts: its default, or from its least one upwards, shape (n,)."""
-    if parameter.default is not None:
-        return np.full(len(impacts), parameter.default)
-    # the size of the parameter that is 1 in the contact's own units
-    size = 1.0 / impacts.dimensionless(model, parameter.name) if parameter.typical is None else parameter.typical
-    least = parameter.least if math.isfinite(parameter.least) else min(0.0, parameter.most)
-    return np.minimum(least + np.linspace(0.0, 4.0, len(impacts)) * size, parameter.most)
 
 
 class ContractResult(list[ClauseResult], Displayed):
@@ -209,9 +207,11 @@ def _check_clauses(model: ForceModel) -> Iterator[ClauseResult]:
     yield ClauseResult(
         "a tighter tolerance moves nothing", worst(tight["e_out"] - base["e_out"]), 10 * CONTRACT_RTOL
     )
-    yield ClauseResult(
-        "an impact alone has the bits that it has in a batch", float(_alone_differs(collided, impacts, base)), 0
-    )
+    differ = 0
+    for index in range(0, len(impacts), 7):
+        (alone,) = collided(impacts[np.array([index])])
+        differ += any(base[name][[index]].tobytes() != alone[name].tobytes() for name in CENTRAL_OUTPUTS)
+    yield ClauseResult("an impact alone has the bits that it has in a batch", float(differ), 0)
 
 
 def in_other_units(model: ForceModel, impacts: Impacts) -> Impacts:
@@ -225,12 +225,3 @@ def in_other_units(model: ForceModel, impacts: Impacts) -> Impacts:
         return np.asarray(value * 1e3**mass * (1 / 0.3048) ** length * (1 / 60.0) ** time)
 
     return impacts.changed(changed)
-
-
-def _alone_differs(collided: Callable[[Impacts], list[Outputs]], impacts: Impacts, base: Outputs) -> int:
-    """Count the impacts that have other bits when they are integrated alone."""
-    differ = 0
-    for index in range(0, len(impacts), 7):
-        (alone,) = collided(impacts[np.array([index])])
-        differ += any(base[name][[index]].tobytes() != alone[name].tobytes() for name in CENTRAL_OUTPUTS)
-    return differ
