@@ -45,13 +45,9 @@ def run_together(functions: Mapping[str, VectorFunction], solvers: Sequence[Call
     >>> run_together({"square": lambda rows: rows**2}, [root_of(4.0), root_of(9.0)])
     [2.0, 3.0]
     """
-    results: list[T] = []
-    for start in range(0, len(solvers), MAX_THREADS):
-        results += _run_threads(functions, solvers[start : start + MAX_THREADS])
-    return results
-
-
-def _run_threads(functions: Mapping[str, VectorFunction], solvers: Sequence[Callable[[Evaluate], T]]) -> list[T]:
+    if len(solvers) > MAX_THREADS:
+        first, others = solvers[:MAX_THREADS], solvers[MAX_THREADS:]
+        return [*run_together(functions, first), *run_together(functions, others)]
     # what the running solver sends: a request, or at its end its future
     messages: SimpleQueue[tuple[str, Array] | Future[T]] = SimpleQueue()
     answers: list[SimpleQueue[Array | None]] = [SimpleQueue() for _ in solvers]
@@ -73,14 +69,20 @@ def _run_threads(functions: Mapping[str, VectorFunction], solvers: Sequence[Call
         else:
             requests[number] = message
 
-    with ThreadPoolExecutor(len(solvers)) as executor:
+    with ThreadPoolExecutor(MAX_THREADS) as executor:
         try:
             for number, solver in enumerate(solvers):
                 futures.append(executor.submit(solver, partial(evaluate, number)))
                 futures[-1].add_done_callback(messages.put)
                 wait_for(number)
             while requests:
-                values = _evaluate_all(functions, requests)
+                values: dict[int, Array] = {}
+                # those of one function together, in the order of the solvers
+                for key in dict.fromkeys(key for key, _ in requests.values()):
+                    numbers = sorted(number for number, (requested, _) in requests.items() if requested == key)
+                    rows = [requests[number][1] for number in numbers]
+                    ends = np.cumsum([len(block) for block in rows])[:-1]
+                    values.update(zip(numbers, np.split(functions[key](np.concatenate(rows)), ends), strict=True))
                 requests.clear()
                 for number in sorted(values):
                     answers[number].put(values[number])
@@ -89,16 +91,3 @@ def _run_threads(functions: Mapping[str, VectorFunction], solvers: Sequence[Call
             for answer in answers:
                 answer.put(None)
     return [future.result() for future in futures]
-
-
-def _evaluate_all(
-    functions: Mapping[str, VectorFunction], requests: Mapping[int, tuple[str, Array]]
-) -> dict[int, Array]:
-    """Evaluate all requests, those of one function together, in the order of the solvers."""
-    values: dict[int, Array] = {}
-    for key in dict.fromkeys(key for key, _ in requests.values()):
-        numbers = sorted(number for number, (requested, _) in requests.items() if requested == key)
-        rows = [requests[number][1] for number in numbers]
-        ends = np.cumsum([len(block) for block in rows])
-        values |= dict(zip(numbers, np.split(functions[key](np.concatenate(rows)), ends[:-1]), strict=True))
-    return values
