@@ -326,17 +326,15 @@ def check_coefficients(
 ) -> NDArray[np.int8]:
     """Compute the status of impacts by the coefficients of their law, before integration; shape (count,)."""
     status = np.full(count, Status.OK, np.int8)
-    coefficients = {name: np.asarray(law_values[name]) for name in model.coefficients}
-    if all(np.isfinite(coefficient).all() for coefficient in coefficients.values()):
+    coefficients = np.array([law_values[name] for name in model.coefficients]).reshape(-1, count)
+    if np.isfinite(coefficients).all():
         return status
     is_e_zero = values.get("e", np.full(count, np.nan)) == 0.0
-    for coefficient in coefficients.values():
-        status[np.isinf(coefficient) & ~is_e_zero] = Status.OUT_OF_RANGE
-    for coefficient in coefficients.values():
-        status[np.isnan(coefficient)] = Status.INVALID_PARAMETER
+    status[(np.isinf(coefficients) & ~is_e_zero).any(axis=0)] = Status.OUT_OF_RANGE
+    status[np.isnan(coefficients).any(axis=0)] = Status.INVALID_PARAMETER
     # with infinite damping the balls neither approach nor separate: force and time have no finite limit
-    for name in coefficients.keys() & argument_names(model.force):
-        status[np.isinf(coefficients[name]) & is_e_zero] = Status.LIMIT
+    is_of_force = [name in argument_names(model.force) for name in model.coefficients]
+    status[(np.isinf(coefficients[is_of_force]) & is_e_zero).any(axis=0)] = Status.LIMIT
     return status
 
 
