@@ -195,7 +195,7 @@ def prediction(
         columns = {name: np.tile(values, len(rows)) for name, values in inputs.items()}
         columns |= {name: np.repeat(values, count) for name, values in zip(names, rows.T, strict=True)}
         collisions = outputs_at(config, law, columns, outputs, compute)
-        # a law on which no column has an effect has one trajectory
+        # without any column there is one collision
         size = len(rows) * count
         values = np.stack([np.broadcast_to(collisions[name], size).reshape(-1, count) for name in outputs], axis=1)
         return np.hstack([part.reshape(len(rows), -1) for part in np.split(values, [points], axis=2)])
@@ -371,7 +371,7 @@ def _calibration_dataset(config: Config, plugins: Plugins, fits: Mapping[str, Fi
 
     keys = sorted(fits, key=rank)
     laws, ranked = [candidates[key] for key in keys], [fits[key] for key in keys]
-    parameters = list(config.fits)
+    parameters, groups = list(config.fits), []
     varied = varied_input(config.data.inputs)
     dataset = calibration_template(config, laws, plugins, varied)
     shape = (len(keys), len(parameters))
@@ -379,11 +379,13 @@ def _calibration_dataset(config: Config, plugins: Plugins, fits: Mapping[str, Fi
     covariance = np.full((*shape, len(parameters)), np.nan)
     identifiable = np.full(shape, -1, np.int8)
     for row, (law, fit) in enumerate(zip(laws, ranked, strict=True)):
-        columns = [parameters.index(name) for name in parameters_of(config, law)]
+        names = parameters_of(config, law)
+        columns = [parameters.index(name) for name in names]
         for name, array in arrays.items():
             array[row, columns] = getattr(fit, name)
         covariance[row][np.ix_(columns, columns)] = fit.covariance
         identifiable[row, columns] = fit.identifiable
+        groups.append("; ".join(determined_groups(config, model_of(law), names, fit)))
     weights = akaike_weights({key: fit.aicc for key, fit in fits.items()})
     values: dict[str, Array | NDArray[np.int8]] = {
         **arrays,
@@ -398,10 +400,6 @@ def _calibration_dataset(config: Config, plugins: Plugins, fits: Mapping[str, Fi
         parts = [[fit.other_predicted for fit in ranked], [fit.other_half_width for fit in ranked]]
         curve, half = (np.reshape(part, dataset["curve"].shape) for part in parts)
         values |= {"curve": curve, "curve_lower": curve - half, "curve_upper": curve + half}
-    groups = [
-        "; ".join(determined_groups(config, model_of(law), parameters_of(config, law), fit))
-        for law, fit in zip(laws, ranked, strict=True)
-    ]
     variables = {name: dataset.variables[name].copy(data=array) for name, array in values.items()}
     return dataset.assign(variables).assign_coords(determined=("model", groups))
 

@@ -67,8 +67,8 @@ def outputs_at(
 ) -> Outputs:
     """Compute outputs of a law at arrays of inputs by config name, all of one length; others are of a config.
 
-    An output is of that length, or of length 1 if no column has an effect; NaN where the law has no result.
-    `compute` is that of `impact.contact.simulate.simulate`. A warning states each distinct error of the law.
+    An output is of that length; NaN where the law has no result. `compute` is that of
+    `impact.contact.simulate.simulate`. A warning states each distinct error of the law.
     """
     inputs, model = trial_inputs(config, columns), model_of(law)
     index = inputs.index()
@@ -89,7 +89,7 @@ def outputs_at(
         **asdict(config.solver),
     )
     warn(*errors.values())
-    return outputs
+    return {name: np.broadcast_to(values, inputs.shape) for name, values in outputs.items()}
 
 
 @dataclass(frozen=True)
@@ -135,7 +135,7 @@ class PreparedProblem:
         collisions = outputs_at(self.config, self.law, columns, names, self._collisions)
         result = {}
         for name in names:
-            array = np.broadcast_to(collisions[name], int(np.prod(shape))).reshape(shape)
+            array = collisions[name].reshape(shape)
             result[name] = array.copy() if shape else array.item()
         return result
 

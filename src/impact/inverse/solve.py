@@ -390,8 +390,8 @@ class SolveProblem:
         law = Pair(self.model, config.frictions[0]) if config.frictions else self.model
         names = dict.fromkeys((self.variable, OUTPUTS[self.variable].status, "e_out"))
         outputs = outputs_at(config, law, self.columns(values), list(names))
-        size, shape = values.size * self.n_conditions, (values.size, *(axis.size for axis in self.config.axes))
-        return {name: np.broadcast_to(array, size).reshape(shape).copy() for name, array in outputs.items()}
+        shape = (values.size, *(axis.size for axis in self.config.axes))
+        return {name: array.reshape(shape).copy() for name, array in outputs.items()}
 
     def raise_failure(self) -> NoReturn:
         """Raise a UsageError with the most frequent status of the integrations of the scan that fail."""
