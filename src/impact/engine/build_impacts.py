@@ -65,20 +65,19 @@ def build_oblique(
 ) -> ObliqueImpacts:
     """Build the tangential inputs of impacts at cells, with the parameters of a friction law."""
     value = partial(input_at, inputs, index=index)
-    u1, u2, tangent = (value(name) for name in ("u1", "u2", "angle"))
+    u1, u2, tangent = value("u1"), value("u2"), None
     if "angle" in inputs.names():
-        tangent = np.tan(tangent)
+        tangent = np.tan(value("angle"))
         u2 = u2 if "u2" in inputs.names() else np.zeros_like(tangent)
         u1 = u2 + impacts.v0 * tangent
+    names = {} if friction is None else {p.name: f"friction.{friction.key}.{p.name}" for p in friction.parameters}
     return ObliqueImpacts(
         impacts=impacts,
         u1=u1,
         u2=u2,
         **{name: value(name) for name in ("omega1", "omega2", "inertia_factor1", "inertia_factor2", "mu")},
-        tangent=tangent if "angle" in inputs.names() else None,
-        parameters={}
-        if friction is None
-        else {p.name: value(f"friction.{friction.key}.{p.name}") for p in friction.parameters},
+        tangent=tangent,
+        parameters={name: value(full_name) for name, full_name in names.items()},
     )
 
 
