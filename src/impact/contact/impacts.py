@@ -172,21 +172,16 @@ def check_inputs(model: Law, impacts: Impacts, checks: frozenset[str] = CHECKS) 
 
     Returns the status before integration, of a shape that broadcasts to that of the impacts.
     """
-    status = np.asarray(Status.OK, np.int8)
+    status, least = np.asarray(Status.OK, np.int8), np.nextafter(0.0, 1.0)
+    # values, their bounds, and the status where they are not within these; the last one counts
+    bounds: list[tuple[Array, float, float, Status]] = []
     if "length" in checks:
         sizes = [impacts.m, impacts.K, impacts.length, impacts.energy, impacts.time]
-        least, most = np.nextafter(0.0, 1.0), np.finfo(float).max
-        for size in sizes:
-            status = _unless(size, least, most, status, Status.OUT_OF_RANGE)
+        bounds += [(size, least, np.finfo(float).max, Status.OUT_OF_RANGE) for size in sizes]
     if "e" in checks and "e" in model.quantities:
-        status = _unless(impacts.e, 0.0, 1.0, status, Status.INVALID_PARAMETER)
+        bounds.append((impacts.e, 0.0, 1.0, Status.INVALID_PARAMETER))
     if "v0" in checks or "length" in checks:
-        status = _unless(impacts.v0, np.nextafter(0.0, 1.0), np.inf, status, Status.NO_IMPACT)
+        bounds.append((impacts.v0, least, np.inf, Status.NO_IMPACT))
+    for values, lower, upper, otherwise in bounds:
+        status = replace_where(status, ~((values >= lower) & (values <= upper)), np.int8(otherwise))
     return status.astype(np.int8)
-
-
-def _unless(
-    values: Array, least: float, most: float, status: NDArray[np.int8], otherwise: Status
-) -> NDArray[np.int8]:
-    """Replace the status by another one where a value is not within bounds."""
-    return replace_where(status, ~((values >= least) & (values <= most)), np.int8(otherwise))

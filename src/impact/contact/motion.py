@@ -120,22 +120,15 @@ def restitution_problem(law: MotionLaw) -> Problem:
         slope = (force_at(y + small * k[:2], params) - force) / small
         return release_event(s, k[0], force, slope)
 
-    def gap_event(y: Array, k: Array, params: Params) -> tuple[Array, Array]:
-        return y[0], k[0]
-
-    def turned_back(y: Array, k: Array, params: Params) -> Mask:
-        return np.asarray(k[0] >= 0.0)
-
     def overdamped(y: Array, k: Array, params: Params) -> Mask:
         c, x = params[law.names.index("c")], integer_power(y[0], law.model.coordinate_power)
         return is_overdamped(x, -k[0], c, law.n, force_form(law.model, law.n).drag / law.model.coordinate_power)
 
-    event = force_event if law.model.release == "force" else gap_event
-    unreachable = overdamped if may_be_overdamped(law.model) else turned_back
+    ends_at_gap, may_turn_back = law.model.release == "gap", not may_be_overdamped(law.model)
     return Problem(
         rates=_rates(law, unloads=True),
-        event=event,
-        unreachable=unreachable,
+        event=(lambda y, k, params: (y[0], k[0])) if ends_at_gap else force_event,
+        unreachable=(lambda y, k, params: np.asarray(k[0] >= 0.0)) if may_turn_back else overdamped,
         floor=ERROR_FLOOR,
         step_at_unit_error=RESTITUTION_STEP,
     )

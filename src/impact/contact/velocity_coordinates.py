@@ -115,13 +115,11 @@ class ForceCoordinate(VelocityCoordinate):
 
 def is_strong(model: ForceModel, values: Mapping[str, Array | float], count: int) -> NDArray[np.bool_]:
     """Find which impacts the coordinate of their law suits, by their own damping alone; shape (count,)."""
-    if model.velocity_coordinate not in STRONG_DAMPING:
+    kind = model.velocity_coordinate
+    if kind not in STRONG_DAMPING:
         return np.zeros(count, bool)
-    return np.broadcast_to(
-        np.asarray(values[COORDINATE_COEFFICIENTS[model.velocity_coordinate][0]])
-        > STRONG_DAMPING[model.velocity_coordinate],
-        count,
-    )
+    strength = np.asarray(values[COORDINATE_COEFFICIENTS[kind][0]])
+    return np.broadcast_to(strength > STRONG_DAMPING[kind], count)
 
 
 def coordinate(model: ForceModel, n: float) -> VelocityCoordinate:

@@ -76,7 +76,7 @@ class Bounds:
 
     def values(self, u: Array) -> Array:
         """Convert rows u to parameters, shape (..., p)."""
-        lower, upper = np.where(self.is_log, self.lower, 1.0), np.where(self.is_log, self.upper, 1.0)
+        lower, upper = (np.where(self.is_log, bound, 1.0) for bound in (self.lower, self.upper))
         between = self.lower + u * (self.upper - self.lower)
         # a bound is met exactly
         between = np.where(u == 1.0, self.upper, between)

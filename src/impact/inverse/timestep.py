@@ -506,11 +506,10 @@ def needed_steps(
     target = law.e if law.has_e else e_continuous
     if not target > 0.0:
         raise UsageError(f"{argument('tol')} is relative to e, expected e > 0")
-    if abs(e_continuous - target) >= tol * target:
-        # no step does what the continuous law does not
-        return None
-    if law.continuous["separation_time"] > MAX_CONTACTS * law.contact_time:
-        # an overdamped contact, whose surfaces part later than a collision at a step is followed
+    # the surfaces of an overdamped contact part later than a collision at a step is followed
+    is_overdamped = law.continuous["separation_time"] > MAX_CONTACTS * law.contact_time
+    # no step does what the continuous law does not
+    if abs(e_continuous - target) >= tol * target or is_overdamped:
         return None
 
     @cache
@@ -673,8 +672,7 @@ def _seek(law: FixedStepLaw, name: str) -> tuple[Parameter, str, float]:
 def time_parameter(config: Config, model: ForceModel) -> str:
     """Name the parameter that sets the time scale of a law, as `timestep` takes it; "" where two materials do."""
     arguments = argument_names(model.stiffness)
-    names = [parameter.name for parameter in model.parameters if parameter.name in arguments]
-    names = [name for name in names if name != model.damping]
+    names = [p.name for p in model.parameters if p.name in arguments and p.name != model.damping]
     if len(names) == 1:
         return names[0]
     if not _takes_moduli(config, model):
