@@ -256,7 +256,17 @@ def minimize(
 ) -> Estimate:
     """Find the local minimum of the objective from a start u, at which the parameter `fixed` stays."""
     if problem.data.noise == "excess" and excess is None:
-        return _minimize_with_excess(problem, start, evaluate, fixed, taken, tolerance)
+        # over the parameters and the excess deviation in turn: their information is independent
+        accuracy = COARSE_EXCESS_TOLERANCE if tolerance >= COARSE_TOLERANCE else EXCESS_TOLERANCE
+        best = Estimate(start, math.inf, -1.0, False)
+        for _ in range(MAX_EXCESS_ITERATIONS):
+            (scaled,) = problem.residuals(evaluate, best.u[None, :])
+            likelihood = ExcessLikelihood(problem.data, scaled, taken)
+            excess = likelihood.best()
+            if abs(excess - best.excess) <= accuracy * excess:
+                return replace(best, objective=likelihood.objective(best.excess**2))
+            best = minimize(problem, best.u, evaluate, fixed=fixed, excess=excess, tolerance=tolerance)
+        return replace(best, objective=likelihood.objective(best.excess**2), converged=False)
     excess = excess or 0.0
     free = np.array([number for number in range(problem.count) if number != fixed], np.intp)
 
@@ -297,23 +307,6 @@ def minimize(
     nearest = np.round(result.x)
     free_u = np.where(np.abs(result.x - nearest) <= AT_BOUND, nearest, result.x)
     return Estimate(full(free_u), 2.0 * float(result.cost), excess, bool(result.success))
-
-
-def _minimize_with_excess(
-    problem: FitProblem, start: Array, evaluate: Evaluate, fixed: int | None, taken: Array | None, tolerance: float
-) -> Estimate:
-    """Minimize over the parameters and the excess deviation in turn: their information is independent."""
-    is_coarse = tolerance >= COARSE_TOLERANCE
-    accuracy = COARSE_EXCESS_TOLERANCE if is_coarse else EXCESS_TOLERANCE
-    best = Estimate(start, math.inf, -1.0, False)
-    for _ in range(MAX_EXCESS_ITERATIONS):
-        (scaled,) = problem.residuals(evaluate, best.u[None, :])
-        likelihood = ExcessLikelihood(problem.data, scaled, taken)
-        excess = likelihood.best()
-        if abs(excess - best.excess) <= accuracy * excess:
-            return replace(best, objective=likelihood.objective(best.excess**2))
-        best = minimize(problem, best.u, evaluate, fixed=fixed, excess=excess, tolerance=tolerance)
-    return replace(best, objective=likelihood.objective(best.excess**2), converged=False)
 
 
 class ExcessLikelihood:

@@ -85,6 +85,7 @@ SLOPE_STEP = 1e-6
 REFINED_TOLERANCE = 1e-7
 
 SolveStatus: TypeAlias = Literal["ok", "at_bound", "several_roots", "no_root"]
+Conditions: TypeAlias = tuple[Mapping[str, float | str], ...]
 
 
 @dataclass(frozen=True)
@@ -117,7 +118,7 @@ class SolveResult(Displayed):
     status: SolveStatus
     roots: tuple[Root, ...]
     attainable: tuple[float, float]
-    over: tuple[Mapping[str, float | str], ...] | None
+    over: Conditions | None
     friction: str = ""
 
     def as_dict(self) -> dict[str, Any]:
@@ -491,6 +492,28 @@ class SolveProblem:
             size = 1.0 / float(impacts.dimensionless(self.model, self.unknown.name)[0])
         return size if 0.0 < size < math.inf else 1.0
 
+    def result(
+        self,
+        target: float,
+        status: SolveStatus,
+        roots: Iterable[Root],
+        values: Array,
+        over: Conditions | None = None,
+    ) -> SolveResult:
+        """Make the result of roots, with the range of some values of the variable."""
+        return SolveResult(
+            model=self.model.key,
+            name=self.unknown.name,
+            unit=self.unit(),
+            target={self.variable: target},
+            status=status,
+            roots=tuple(roots),
+            # to the digits of the scan
+            attainable=(float(f"{np.nanmin(values):.6g}"), float(f"{np.nanmax(values):.6g}")),
+            over=over,
+            friction=self.friction,
+        )
+
 
 def _all_roots(problem: SolveProblem, target: float) -> SolveResult:
     """Find all values that give the target, and the range of the output."""
@@ -501,7 +524,7 @@ def _all_roots(problem: SolveProblem, target: float) -> SolveResult:
     status: SolveStatus = "no_root" if not roots else "several_roots" if len(roots) > 1 else "ok"
     if status == "ok" and roots[0] in (problem.unknown.least, problem.unknown.most):
         status = "at_bound"
-    return _result(problem, target, status, map(Root, roots, e_out), values)
+    return problem.result(target, status, map(Root, roots, e_out), values)
 
 
 def _roots_and_values(
@@ -673,26 +696,4 @@ def _best_over_axis(problem: SolveProblem, target: float) -> SolveResult:
     )
     status: SolveStatus = "at_bound" if value in (problem.unknown.least, problem.unknown.most) else "ok"
     root = Root(value, float(outputs["e_out"].mean()))
-    return _result(problem, target, status, (root,), outputs[problem.variable], over)
-
-
-def _result(
-    problem: SolveProblem,
-    target: float,
-    status: SolveStatus,
-    roots: Iterable[Root],
-    values: Array,
-    over: tuple[Mapping[str, float | str], ...] | None = None,
-) -> SolveResult:
-    return SolveResult(
-        model=problem.model.key,
-        name=problem.unknown.name,
-        unit=problem.unit(),
-        target={problem.variable: target},
-        status=status,
-        roots=tuple(roots),
-        # to the digits of the scan
-        attainable=(float(f"{np.nanmin(values):.6g}"), float(f"{np.nanmax(values):.6g}")),
-        over=over,
-        friction=problem.friction,
-    )
+    return problem.result(target, status, (root,), outputs[problem.variable], over)
