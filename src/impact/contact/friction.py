@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Literal
 
@@ -387,7 +388,12 @@ def _problems(pair: Pair, oblique: ObliqueImpacts) -> Iterator[tuple[Mask, str]]
     """Find where a pair is not combinable, and why."""
     law, model, n = pair.friction, pair.model, oblique.impacts.n
     if model.family == "adhesive":
-        yield from _adhesion_problems(pair, oblique)
+        is_allowed = (law.kind == "coulomb") & (_value(law, oblique, "limit") > 0.0)
+        expected = 'expected coulomb-1785, limit = "positive"'
+        # an error of the force is reported by the integration
+        with suppress(ModelError):
+            pulls = _force_at_first_contact(model, oblique.impacts) < 0.0
+            yield pulls & ~is_allowed, f"the contact force pulls from the start: {expected}"
     if _parameter(law, oblique, "kt_over_kn") is not None:
         is_other = (
             ~np.isin(n, (1.0, HERTZ)) if law.stiffness == "liggghts" else n != 1.0 + _stiffness_power(law, 1.0)
@@ -417,17 +423,6 @@ _FACTORS_OF_DAMPING = {
     "liggghts": ("tangential_damping", '; set tangential_damping = "off"'),
     "kratos": ("", ""),
 }
-
-
-def _adhesion_problems(pair: Pair, oblique: ObliqueImpacts) -> Iterator[tuple[Mask, str]]:
-    """Find where a contact force pulls from the start and friction is not Coulomb's, of a pressing force."""
-    try:
-        pulls = _force_at_first_contact(pair.model, oblique.impacts) < 0.0
-    except ModelError:
-        # the integration reports it
-        return
-    is_allowed = (pair.friction.kind == "coulomb") & (_value(pair.friction, oblique, "limit") > 0.0)
-    yield pulls & ~is_allowed, 'the contact force pulls from the start: expected coulomb-1785, limit = "positive"'
 
 
 def _invalid(law: FrictionLaw, oblique: ObliqueImpacts) -> Iterator[Mask]:

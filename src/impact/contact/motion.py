@@ -353,15 +353,10 @@ def never_separates(force_at: Force, params: Params, peak: Array, coordinate_pow
     dx/dt >= -B x^k, and x stays above zero for ever. Where no such bound is found, the answer is False. `peak`
     is above the permanent indentation, and has the shape of each of the params, (n,).
     """
-    never = np.zeros(peak.size, bool)
-    for first in range(0, peak.size, MAX_BOUND_BATCH):
-        part = slice(first, first + MAX_BOUND_BATCH)
-        batch_params = tuple(column[part] for column in params)
-        never[part] = _never_separates(force_at, batch_params, peak[part], coordinate_power)
-    return never
-
-
-def _never_separates(force_at: Force, params: Params, peak: Array, coordinate_power: int) -> Mask:
+    if peak.size > MAX_BOUND_BATCH:
+        halves = (slice(0, peak.size // 2), slice(peak.size // 2, None))
+        batches = [(tuple(column[half] for column in params), peak[half]) for half in halves]
+        return np.concatenate([never_separates(force_at, *batch, coordinate_power) for batch in batches])
     never = np.zeros(peak.size, bool)
     x = (peak[:, None] * BOUND_INDENTATIONS).reshape(-1)
     s = power(x, 1.0 / coordinate_power)
