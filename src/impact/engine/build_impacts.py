@@ -39,17 +39,12 @@ def build_impacts(inputs: Inputs, model: Law, index: Index) -> Impacts:
     parameters = {parameter.name: value(f"{model.key}.{parameter.name}") for parameter in model.parameters}
     with np.errstate(all="ignore"):
         impacts = Impacts(e=value("e"), K=missing, n=n, parameters=parameters, **balls, **materials)
-        stiffness_name = f"{model.key}.K"
-        if stiffness_name in names or "K" in names:
-            K = value(stiffness_name if stiffness_name in names else "K")
-        else:
+        for name in (f"{model.key}.K", "K"):
+            if name in names:
+                return replace(impacts, K=value(name))
+        if model.stiffness is None:
             hertz = hertz_stiffness(impacts.E1, impacts.nu1, impacts.E2, impacts.nu2, impacts.R1, impacts.R2)
-            K = hertz_or_secant(n, hertz, impacts.m, impacts.v0)
-    impacts = replace(impacts, K=K)
-    if not has_stiffness_rule(inputs, model):
-        return impacts
-    assert model.stiffness is not None
-    with np.errstate(all="ignore"):
+            return replace(impacts, K=hertz_or_secant(n, hertz, impacts.m, impacts.v0))
         arguments = {name: impacts.quantity(name) for name in argument_names(model.stiffness)}
         shape = np.broadcast_shapes(missing.shape, *(values.shape for values in arguments.values()))
         # formulas receive arrays of one shape (n,)

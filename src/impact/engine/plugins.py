@@ -114,7 +114,6 @@ def read_plugins(sources: Sequence[ForceModel | str | Path | PythonFile]) -> Plu
         )
         raise UsageError(f"plugins: got {sources!r}, expected a list of models and paths{hint}")
     origins = dict.fromkeys(catalogue(), "built in")
-    plugins: list[Plugin] = []
     named_plugins = [(str(plugin.package), plugin) for plugin in installed()]
     for index, source in enumerate(sources):
         named_plugins += _plugins_of_source(source, f"plugins[{index}]")
@@ -127,8 +126,7 @@ def read_plugins(sources: Sequence[ForceModel | str | Path | PythonFile]) -> Plu
                 "another key"
             )
         origins[key] = f"in {name}"
-        plugins.append(plugin)
-    return Plugins(tuple(plugins))
+    return Plugins(tuple(plugin for _, plugin in named_plugins))
 
 
 def _plugins_of_source(source: object, argument: str) -> list[tuple[str, Plugin]]:
