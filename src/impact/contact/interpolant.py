@@ -167,10 +167,9 @@ class Interpolant:
         edges: Array | Sequence[float],
         floors: Array,
         max_divisions: int = MAX_DIVISIONS,
-        is_needed: Callable[[Array], bool] | None = None,
+        is_needed: Callable[[Array], bool] = lambda values: True,
     ) -> None:
-        self.function, self.floors, self.max_divisions = function, floors, max_divisions
-        self.is_needed = is_needed
+        self.function, self.floors, self.max_divisions, self.is_needed = function, floors, max_divisions, is_needed
         bounds = np.asarray(edges, float).tolist()
         self.intervals = [Interval(lower, upper) for lower, upper in pairwise(bounds)]
 
@@ -243,9 +242,8 @@ class Interpolant:
             return False
         is_finite = np.isfinite(interval.values)
         # what fails in most of it, or near its ends, is not worth many divisions
-        if not (is_finite.all() or (is_finite.mean() > 0.5 and interval.divisions < MAX_DIVISIONS)):
-            return False
-        return self.is_needed is None or self.is_needed(interval.values)
+        is_worth = is_finite.all() or (is_finite.mean() > 0.5 and interval.divisions < MAX_DIVISIONS)
+        return bool(is_worth) and self.is_needed(interval.values)
 
 
 class InterpolatedCollisions:
@@ -285,10 +283,9 @@ class InterpolatedCollisions:
             floors = np.array([FLOORS[column] for column in self.columns])
             number = int(varying[0]) if varying.size else 0
             self.group = number, Interpolant(self._outcomes, GROUP_EDGES, floors)
-        others = differs
         if self.group is not None:
-            others = np.delete(differs, self.group[0], axis=0)
-        direct = others.any(axis=0) | (law.n != self.first[0])
+            differs[self.group[0]] = False
+        direct = differs.any(axis=0) | (law.n != self.first[0])
         collisions = CollisionResult.blank(n)
         same = ~direct
         if self.group is not None:

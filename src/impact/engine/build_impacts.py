@@ -21,13 +21,9 @@ from .inputs import Index, Inputs, dimensions
 
 
 def build_impacts(inputs: Inputs, model: Law, index: Index) -> Impacts:
-    """Build the impacts of a model at cells; arrays have length 1 along axes on which they do not vary.
+    """Build the impacts of a model, or of what a file stores of it, at cells of a sweep.
 
-    Parameters
-    ----------
-    inputs : of the sweep
-    model : the law, or what a file stores of it
-    index : the cells
+    Arrays have length 1 along axes on which they do not vary.
     """
     names = set(inputs.names())
     missing = np.full((1,) * dimensions(index), np.nan)

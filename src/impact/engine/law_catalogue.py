@@ -160,19 +160,16 @@ def law_record(law: ForceModel | FrictionLaw, *more_fields: str) -> dict[str, An
 
 def parameter_rows(table: str, parameters: Sequence[Parameter]) -> dict[str, str]:
     """Describe the parameters of a table of a config, a line each; the table is named once."""
-    names = [table, *(" " * index for index in range(1, len(parameters)))]
-    return {name: _describe_parameter(parameter) for name, parameter in zip(names, parameters, strict=False)}
-
-
-def _describe_parameter(parameter: Parameter) -> str:
-    default, choices = parameter.default, [f'"{word}"' for word in parameter.choices]
-    if default is None:
+    rows = {}
+    for index, parameter in enumerate(parameters):
+        default, choices = parameter.default, [f'"{word}"' for word in parameter.choices]
         status = "optional" if parameter.optional else "required"
-    else:
-        status = f"default {choices[int(default)] if choices else number(default)}"
-    unit = "" if parameter.unit == "1" else f" [{parameter.unit}]"
-    limits = " or ".join(choices) or f"from {number(parameter.least)} to {number(parameter.most)}"
-    return f"{parameter.name}{unit}: {parameter.meaning}; {limits}, {status}"
+        if default is not None:
+            status = f"default {choices[int(default)] if choices else number(default)}"
+        unit = "" if parameter.unit == "1" else f" [{parameter.unit}]"
+        limits = " or ".join(choices) or f"from {number(parameter.least)} to {number(parameter.most)}"
+        rows[" " * index or table] = f"{parameter.name}{unit}: {parameter.meaning}; {limits}, {status}"
+    return rows
 
 
 class Laws(dict[str, Described], Displayed):

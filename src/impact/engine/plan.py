@@ -103,13 +103,11 @@ class Plan:
 
     def _is_compiled(self, trajectory_map: TrajectoryMap) -> bool:
         """Whether the compiled core integrates a phase of a model, for all of its exponents."""
-        if "dt" in self.inputs.names():
-            # at a given step the continuous law is only integrated where balls do not separate
+        law = self.laws[trajectory_map.model]
+        # at a given step the continuous law is only integrated where balls do not separate
+        if "dt" in self.inputs.names() or isinstance(law, Pair):
             return False
-        model = self.laws[trajectory_map.model]
-        if isinstance(model, Pair):
-            return False
-        return all(any(serves(model, n)) for n in exponents(self.inputs, model))
+        return all(any(serves(law, n)) for n in exponents(self.inputs, law))
 
     def columns_of(self, trajectory_range: TrajectoryRange) -> Columns:
         """Build the dimensionless problems of the trajectories of a range, arrays of its size."""

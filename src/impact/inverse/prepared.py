@@ -149,9 +149,8 @@ class PreparedProblem:
         """The inputs that a call may have: their names in the config and what they may be, by name."""
         scalars = self.config.scalars
         model = model_of(self.law)
-        laws: dict[str, ForceModel | FrictionLaw] = {"model": model}
-        if isinstance(self.law, Pair):
-            laws["friction"] = self.law.friction
+        pair = {"friction": self.law.friction} if isinstance(self.law, Pair) else {}
+        laws: dict[str, ForceModel | FrictionLaw] = {"model": model, **pair}
         # what the config has, and what replaces what the law derives from it
         names = [InputName.parse(name) for name in (*scalars, *DERIVED, *(() if "alpha" in scalars else ("e",)))]
         names += [
