@@ -157,12 +157,8 @@ def _check_clauses(model: ForceModel) -> Iterator[ClauseResult]:
         return [{name: part[number] for name, part in parts.items()} for number in range(len(batches))]
 
     impacts = sample(model)
-    swapped = replace(
-        impacts,
-        v1=-impacts.v2,
-        v2=-impacts.v1,
-        **{name + a: getattr(impacts, name + b) for name in PROPERTIES_OF_A_BALL for a, b in ("12", "21")},
-    )
+    others = {name + a: getattr(impacts, name + b) for name in PROPERTIES_OF_A_BALL for a, b in ("12", "21")}
+    swapped = replace(impacts, v1=-impacts.v2, v2=-impacts.v1, **others)
     base, exchanged, elastic = collided(impacts, swapped, replace(impacts, e=np.ones(len(impacts))))
     ended = base["status"] < FIRST_FAILURE
     yield ClauseResult("every impact ends", float(np.count_nonzero(~ended)), 0)

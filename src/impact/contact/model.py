@@ -220,20 +220,18 @@ class ForceModel:
         inputs = {*QUANTITIES, *(parameter.name for parameter in self.parameters)}
         names = set(inputs)
         for name, formula in self.coefficients.items():
-            self._check_arguments(f"coefficient {name}", formula, names)
+            self._check_arguments(f"coefficient {name}", names, formula)
             names.add(name)
         approach = {*names, *FORCE_ARGUMENTS}
         restitution = {*approach, *UNLOADING_ARGUMENTS}
-        self._check_arguments("force", self.force, approach)
-        self._check_arguments("unloading", self.unloading, {*restitution, "stretch"})
+        self._check_arguments("force", approach, self.force)
+        self._check_arguments("unloading", {*restitution, "stretch"}, self.unloading)
         for role in ("residual", "recovered"):
-            self._check_arguments(role, getattr(self, role), {*names, "peak", "force_at_peak"})
-        for formula in self.breakpoints:
-            self._check_arguments("breakpoint", formula, approach)
-        for formula in self.unloading_breakpoints:
-            self._check_arguments("unloading breakpoint", formula, restitution)
-        self._check_arguments("oracle", self.oracle, names)
-        self._check_arguments("stiffness", self.stiffness, inputs - {"K", "e"})
+            self._check_arguments(role, {*names, "peak", "force_at_peak"}, getattr(self, role))
+        self._check_arguments("breakpoint", approach, *self.breakpoints)
+        self._check_arguments("unloading breakpoint", restitution, *self.unloading_breakpoints)
+        self._check_arguments("oracle", names, self.oracle)
+        self._check_arguments("stiffness", inputs - {"K", "e"}, self.stiffness)
 
     def _check_velocity_coordinate(self) -> None:
         required = COORDINATE_COEFFICIENTS[self.velocity_coordinate]
@@ -246,7 +244,7 @@ class ForceModel:
 
     def _check_fields(self) -> None:
         are_parameters = isinstance(self.parameters, tuple) and all(
-            isinstance(parameter, Parameter) for parameter in self.parameters
+            isinstance(p, Parameter) for p in self.parameters
         )
         allowed = {
             "evidence": (
@@ -263,18 +261,14 @@ class ForceModel:
             if not is_valid:
                 raise ModelError(f"model {self.key}: {name}: got {getattr(self, name)!r}, expected {expected}")
         reserved_names = {*QUANTITIES, *DOMAIN_INPUTS, *FORCE_ARGUMENTS, *UNLOADING_ARGUMENTS, "stretch"}
-        for name in (*(parameter.name for parameter in self.parameters), *self.coefficients):
+        parameter_names = [parameter.name for parameter in self.parameters]
+        for name in (*parameter_names, *self.coefficients):
             if name in reserved_names:
                 raise ModelError(f'model {self.key}: "{name}" is the name of a quantity, expected another name')
         dimensionless = [parameter.name for parameter in self.parameters if parameter.unit == "1"]
         for parameter in self.parameters:
             dimension(parameter.unit, {"n": 1.5, **dict.fromkeys(dimensionless, 1.0)})
-        domain_names = {
-            *QUANTITIES,
-            *DOMAIN_INPUTS,
-            *({"chi"} & self.coefficients.keys()),
-            *(parameter.name for parameter in self.parameters),
-        }
+        domain_names = {*QUANTITIES, *DOMAIN_INPUTS, *({"chi"} & self.coefficients.keys()), *parameter_names}
         for name, ends in self.domain.items():
             if name not in domain_names:
                 raise ModelError(
@@ -286,8 +280,8 @@ class ForceModel:
     def __repr__(self) -> str:
         return f"<ForceModel {self.key}: {self.equation}>"
 
-    def _check_arguments(self, role: str, formula: Formula | None, names: set[str]) -> None:
-        for name in argument_names(formula):
+    def _check_arguments(self, role: str, names: set[str], *formulas: Formula | None) -> None:
+        for name in (name for formula in formulas for name in argument_names(formula)):
             if name not in names:
                 raise ModelError(
                     f'model {self.key}: its {role} asks for "{name}"; {did_you_mean(name, sorted(names))}'

@@ -76,12 +76,8 @@ class MotionLaw:
         """Make the law at an exponent n; if `strong`, with the coordinate that it declares for strong damping."""
         arguments = {name for formula in model.motion_formulas for name in argument_names(formula)}
         param_names = {*model.quantities, *model.coefficients} - {"K", "m", "v0", "n"}
-        return cls(
-            model,
-            n,
-            tuple(sorted(arguments & param_names)),
-            coordinate(model, n) if strong else VelocityCoordinate(),
-        )
+        names = tuple(sorted(arguments & param_names))
+        return cls(model, n, names, coordinate(model, n) if strong else VelocityCoordinate())
 
     def call(self, formula: Formula, params: Params, arguments: dict[str, Array]) -> Array:
         """Compute the value of a formula from the params and further arguments by name; K, m and v0 are 1."""

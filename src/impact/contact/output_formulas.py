@@ -100,32 +100,20 @@ def collide(
         values, checked = dimensionless_values(model, impacts), check_inputs(model, impacts)
         of_friction = friction_values(*oblique) if oblique is not None else {}
     values |= fixed_step or {}
+    columns = values | of_friction
+    normal = columns if settings.get("integrator") == MUJOCO_CONE else values
     result = simulate(
-        model,
-        impacts.n,
-        values | of_friction if settings.get("integrator") == MUJOCO_CONE else values,
-        checked,
-        errors=errors,
-        compute=compute,
-        recorded=recorded,
-        **settings,
+        model, impacts.n, normal, checked, errors=errors, compute=compute, recorded=recorded, **settings
     )
     if oblique is None:
         return outputs(model, impacts, result, names, checked)
     pair, inputs = oblique
     with np.errstate(all="ignore"):
         own = np.where(checked == STATUS_OK, check_friction(pair, inputs), checked).astype(np.int8)
-    columns = values | of_friction
     shape = np.broadcast_shapes(impacts.n.shape, own.shape, *(column.shape for column in columns.values()))
-    tangential = simulate_friction(
-        pair,
-        np.broadcast_to(impacts.n, shape),
-        {name: np.broadcast_to(column, shape) for name, column in columns.items()},
-        np.broadcast_to(own, shape),
-        errors=errors,
-        recorded=recorded_slip,
-        **settings,
-    )
+    n, own = np.broadcast_to(impacts.n, shape), np.broadcast_to(own, shape)
+    columns = {name: np.broadcast_to(column, shape) for name, column in columns.items()}
+    tangential = simulate_friction(pair, n, columns, own, errors=errors, recorded=recorded_slip, **settings)
     return outputs(model, impacts, result, names, checked, (inputs, tangential, pair.friction.kind))
 
 

@@ -62,14 +62,7 @@ def integrate_columns(law: PlanLaw, columns: Columns, solver: Solver) -> Integra
     values = {name: column for name, column in columns.items() if name not in ("n", "status")}
     simulate_law: Callable[..., Record]
     simulate_law = partial(simulate_friction, law) if isinstance(law, Pair) else partial(simulate, law)
-    collisions = simulate_law(
-        columns["n"],
-        values,
-        columns["status"],
-        errors=errors,
-        **asdict(solver),
-    )
-    return collisions, errors
+    return simulate_law(columns["n"], values, columns["status"], errors=errors, **asdict(solver)), errors
 
 
 def integrate_remotely(keys: Sequence[str], columns: Columns, context: WorkerContext) -> Integrated:
@@ -219,10 +212,5 @@ def _submit(
 
 def context_of(plan: Plan) -> WorkerContext:
     """Collect what workers need to integrate trajectories of a plan."""
-    plugins = plan.plugins
-    return WorkerContext(
-        __version__,
-        plan.solver,
-        tuple((source.name, source.content) for source in plugins.sources),
-        tuple(plugins.hashes.items()),
-    )
+    sources = tuple((source.name, source.content) for source in plan.plugins.sources)
+    return WorkerContext(__version__, plan.solver, sources, tuple(plan.plugins.hashes.items()))

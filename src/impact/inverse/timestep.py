@@ -712,14 +712,9 @@ def fixed_step_law(
             raise UsageError(problem)
         oblique = ObliqueLaw(Pair(model, law), build_oblique(plan.inputs, impact, (), law))
     continuous = oblique if law is not None and not law.scheme else None
-    outputs = collide(
-        model,
-        impact,
-        rtol=config.solver.rtol,
-        max_steps=config.solver.max_steps,
-        names=(*CENTRAL_OUTPUTS, *(("beta", "friction_status") if continuous else ())),
-        oblique=continuous,
-    )
+    names = (*CENTRAL_OUTPUTS, *(("beta", "friction_status") if continuous else ()))
+    rtol, max_steps = config.solver.rtol, config.solver.max_steps
+    outputs = collide(model, impact, rtol=rtol, max_steps=max_steps, names=names, oblique=continuous)
     values = {name: array.ravel()[0].item() for name, array in outputs.items()}
     status = Status(values["status"])
     if status != Status.OK:
