@@ -405,10 +405,8 @@ def _problems(pair: Pair, oblique: ObliqueImpacts) -> Iterator[tuple[Mask, str]]
         numbers = "1 or 1.5" if law.stiffness == "liggghts" else "1.5; set k_t"
         yield ~(is_linear | (n == HERTZ)), f"8 G* a needs a contact force of n = {numbers}"
         if model.unloading is not None or model.is_permanent:
-            yield (
-                n == HERTZ,
-                "8 G* a needs a contact force without permanent indentation and without unloading branch",
-            )
+            needed = "a contact force without permanent indentation and without unloading branch"
+            yield n == HERTZ, f"8 G* a needs {needed}"
     if law.damping in _FACTORS_OF_DAMPING:
         name, off = _FACTORS_OF_DAMPING[law.damping]
         factor = _value(law, oblique, name) if name else _ones(oblique.impacts)

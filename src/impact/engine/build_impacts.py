@@ -152,10 +152,3 @@ def rayleigh_time_at(inputs: Inputs, index: Index) -> Array:
 def has_stiffness_rule(inputs: Inputs, model: Law) -> bool:
     """Whether K is computed by a formula of the law: it has one, and the config has no K."""
     return model.stiffness is not None and {"K", f"{model.key}.K"}.isdisjoint(inputs.names())
-
-
-def exponents(inputs: Inputs, model: Law) -> tuple[float, ...]:
-    """List the compliance exponents of a model in the sweep."""
-    if model.exponent is not None:
-        return (model.exponent,)
-    return tuple(np.unique(np.asarray(inputs.values("n"), float)).tolist())

@@ -134,10 +134,7 @@ def _description(law: ForceModel | FrictionLaw, more: Mapping[str, str]) -> Tabl
         noun: law.key,
         "same law as": law.same_as,
         "title": with_year(law.title, law.year),
-        group: getattr(law, group),
-        "equation": law.equation,
-        "reference": law.reference,
-        "doi": law.doi,
+        **{name: getattr(law, name) for name in (group, "equation", "reference", "doi")},
         "evidence": str(law.evidence),
         **more,
     }

@@ -23,7 +23,7 @@ from ..contact.numba.dispatch import is_installed, serves
 from ..contact.status import FrictionStatus
 from ..errors import ConfigError, UsageError
 from ..formatting import argument
-from .build_impacts import build_impacts, build_oblique, exponents
+from .build_impacts import build_impacts, build_oblique
 from .inputs import Inputs
 from .plugins import Plugins
 from .trajectories import (
@@ -107,7 +107,8 @@ class Plan:
         # at a given step the continuous law is only integrated where balls do not separate
         if "dt" in self.inputs.names() or isinstance(law, Pair):
             return False
-        return all(any(serves(law, n)) for n in exponents(self.inputs, law))
+        exponents = np.unique(np.asarray(self.inputs.values("n") if law.exponent is None else law.exponent, float))
+        return all(any(serves(law, n)) for n in exponents.tolist())
 
     def columns_of(self, trajectory_range: TrajectoryRange) -> Columns:
         """Build the dimensionless problems of the trajectories of a range, arrays of its size."""
