@@ -133,11 +133,8 @@ class PreparedProblem:
         statuses = (OUTPUTS[name].status for name in self.outputs)
         names = [*dict.fromkeys((*self.outputs, "status", *statuses))]
         collisions = outputs_at(self.config, self.law, columns, names, self._collisions)
-        result = {}
-        for name in names:
-            array = collisions[name].reshape(shape)
-            result[name] = array.copy() if shape else array.item()
-        return result
+        arrays = {name: collisions[name].reshape(shape) for name in names}
+        return {name: array.copy() if shape else array.item() for name, array in arrays.items()}
 
     @cached_property
     def _collisions(self) -> InterpolatedCollisions | None:
