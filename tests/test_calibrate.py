@@ -343,8 +343,8 @@ def test_what_is_determined_has_no_dimension_whether_or_not_its_units_have_a_mas
     assert list(config.fits) == ["K", f"{key}.A"]
     bounds = Bounds(*np.transpose(list(config.fits.values())))
     points = DataPoints(np.full(3, 1e-2), np.full(3, 1e-4), "given")
-    problem = FitProblem(key, bounds, points)
-    (fit,) = fit_all([problem], {key: lambda rows: np.repeat(rows[:, :1] ** 0.4 * rows[:, 1:], 3, axis=1)})
+    problem = FitProblem(lambda rows: np.repeat(rows[:, :1] ** 0.4 * rows[:, 1:], 3, axis=1), bounds, points)
+    (fit,) = fit_all([problem])
     groups = determined_groups(config, find(key), list(config.fits), fit)
     assert groups == ["(v0^(1/5) K^(2/5) A)/m^(2/5)"]
 
@@ -374,8 +374,9 @@ def test_what_is_determined_has_no_dimension_at_every_exponent_of_the_data(
     )
     names = ["K", f"{key}.d"]
     bounds = Bounds(*np.transpose([config.fits[name] for name in names]))
-    problem = FitProblem(key, bounds, DataPoints(np.full(3, 0.01), np.full(3, 1e-4), "given"))
-    (fit,) = fit_all([problem], {key: lambda rows: np.repeat(rows[:, 1:] / np.sqrt(rows[:, :1]), 3, axis=1)})
+    points = DataPoints(np.full(3, 0.01), np.full(3, 1e-4), "given")
+    problem = FitProblem(lambda rows: np.repeat(rows[:, 1:] / np.sqrt(rows[:, :1]), 3, axis=1), bounds, points)
+    (fit,) = fit_all([problem])
     assert determined_groups(config, find(key), names, fit) == [expected]
 
 
@@ -393,8 +394,9 @@ def test_what_is_determined_of_a_parameter_that_may_be_zero_is_no_product() -> N
     )
     names = ["K", f"{key}.d"]
     bounds = Bounds(*np.transpose([config.fits[name] for name in names]))
-    problem = FitProblem(key, bounds, DataPoints(np.full(3, 1.0), np.full(3, 1e-2), "given"))
-    (fit,) = fit_all([problem], {key: lambda rows: np.repeat(rows[:, 1:] / np.sqrt(rows[:, :1]), 3, axis=1)})
+    points = DataPoints(np.full(3, 1.0), np.full(3, 1e-2), "given")
+    problem = FitProblem(lambda rows: np.repeat(rows[:, 1:] / np.sqrt(rows[:, :1]), 3, axis=1), bounds, points)
+    (fit,) = fit_all([problem])
     assert not fit.identifiable.any()
     assert determined_groups(config, find(key), names, fit) == []
 
@@ -526,14 +528,14 @@ def test_the_law_that_made_the_data_is_ranked_first_in_nine_of_ten_sets(sets_of_
     sets = [(key, values[key] + 0.01 * random.standard_normal(speeds.size)) for key in [*truths] * sets_of_a_law]
     problems = [
         FitProblem(
-            model.key,
+            functions[model.key],
             Bounds(*np.array([config.fits[name] for name in names[model.key]]).T),
             DataPoints(measured, np.full(speeds.size, 0.01), "given"),
         )
         for _, measured in sets
         for model in models
     ]
-    aicc = np.array([fit.aicc for fit in fit_all(problems, functions, leave_one_out=False)]).reshape(-1, 3)
+    aicc = np.array([fit.aicc for fit in fit_all(problems, leave_one_out=False)]).reshape(-1, 3)
     truth = np.array([[model.key for model in models].index(key) for key, _ in sets])
     near = aicc[np.arange(truth.size), truth] <= aicc.min(axis=1) + 2.0
     print(f"ranked first or within 2: {near.mean():.3f} of {truth.size}")

@@ -79,7 +79,7 @@ def fit(
     key: str, least: list[float], most: list[float], values: Array, sigma: float, noise: str = "given", **data: Any
 ) -> Fit:
     points = DataPoints(values, np.full(values.size, sigma), noise, **data)  # type: ignore[arg-type]
-    (result,) = fit_all([FitProblem(key, Bounds(np.array(least), np.array(most)), points)], FUNCTIONS)
+    (result,) = fit_all([FitProblem(FUNCTIONS[key], Bounds(np.array(least), np.array(most)), points)])
     return result
 
 
@@ -167,8 +167,8 @@ def test_an_interval_that_reaches_a_bound_ends_there(mean: float, lower: float, 
 
 def test_a_law_without_a_prediction_determines_no_parameter() -> None:
     data = DataPoints(np.full(20, 0.5), np.full(20, 0.01), "given")
-    problem = FitProblem("none", Bounds(np.zeros(1), np.ones(1)), data)
-    (result,) = fit_all([problem], {"none": lambda rows: np.full((len(rows), 20), np.nan)})
+    problem = FitProblem(lambda rows: np.full((len(rows), 20), np.nan), Bounds(np.zeros(1), np.ones(1)), data)
+    (result,) = fit_all([problem])
     assert result.status == "no_prediction"
     assert not result.identifiable.any()
     assert np.isnan([result.lower, result.upper, result.covariance[0]]).all()
@@ -186,9 +186,9 @@ def test_the_derivative_at_a_bound_is_that_of_the_prediction(
 
 
 def test_as_many_points_as_parameters_are_too_few() -> None:
-    functions = {"line": lambda rows: rows[:, :1] + rows[:, 1:] * X[:2]}
     data = DataPoints(np.array([0.5, 0.6]), np.full(2, 0.01), "scale")
-    (result,) = fit_all([FitProblem("line", Bounds(np.full(2, -1.0), np.full(2, 2.0)), data)], functions)
+    bounds = Bounds(np.full(2, -1.0), np.full(2, 2.0))
+    (result,) = fit_all([FitProblem(lambda rows: rows[:, :1] + rows[:, 1:] * X[:2], bounds, data)])
     assert result.status == "too_few_points"
     assert np.isnan(result.lower).all()
     assert np.isnan(result.aicc)
@@ -199,7 +199,7 @@ def test_a_fit_does_not_depend_on_the_others() -> None:
     random = np.random.default_rng(10)
     problems = [
         FitProblem(
-            "decay",
+            decay,
             Bounds(np.array([1e-3, 1e-3]), np.array([10.0, 10.0])),
             DataPoints(
                 decay(np.array([[1.3, 0.7]]))[0] + 0.01 * random.standard_normal(30), np.full(30, 0.01), "given"
@@ -207,9 +207,9 @@ def test_a_fit_does_not_depend_on_the_others() -> None:
         )
         for _ in range(3)
     ]
-    together = fit_all(problems, FUNCTIONS)
+    together = fit_all(problems)
     for problem, of_all in zip(problems, together, strict=True):
-        (alone,) = fit_all([problem], FUNCTIONS)
+        (alone,) = fit_all([problem])
         for name in ("estimate", "lower", "upper", "covariance", "aicc", "loo"):
             assert np.array_equal(getattr(alone, name), getattr(of_all, name))
 
@@ -339,8 +339,8 @@ def test_an_end_of_the_allowed_values_is_a_limit_and_no_bound_of_the_search(
     values: Array, is_limit: list[list[bool]] | None, status: str
 ) -> None:
     bounds = Bounds(np.array([0.05]), np.array([0.9]), None if is_limit is None else np.array(is_limit))
-    problem = FitProblem("zeta", bounds, DataPoints(values, np.full(20, 0.01), "given"))
-    (result,) = fit_all([problem], FUNCTIONS)
+    problem = FitProblem(of_zeta, bounds, DataPoints(values, np.full(20, 0.01), "given"))
+    (result,) = fit_all([problem])
     assert result.status == status
 
 
@@ -357,8 +357,8 @@ def test_coverage_of_sets_of_four_specimens(deviation: float, count: int) -> Non
     bounds = Bounds(np.array([0.0]), np.array([1.0]))
     sets = [specimens_with_deviations(deviation, sigma, seed) for seed in range(count)]
     data = DataPoints(sets[0], np.full(SPECIMENS.size, sigma), "excess", SPECIMENS)
-    problems = [FitProblem("constant", bounds, replace(data, values=values)) for values in sets]
-    fits = fit_all(problems, FUNCTIONS, leave_one_out=False)
+    problems = [FitProblem(constant, bounds, replace(data, values=values)) for values in sets]
+    fits = fit_all(problems, leave_one_out=False)
     covered = np.mean([result.lower[0] <= 0.7 <= result.upper[0] for result in fits])
     print(f"deviation {deviation}: coverage {covered:.4f}")
     # a deviation smaller than sigma is often estimated as 0, and the intervals are too long
@@ -375,8 +375,8 @@ def test_coverage_and_bias_of_synthetic_sets(count: int) -> None:
     random = np.random.default_rng(20261123)
     bounds = Bounds(np.array([0.01]), np.array([0.9]))
     values = restitution(np.array([ZETA])) + sigma * random.standard_normal((count, n))
-    problems = [FitProblem("zeta", bounds, DataPoints(row, np.full(n, sigma), "given")) for row in values]
-    fits = fit_all(problems, FUNCTIONS, leave_one_out=False)
+    problems = [FitProblem(of_zeta, bounds, DataPoints(row, np.full(n, sigma), "given")) for row in values]
+    fits = fit_all(problems, leave_one_out=False)
     estimates = np.array([result.estimate[0] for result in fits])
     covered = np.mean([result.lower[0] <= ZETA <= result.upper[0] for result in fits])
     bound = 0.00132556
@@ -396,14 +396,14 @@ def test_of_equal_fits_one_that_converged_is_the_best() -> None:
 
 def test_a_solver_that_fails_ends_those_that_wait() -> None:
     def waits(evaluate: Evaluate) -> Array:
-        return evaluate("square", np.ones((1, 1)))
+        return evaluate(np.square, np.ones((1, 1)))
 
     def fails(evaluate: Evaluate) -> Array:
         raise ArithmeticError("no root")
 
     def run() -> None:
         with suppress(ArithmeticError):
-            run_together({"square": np.square}, [waits, fails])
+            run_together([waits, fails])
 
     thread = threading.Thread(target=run, daemon=True)
     thread.start()

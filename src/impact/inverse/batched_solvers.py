@@ -7,7 +7,7 @@ wait, their requests are evaluated together.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from functools import partial
 from queue import SimpleQueue
@@ -20,8 +20,8 @@ from ..array_types import Array
 T = TypeVar("T")
 # rows (k, p) to values (k, n)
 VectorFunction = Callable[[Array], Array]
-# called by a solver: the key of a function, and rows of its arguments
-Evaluate = Callable[[str, Array], Array]
+# called by a solver: a function, and rows of its arguments
+Evaluate = Callable[[VectorFunction, Array], Array]
 # threads at a time
 MAX_THREADS = 256
 
@@ -30,32 +30,33 @@ class _Stopped(Exception):
     """Ends a waiting solver after a function or another solver failed."""
 
 
-def run_together(functions: Mapping[str, VectorFunction], solvers: Sequence[Callable[[Evaluate], T]]) -> list[T]:
-    """Run solvers, each called with a function `evaluate(key, rows)`, and evaluate their requests in batches.
+def run_together(solvers: Sequence[Callable[[Evaluate], T]]) -> list[T]:
+    """Run solvers, each called with `evaluate(function, rows)`, and evaluate their requests in batches.
 
     A result does not depend on the other solvers, as long as the functions treat each row separately.
 
-    >>> def root_of(square):
+    >>> square = lambda rows: rows**2
+    >>> def root_of(y):
     ...     def newton(evaluate):
     ...         x = np.ones(1)
     ...         for _ in range(8):
-    ...             x = x - (evaluate("square", x[None, :])[0] - square) / (2 * x)
+    ...             x = x - (evaluate(square, x[None, :])[0] - y) / (2 * x)
     ...         return float(x[0].round(12))
     ...     return newton
-    >>> run_together({"square": lambda rows: rows**2}, [root_of(4.0), root_of(9.0)])
+    >>> run_together([root_of(4.0), root_of(9.0)])
     [2.0, 3.0]
     """
     if len(solvers) > MAX_THREADS:
         first, others = solvers[:MAX_THREADS], solvers[MAX_THREADS:]
-        return [*run_together(functions, first), *run_together(functions, others)]
+        return [*run_together(first), *run_together(others)]
     # what the running solver sends: a request, or at its end its future
-    messages: SimpleQueue[tuple[str, Array] | Future[T]] = SimpleQueue()
+    messages: SimpleQueue[tuple[VectorFunction, Array] | Future[T]] = SimpleQueue()
     answers: list[SimpleQueue[Array | None]] = [SimpleQueue() for _ in solvers]
     futures: list[Future[T]] = []
-    requests: dict[int, tuple[str, Array]] = {}
+    requests: dict[int, tuple[VectorFunction, Array]] = {}
 
-    def evaluate(number: int, key: str, rows: Array) -> Array:
-        messages.put((key, rows))
+    def evaluate(number: int, function: VectorFunction, rows: Array) -> Array:
+        messages.put((function, rows))
         answer = answers[number].get()
         if answer is None:
             raise _Stopped
@@ -78,11 +79,11 @@ def run_together(functions: Mapping[str, VectorFunction], solvers: Sequence[Call
             while requests:
                 values: dict[int, Array] = {}
                 # those of one function together, in the order of the solvers
-                for key in dict.fromkeys(key for key, _ in requests.values()):
-                    numbers = sorted(number for number, (requested, _) in requests.items() if requested == key)
+                for function in dict.fromkeys(function for function, _ in requests.values()):
+                    numbers = sorted(number for number in requests if requests[number][0] == function)
                     rows = [requests[number][1] for number in numbers]
                     ends = np.cumsum([len(block) for block in rows])[:-1]
-                    values.update(zip(numbers, np.split(functions[key](np.concatenate(rows)), ends), strict=True))
+                    values.update(zip(numbers, np.split(function(np.concatenate(rows)), ends), strict=True))
                 requests.clear()
                 for number in sorted(values):
                     answers[number].put(values[number])

@@ -224,23 +224,21 @@ def fit_laws(config: Config) -> dict[str, Fit]:
     points = DataPoints(values, sigma, data.noise, specimens, data.loss)
     laws = laws_to_fit(config)
     problems: list[FitProblem] = []
-    functions: dict[str, VectorFunction] = {}
     shared: dict[object, InterpolatedCollisions] = {}
     varied, grid = varied_input(data.inputs)
     with_curve = {
         name: [*column, *(grid.tolist() if name == varied else [column[0]] * grid.size)]
         for name, column in data.inputs.items()
     }
-    for key, law in laws.items():
+    for law in laws.values():
         names = parameters_of(config, law)
-        problem = FitProblem(key, _bounds(config, names), points, f"{key}, integrated")
-        problems.append(problem)
         compute = interpolated(config, law, tuple(data.outputs))
         if compute is not None:
             compute = shared.setdefault(motion_key(model_of(law)), compute)
-        functions[problem.key] = prediction(config, law, names, data.inputs, len(data.lines), compute)
-        functions[problem.final_key] = prediction(config, law, names, with_curve, len(data.lines))
-    return dict(zip(laws, fit_all(problems, functions), strict=True))
+        function = prediction(config, law, names, data.inputs, len(data.lines), compute)
+        integrated = prediction(config, law, names, with_curve, len(data.lines))
+        problems.append(FitProblem(function, _bounds(config, names), points, integrated))
+    return dict(zip(laws, fit_all(problems), strict=True))
 
 
 def _bounds(config: Config, names: Sequence[str]) -> Bounds:

@@ -188,13 +188,13 @@ class Fit:
 class FitProblem:
     """A model with parameters in bounds, and the measurements."""
 
-    # of the function of `run_together` that predicts from rows of parameters, shape (k, p) to (k, n)
-    key: str
+    # predicts from rows of parameters, shape (k, p) to (k, n)
+    function: VectorFunction
     bounds: Bounds
     data: DataPoints
-    # of the function for the final predictions and their derivatives, which may predict more values than are
-    # measured, after these; "" for the same
-    final_key: str = ""
+    # for the final predictions and their derivatives, which may predict more values than are measured, after
+    # these; None for the same
+    final_function: VectorFunction | None = None
 
     @property
     def count(self) -> int:
@@ -208,7 +208,8 @@ class FitProblem:
 
     def predict(self, evaluate: Evaluate, u: Array, *, is_final: bool = False) -> Array:
         """Predict the measurements from rows u, shape (k, p) to (k, n)."""
-        return evaluate((is_final and self.final_key) or self.key, self.bounds.values(u))
+        final = self.final_function if is_final else None
+        return evaluate(final or self.function, self.bounds.values(u))
 
     def scale(self, predicted: Array) -> Array:
         """Subtract the measurements from predictions, in given standard deviations, shape (..., n)."""
@@ -654,30 +655,21 @@ class _Minimum:
         return "at_bound" if is_limit is None or (at_bound & ~is_limit).any() else "at_limit"
 
 
-def fit_all(
-    problems: Sequence[FitProblem], functions: Mapping[str, VectorFunction], *, leave_one_out: bool = True
-) -> list[Fit]:
+def fit_all(problems: Sequence[FitProblem], *, leave_one_out: bool = True) -> list[Fit]:
     """Fit problems at the same time; a fit does not depend on the other problems."""
-    starts = run_together(functions, [partial(scan, problem) for problem in problems])
-    minima = _run_each(
-        functions,
-        [
-            [partial(minimize, problem, start) for start in of_problem]
-            for problem, of_problem in zip(problems, starts, strict=True)
-        ],
-    )
+    starts = run_together([partial(scan, problem) for problem in problems])
+    with_starts = zip(problems, starts, strict=True)
+    minima = _run_each([[partial(minimize, problem, start) for start in some] for problem, some in with_starts])
     pairs = zip(problems, map(best_of, minima), strict=True)
-    fits = run_together(functions, [partial(_minimum, *pair) for pair in pairs])
-    ends = _run_each(functions, [minimum.end_tasks() for minimum in fits])
-    left_out = _run_each(functions, [minimum.leave_one_out_tasks() if leave_one_out else [] for minimum in fits])
+    fits = run_together([partial(_minimum, *pair) for pair in pairs])
+    ends = _run_each([minimum.end_tasks() for minimum in fits])
+    left_out = _run_each([minimum.leave_one_out_tasks() if leave_one_out else [] for minimum in fits])
     return [minimum.result(*parts) for minimum, parts in zip(fits, zip(ends, left_out, strict=True), strict=True)]
 
 
-def _run_each(
-    functions: Mapping[str, VectorFunction], groups: Sequence[Sequence[Callable[[Evaluate], T]]]
-) -> list[list[T]]:
+def _run_each(groups: Sequence[Sequence[Callable[[Evaluate], T]]]) -> list[list[T]]:
     """Run groups of tasks, all at the same time."""
-    results = iter(run_together(functions, [task for group in groups for task in group]))
+    results = iter(run_together([task for group in groups for task in group]))
     return [[next(results) for _ in group] for group in groups]
 
 
