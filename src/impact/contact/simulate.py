@@ -9,7 +9,7 @@ indentation or zero force, as the law declares. For the coordinates see `impact.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import NamedTuple, NotRequired, TypedDict, TypeVar
 
@@ -184,8 +184,7 @@ def _simulate_distinct(
     return result
 
 
-@dataclass(frozen=True)
-class DistinctProblems:
+class DistinctProblems(NamedTuple):
     """The distinct problems of impacts at `rows`: their law, and params and further columns of each.
 
     `first` are the positions among the rows of the first impact of each problem, and `row_of_impact` is the number
@@ -398,16 +397,14 @@ def integrate_collisions(
     return result
 
 
-@dataclass(frozen=True)
-class Recovery:
+class Recovery(NamedTuple):
     """What the restitution phase begins with, for the impacts at `rows` that enter it."""
 
     rows: Positions
     residual: Array
 
 
-@dataclass(frozen=True)
-class Phases:
+class Phases(NamedTuple):
     """The solutions of both phases; `rows` are the impacts that enter restitution, and `params` theirs."""
 
     approach: Solution

@@ -96,8 +96,7 @@ def open_work_folder(folder: Path, plan: Plan, run: Run, extends: str = "") -> I
 def lock_work_folder(folder: Path, plan: Plan) -> Iterator[WorkFolder]:
     """Lock an existing work folder of a plan without changing it; a `UsageError` if it is of another sweep."""
     record = _sweep_record(plan)
-    difference = _difference_from(folder, record)
-    if difference:
+    if difference := _difference_from(folder, record):
         raise UsageError(f"{folder}: {difference}; expected the folders of one sweep")
     with _locked(folder):
         yield WorkFolder(folder, _record_digest(record))
@@ -201,8 +200,7 @@ def _remove_files(folder: Path, plan: bool = False) -> None:
 
 def _check_same_sweep(folder: Path, record: Mapping[str, Any]) -> None:
     """Raise a `UsageError` if the ranges of a folder are of another sweep."""
-    difference = _difference_from(folder, record)
-    if difference:
+    if difference := _difference_from(folder, record):
         hint = f"give the sweep that it is of, another output, or {argument('overwrite', True)} to start again"
         raise UsageError(f"{folder}: {difference}; {hint}")
 

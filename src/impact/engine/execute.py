@@ -157,7 +157,13 @@ def _submit_and_collect(
                     remaining.popleft()
                     yield trajectory_range, (reused[1], {})
                     continue
-                future = _submit(plan, spec, executor, trajectory_range, reused)
+                # columns are built here, so that waiting ranges take no memory
+                rows, law = positions(~reused[0]), plan.laws[trajectory_range.model]
+                columns = {name: values[rows] for name, values in plan.columns_of(trajectory_range).items()}
+                if spec.shares_memory:
+                    future = executor.submit(integrate_columns, law, columns, plan.solver)
+                else:
+                    future = executor.submit(integrate_remotely, keys_of(law), columns, context_of(plan))
                 running[future] = trajectory_range, reused
                 remaining.popleft()
             # ranges already started are finished, unless no worker is left
@@ -196,18 +202,6 @@ def _check_integrated(trajectory_range: TrajectoryRange, integrated: object, siz
     unknown = np.setdiff1d(collisions.status, statuses)
     if unknown.size:
         raise StoreError(f"{prefix}: status: got {unknown[0]}, expected one of {list(statuses)}")
-
-
-def _submit(
-    plan: Plan, spec: ExecutorSpec, executor: Executor, trajectory_range: TrajectoryRange, reused: ReusedPart
-) -> Future[Integrated]:
-    """Submit what is not reused of a range; its columns are built here, so that waiting ranges take no memory."""
-    rows = positions(~reused[0])
-    columns = {name: values[rows] for name, values in plan.columns_of(trajectory_range).items()}
-    law = plan.laws[trajectory_range.model]
-    if spec.shares_memory:
-        return executor.submit(integrate_columns, law, columns, plan.solver)
-    return executor.submit(integrate_remotely, keys_of(law), columns, context_of(plan))
 
 
 def context_of(plan: Plan) -> WorkerContext:

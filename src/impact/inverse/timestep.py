@@ -707,8 +707,7 @@ def fixed_step_law(
     check_scheme(model, float(impact.n[0]), scheme)
     oblique = None
     if law is not None:
-        problem = friction_problem(law.key, law.kind, scheme)
-        if problem:
+        if problem := friction_problem(law.key, law.kind, scheme):
             raise UsageError(problem)
         oblique = ObliqueLaw(Pair(model, law), build_oblique(plan.inputs, impact, (), law))
     continuous = oblique if law is not None and not law.scheme else None
