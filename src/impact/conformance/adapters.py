@@ -112,10 +112,12 @@ def open_adapter(adapter: object, timeout_s: float, folder: str | None = None) -
 def _command(adapter: object) -> list[str]:
     """Make the words of the command of an adapter."""
     if isinstance(adapter, str) and PYTHON_FUNCTION.fullmatch(adapter):
-        path, _, name = adapter.rpartition(":")
+        path = adapter.rpartition(":")[0]
         # it may also be the last word of a command
         if " " not in path or Path(path).is_file():
-            return python_command(sys.executable, Path(path), name)
+            if not Path(path).is_file():
+                raise AdapterError(f"{path}: {'is no file' if Path(path).exists() else 'does not exist'}")
+            return [sys.executable, str(SERVE), str(Path(adapter).absolute())]
     if not isinstance(adapter, str | Sequence) or not adapter:
         raise AdapterError(f'got {adapter!r}, expected FILE.py:FUNCTION or "PROGRAM ARGUMENTS"')
     try:
@@ -126,13 +128,6 @@ def _command(adapter: object) -> list[str]:
     if program is None:
         raise AdapterError(f'no program "{words[0]}"; expected FILE.py:FUNCTION or "PROGRAM ARGUMENTS"')
     return [program, *words[1:]]
-
-
-def python_command(python: str, path: Path, name: str) -> list[str]:
-    """Make the command that runs a function of a Python file as an adapter."""
-    if not path.is_file():
-        raise AdapterError(f"{path}: {'is no file' if path.exists() else 'does not exist'}")
-    return [python, str(SERVE), f"{path.absolute()}:{name}"]
 
 
 @dataclass

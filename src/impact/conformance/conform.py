@@ -81,18 +81,19 @@ def conform(
     check_outputs([path], [], overwrite=overwrite)
     trials = read_suite(suite)
     judged = _selected(trials, [only] if isinstance(only, str) else only)
-    commands: list[tuple[str, object]] = [(name, find_engine(name).command(program)) for name in names]
-    commands += [(_adapter_name(word), word) for word in adapters]
+    commands: list[tuple[str, object, str]] = [(name, *find_engine(name).command(program)) for name in names]
+    commands += [(_adapter_name(word), word, "") for word in adapters]
     checked = [(trial, name) for trial in judged for name in checks.checks_of(trial, trials)]
     engines: list[EngineChecks] = []
-    for position, (name, command) in enumerate(commands):
+    for position, (name, command, version) in enumerate(commands):
         with ExitStack() as stack:
             # engines of the package may leave files where they run
             folder = stack.enter_context(TemporaryDirectory(prefix="impact-")) if position < len(names) else None
             ask = stack.enter_context(open_adapter(command, timeout, folder))
             facts, answers, again = _ask_all(ask, trials, judged)
         # an adapter may name its engine; names are labels of the board
-        facts = replace(facts, engine=_unique(facts.engine or name, [engine.engine for engine in engines]))
+        label = _unique(facts.engine or name, [engine.engine for engine in engines])
+        facts = replace(facts, engine=label, version=facts.version or version)
         engines.append(_judge(facts, trials, checked, answers, again, requested))
     board = Board(board_dataset(suite, [(trial.id, name) for trial, name in checked], engines))
     if path is not None and path.suffix.lower() in PAGE_SUFFIXES:

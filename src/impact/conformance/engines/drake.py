@@ -24,79 +24,60 @@ def dissipation(e: float) -> float:
 def collide(c: dict[str, Any]) -> dict[str, Any]:
     """Run a collision by TAMSI, with the force k x (1 + d v)."""
     speed = abs(c["v1"] - c["v2"]) or 1.0
-    stiffness = (math.pi / c["contact_time"]) ** 2 * effective_mass(c)
-    return run(c, "kTamsi", stiffness, dissipation=dissipation(c["e"]) / speed)
+    return run(c, "kTamsi", math.pi / c["contact_time"], dissipation=dissipation(c["e"]) / speed)
 
 
 def collide_sap(c: dict[str, Any]) -> dict[str, Any]:
     """Run a collision by SAP, with the force k (x + t v)."""
-    from linear_contact import damping_ratio, half_time
+    from two_balls import damping_ratio, half_time
 
     z = damping_ratio(c["e"])
     frequency = 2.0 * half_time(z) / c["contact_time"]
     # those of both bodies add
-    return run(c, "kSap", frequency**2 * effective_mass(c), relaxation_time=z / frequency)
+    return run(c, "kSap", frequency, relaxation_time=z / frequency)
 
 
-def effective_mass(c: dict[str, Any]) -> float:
-    """Effective mass [kg]."""
-    m1, m2 = c["m1"], c["m2"]
-    return float(m1 if m2 is None else m1 * m2 / (m1 + m2))
-
-
-def run(c: dict[str, Any], solver: str, stiffness: float, **damping: float) -> dict[str, Any]:
+def run(c: dict[str, Any], solver: str, frequency: float, **damping: float) -> dict[str, Any]:
     """Run a collision whose balls touch, side by side, after the first step."""
-    from importlib.metadata import version
+    import pydrake.all as drake
+    from two_balls import answer_of, balls_of, harmonic
 
-    from pydrake.geometry import AddContactMaterial, HalfSpace, ProximityProperties, Sphere
-    from pydrake.math import RigidTransform
-    from pydrake.multibody.plant import (
-        AddMultibodyPlantSceneGraph,
-        ContactModel,
-        CoulombFriction,
-        DiscreteContactApproximation,
-    )
-    from pydrake.multibody.tree import PlanarJoint, SpatialInertia, UnitInertia
-    from pydrake.systems.analysis import Simulator
-    from pydrake.systems.framework import DiagramBuilder
-
-    numbers = "1" if c["m2"] is None else "12"
+    balls = balls_of(c)
+    stiffness = frequency**2 * harmonic(ball.m for ball in balls)
     step, speed = PART_OF_STEP * c["dt"], abs(c["v1"] - c["v2"])
-    material = ProximityProperties()
-    friction = CoulombFriction(c["mu"], c["mu"])
+    material = drake.ProximityProperties()
+    friction = drake.CoulombFriction(c["mu"], c["mu"])
     # the springs of both bodies are in series
     if "relaxation_time" in damping:
         material.AddProperty("material", "relaxation_time", damping.pop("relaxation_time"))
-    AddContactMaterial(point_stiffness=2.0 * stiffness, friction=friction, properties=material, **damping)
-    builder = DiagramBuilder()
-    plant, _ = AddMultibodyPlantSceneGraph(builder, time_step=step)
-    plant.set_contact_model(ContactModel.kPoint)
-    plant.set_discrete_contact_approximation(getattr(DiscreteContactApproximation, solver))
+    drake.AddContactMaterial(point_stiffness=2.0 * stiffness, friction=friction, properties=material, **damping)
+    builder = drake.DiagramBuilder()
+    plant, _ = drake.AddMultibodyPlantSceneGraph(builder, time_step=step)
+    plant.set_contact_model(drake.ContactModel.kPoint)
+    plant.set_discrete_contact_approximation(getattr(drake.DiscreteContactApproximation, solver))
     plant.set_stiction_tolerance(STICTION * (speed or 1.0))
     plant.mutable_gravity_field().set_gravity_vector([0, 0, 0])
     joints = []
-    for number in numbers:
-        mass, R, inertia = (c[f"{name}{number}"] for name in ("m", "R", "inertia"))
-        unit = UnitInertia.TriaxiallySymmetric(inertia / mass)
-        body = plant.AddRigidBody(f"ball{number}", SpatialInertia(mass, [0, 0, 0], unit))
-        joint = PlanarJoint(f"joint{number}", plant.world_frame(), body.body_frame(), [0, 0, 0])
+    for ball in balls:
+        unit = drake.UnitInertia.TriaxiallySymmetric(ball.inertia / ball.m)
+        body = plant.AddRigidBody(f"ball{ball.number}", drake.SpatialInertia(ball.m, [0, 0, 0], unit))
+        joint = drake.PlanarJoint(f"joint{ball.number}", plant.world_frame(), body.body_frame(), [0, 0, 0])
         joints.append(plant.AddJoint(joint))
-        plant.RegisterCollisionGeometry(body, RigidTransform(), Sphere(R), f"sphere{number}", material)
-    if len(numbers) == 1:
-        pose = HalfSpace.MakePose([-1, 0, 0], [0, 0, 0])
-        plant.RegisterCollisionGeometry(plant.world_body(), pose, HalfSpace(), "wall", material)
+        pose = drake.RigidTransform()
+        plant.RegisterCollisionGeometry(body, pose, drake.Sphere(ball.R), f"sphere{ball.number}", material)
+    if len(balls) == 1:
+        pose = drake.HalfSpace.MakePose([-1, 0, 0], [0, 0, 0])
+        plant.RegisterCollisionGeometry(plant.world_body(), pose, drake.HalfSpace(), "wall", material)
     plant.Finalize()
-    simulator = Simulator(builder.Build())
+    simulator = drake.Simulator(builder.Build())
     context = plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
     before = STEPS_BEFORE * step
-    for number, joint, side in zip(numbers, joints, (-1.0, 1.0), strict=False):
-        v, u = c[f"v{number}"], c[f"u{number}"]
-        joint.set_translation(context, [side * c[f"R{number}"] - v * before, -u * before])
-        joint.set_translational_velocity(context, [v, u])
-        joint.set_angular_velocity(context, c[f"omega{number}"])
+    for ball, joint in zip(balls, joints, strict=True):
+        joint.set_translation(context, ball.start(before))
+        joint.set_translational_velocity(context, [ball.v, ball.u])
+        joint.set_angular_velocity(context, ball.omega)
     simulator.AdvanceTo(before + CONTACTS * c["contact_time"])
-    answer = {"id": c["id"], "version": version("drake"), "kind": "compliant"}
-    for number, joint in zip(numbers, joints, strict=True):
-        v, u = joint.get_translational_velocity(context)
-        answer |= {f"v{number}": v, f"u{number}": u, f"omega{number}": joint.get_angular_velocity(context)}
-    return answer
+    motions = (
+        (*joint.get_translational_velocity(context), joint.get_angular_velocity(context)) for joint in joints
+    )
+    return answer_of(c, motions, "compliant")

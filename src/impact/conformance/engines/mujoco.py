@@ -34,32 +34,24 @@ STEPS_BEFORE, CONTACTS = 1, 3.0
 def collide(c: dict[str, Any]) -> dict[str, Any]:
     """Run a collision whose balls touch, side by side, after the first step."""
     import mujoco
-    from linear_contact import damping_ratio, half_time
+    from two_balls import answer_of, balls_of, damping_ratio, half_time
 
     z = damping_ratio(c["e"])
     frequency = 2.0 * half_time(z) / c["contact_time"]
-    balls, speeds = "", []
-    for number, side in (("1", -1.0), ("2", 1.0)):
-        mass, R, inertia, v, u, omega = (c[f"{name}{number}"] for name in ("m", "R", "inertia", "v", "u", "omega"))
-        if mass is None:
-            balls += WALL
-            continue
-        before = STEPS_BEFORE * c["dt"]
-        balls += BALL.format(
-            x=repr(side * R - v * before), y=repr(-u * before), m=mass, inertia=inertia, R=R, number=number
-        )
-        speeds += [v, u, omega]
+    bodies, speeds = [], []
+    for ball in balls_of(c):
+        x, y = ball.start(STEPS_BEFORE * c["dt"])
+        bodies.append(BALL.format(x=x, y=y, m=ball.m, inertia=ball.inertia, R=ball.R, number=ball.number))
+        speeds += [ball.v, ball.u, ball.omega]
+    if len(bodies) == 1:
+        bodies.append(WALL)
     model = mujoco.MjModel.from_xml_string(
         WORLD.format(
-            balls=balls, dt=c["dt"], mu=c["mu"], timeconst=1.0 / (frequency * z), dampratio=z,
+            balls="".join(bodies), dt=c["dt"], mu=c["mu"], timeconst=1.0 / (frequency * z), dampratio=z,
             friction_time=max(FRICTION_TIME * c["contact_time"], 2.0 * c["dt"]),
         )
     )  # fmt: skip
     data = mujoco.MjData(model)
     data.qvel[:] = speeds
     mujoco.mj_step(model, data, STEPS_BEFORE + math.ceil(CONTACTS * c["contact_time"] / c["dt"]))
-    answer = {"id": c["id"], "version": mujoco.__version__, "kind": "compliant"}
-    for ball in range(len(speeds) // 3):
-        names = (f"{name}{ball + 1}" for name in ("v", "u", "omega"))
-        answer |= dict(zip(names, map(float, data.qvel[3 * ball : 3 * ball + 3]), strict=True))
-    return answer
+    return answer_of(c, data.qvel.reshape(-1, 3).tolist(), "compliant")
