@@ -200,7 +200,7 @@ def test_a_collision_is_the_mapping_of_the_protocol() -> None:
     for question in COLLISIONS:
         assert tuple(question) == QUESTION_KEYS
         assert json.loads(json.dumps(question)) == question
-    assert {check for trial in read_suite().values() for check in checks_of(trial, read_suite())} == {
+    assert {check for trial in read_suite().values() for check in checks_of(trial)} == {
         *("finite", "momentum", "angular_momentum", "energy", "separates", "restitution", "friction"),
         *("friction_bound", "spin", "frame", "mirror", "exchange", "scale", "repeat", "step"),
     }
@@ -238,7 +238,7 @@ def test_a_tolerance_is_an_option_by_name_or_for_all() -> None:
 
 def test_an_engine_with_a_friction_law_of_the_catalogue_is_judged_by_it() -> None:
     """A spring that reverses the slip: its own beta passes, that of rigid balls does not."""
-    from impact.conformance.friction_laws import betas_of_law
+    from impact.conformance.conform import betas_of_law
     from impact.conformance.suite import Question
 
     law: Values = {"law": "cundall-strack-1979", "parameters": {"kt_over_kn": 2 / 7}}

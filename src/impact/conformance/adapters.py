@@ -17,7 +17,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, SupportsFloat
 
@@ -39,7 +39,7 @@ MAX_LINE_BYTES = 2**16
 SERVE = Path(__file__).with_name("serve.py")
 PYTHON_FUNCTION = re.compile(r".+\.py:[^\W\d]\w*")
 # how C and C++ print what is no number, which JSON does not have
-NOT_A_NUMBER = re.compile(r"(?<=[:\s,])[-+]?(nan|inf)[a-z0-9()]*(?=\s*[,}])", re.IGNORECASE)
+NOT_A_NUMBER = re.compile(r"(?<=[:\s,])([-+]?(?:nan|inf))[a-z0-9()]*(?=\s*[,}])", re.IGNORECASE)
 
 Ask = Callable[[Question], object]
 
@@ -50,20 +50,20 @@ class Facts:
 
     Parameters
     ----------
-    engine, version : "" where it does not say
+    engine, version : "" where it does not state them
     kind : whether it solves impulses or has a compliant contact
     is_float32 : it computes in single precision
     law, model, parameters : key of the friction law that it has, that of its contact force, and the parameters of
         the friction law; "" for rigid friction
     """
 
-    engine: str = ""
-    version: str = ""
-    kind: Kind = "impulse"
-    is_float32: bool = False
-    law: str = ""
-    model: str = ""
-    parameters: Mapping[str, float | str] = field(default_factory=dict)
+    engine: str
+    version: str
+    kind: Kind
+    is_float32: bool
+    law: str
+    model: str
+    parameters: Mapping[str, float | str]
 
 
 class AdapterError(UsageError):
@@ -112,11 +112,11 @@ def open_adapter(adapter: object, timeout_s: float, folder: str | None = None) -
 def _command(adapter: object) -> list[str]:
     """Make the words of the command of an adapter."""
     if isinstance(adapter, str) and PYTHON_FUNCTION.fullmatch(adapter):
-        path = adapter.rpartition(":")[0]
+        path = Path(adapter.rpartition(":")[0])
         # it may also be the last word of a command
-        if " " not in path or Path(path).is_file():
-            if not Path(path).is_file():
-                raise AdapterError(f"{path}: {'is no file' if Path(path).exists() else 'does not exist'}")
+        if " " not in str(path) or path.is_file():
+            if not path.is_file():
+                raise AdapterError(f"{path}: {'is no file' if path.exists() else 'does not exist'}")
             return [sys.executable, str(SERVE), str(Path(adapter).absolute())]
     if not isinstance(adapter, str | Sequence) or not adapter:
         raise AdapterError(f'got {adapter!r}, expected FILE.py:FUNCTION or "PROGRAM ARGUMENTS"')
@@ -154,7 +154,7 @@ class _Conversation:
             try:
                 return json.loads(text)
             except ValueError:
-                return json.loads(NOT_A_NUMBER.sub(_python_number, text))
+                return json.loads(NOT_A_NUMBER.sub(lambda match: json.dumps(float(match[1])), text))
         except ValueError:
             shown = safe_text(line.decode(errors="replace"), 80)
             raise AdapterError(f'{name}: got "{shown}", expected one line of JSON on stdout') from None
@@ -190,12 +190,6 @@ class _Conversation:
         lines = kept.decode(errors="replace").strip().splitlines()
         last = f": {safe_text(lines[-1])}" if lines else ""
         return AdapterError(f"{name}: the adapter ended with {code}{last}")
-
-
-def _python_number(match: re.Match[str]) -> str:
-    if match[1].lower() == "nan":
-        return "NaN"
-    return "-Infinity" if match[0].startswith("-") else "Infinity"
 
 
 def read_answer(question: Question, answer: object) -> Answer | None:

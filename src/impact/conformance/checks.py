@@ -36,16 +36,16 @@ class Rebound:
 
     Parameters
     ----------
-    question : of the adapter protocol
+    trial : the collision
     answer : the velocities and spins after the impact, those of ball 2 only if it is no wall
     """
 
-    question: Question
+    trial: Trial
     answer: Answer
 
     def before(self, name: str) -> float:
         """Return a number of the question; that of a wall is 0."""
-        value = self.question[name]
+        value = self.trial.question[name]
         return 0.0 if value is None else float(value)
 
     def after(self, name: str) -> float:
@@ -54,7 +54,7 @@ class Rebound:
 
     @property
     def balls(self) -> str:
-        return balls_of(self.question)
+        return balls_of(self.trial.question)
 
     @cached_property
     def m(self) -> float:
@@ -212,12 +212,12 @@ def spin(rebound: Rebound) -> Delivered:
     return Delivered(0.0, float(np.max([*map(difference, rebound.balls)])) / (rebound.m * rebound.speed))
 
 
-def related(rebound: Rebound, trial: Trial, base: Rebound) -> Delivered:
+def related(rebound: Rebound, base: Rebound) -> Delivered:
     """Give how far the answer is from that which follows from the answer to another collision.
 
     It is the largest difference of velocities and R omega, over v0 + |g0|.
     """
-    expected: dict[str, float] = transform(trial.relation, trial.change, base.answer)
+    expected: dict[str, float] = transform(rebound.trial.relation, rebound.trial.change, base.answer)
 
     def difference(name: str) -> float:
         length = rebound.before(f"R{name[-1]}") if name.startswith("omega") else 1.0
@@ -233,17 +233,14 @@ def repeat(rebound: Rebound, again: Answer) -> Delivered:
     return Delivered(0.0, float(sum(differ)))
 
 
-def step(coarse: Rebound, middle: Rebound, fine: Rebound) -> Delivered:
+def step(fine: Rebound, middle: Rebound, coarse: Rebound) -> Delivered:
     """Give how much the answer changes from h to h/2, and from h/2 to h/4, which is asked to be less."""
-
-    def change(first: Rebound, second: Rebound) -> float:
-        return related(second, Trial(second.question, relation="step"), first).delivered
-
-    return Delivered(change(coarse, middle), change(middle, fine))
+    return Delivered(related(middle, coarse).delivered, related(fine, middle).delivered)
 
 
-# checks of one answer alone
-OF_AN_ANSWER: Mapping[str, Callable[[Rebound], Delivered]] = {
+# of checks that compare answers: how many of the chain, the first of which `repeat` compares when asked again
+CHAIN_LENGTHS: Mapping[str, int] = {**dict.fromkeys(RELATIONS, 2), "step": 3, "repeat": 1}
+CHECK_OF: Mapping[str, Callable[..., Delivered]] = {
     "finite": finite,
     "momentum": momentum,
     "angular_momentum": angular_momentum,
@@ -253,6 +250,9 @@ OF_AN_ANSWER: Mapping[str, Callable[[Rebound], Delivered]] = {
     "friction": friction,
     "friction_bound": friction_bound,
     "spin": spin,
+    **dict.fromkeys(RELATIONS, related),
+    "step": step,
+    "repeat": repeat,
 }
 # judged exactly, and to rounding whatever the engine is
 EXACT, CONSERVED = ("finite", "repeat"), ("momentum", "energy", "separates")
@@ -274,16 +274,16 @@ def tolerances(kind: Kind, *, float32: bool, tol: Mapping[str, float]) -> dict[s
     return chosen
 
 
-def checks_of(trial: Trial, trials: Mapping[str, Trial]) -> list[str]:
+def checks_of(trial: Trial) -> list[str]:
     """List the checks that a collision has, in the order of a board."""
-    rebound = Rebound(trial.question, dict.fromkeys(ANSWER_KEYS, 0.0))
+    rebound = Rebound(trial, dict.fromkeys(ANSWER_KEYS, 0.0))
     without = {str(name) for name in RELATIONS if name != trial.relation}
     if rebound.balls == "1":
         without.add("momentum")
     if rebound.g0 == 0.0 or rebound.v0 == 0.0:
         # beta is not defined
         without.add("friction")
-    if trial.relation == "step" and not trials[trial.of].relation:
+    if len(trial.chain) == 2:
         # a half of a step has nothing that could fall
         without.add("step")
     return [name for name in CHECKS if name not in without]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
@@ -15,10 +16,10 @@ from ..formatting import argument, number
 from ..reporting.report import report
 from ..results.board import CHECKS, Board, EngineChecks, board_dataset, excess_of
 from ..results.schema import CHECK_STATUSES
+from ..results.sweep import sweep
 from ..results.xarray_backend import save
 from . import checks
 from .adapters import DEFAULT_TIMEOUT_S, Ask, Facts, open_adapter, read_answer, read_facts
-from .friction_laws import betas_of_law
 from .registry import find_engine
 from .suite import ANSWER_KEYS, DEFAULT_SUITE, Question, Trial, read_suite
 
@@ -80,21 +81,23 @@ def conform(
         raise UsageError(f"{path}: expected a name that ends in .html, for a page, or in .h5")
     check_outputs([path], [], overwrite=overwrite)
     trials = read_suite(suite)
-    judged = _selected(trials, [only] if isinstance(only, str) else only)
+    only = [only] if isinstance(only, str) else only
+    require_known(only, trials, f"{argument('only')}: no collision")
+    judged = [trial for trial in trials.values() if not only or trial.id in only]
     commands: list[tuple[str, object, str]] = [(name, *find_engine(name).command(program)) for name in names]
     commands += [(_adapter_name(word), word, "") for word in adapters]
-    checked = [(trial, name) for trial in judged for name in checks.checks_of(trial, trials)]
+    checked = [(trial, name) for trial in judged for name in checks.checks_of(trial)]
     engines: list[EngineChecks] = []
     for position, (name, command, version) in enumerate(commands):
         with ExitStack() as stack:
             # engines of the package may leave files where they run
             folder = stack.enter_context(TemporaryDirectory(prefix="impact-")) if position < len(names) else None
             ask = stack.enter_context(open_adapter(command, timeout, folder))
-            facts, answers, again = _ask_all(ask, trials, judged)
+            facts, answers, again = _ask_all(ask, judged)
         # an adapter may name its engine; names are labels of the board
         label = _unique(facts.engine or name, [engine.engine for engine in engines])
         facts = replace(facts, engine=label, version=facts.version or version)
-        engines.append(_judge(facts, trials, checked, answers, again, requested))
+        engines.append(_judge(facts, checked, answers, again, requested))
     board = Board(board_dataset(suite, [(trial.id, name) for trial, name in checked], engines))
     if path is not None and path.suffix.lower() in PAGE_SUFFIXES:
         report(board.dataset, output=path, overwrite=overwrite)
@@ -119,12 +122,6 @@ def _check_tolerances(tol: float | Mapping[str, float] | None) -> dict[str, floa
     return {name: float(value) for name, value in requested.items()}
 
 
-def _selected(trials: Mapping[str, Trial], only: Sequence[str]) -> list[Trial]:
-    """Choose the collisions to judge."""
-    require_known(only, trials, f"{argument('only')}: no collision")
-    return [trial for trial in trials.values() if not only or trial.id in only]
-
-
 def _adapter_name(word: object) -> str:
     """Name an adapter by what it was called, without folders."""
     if isinstance(word, str):
@@ -139,28 +136,22 @@ def _unique(name: str, others: Sequence[str]) -> str:
 
 
 def _ask_all(
-    ask: Ask, trials: Mapping[str, Trial], judged: Sequence[Trial]
+    ask: Ask, judged: Sequence[Trial]
 ) -> tuple[Facts, dict[str, checks.Answer | None], dict[str, checks.Answer | None]]:
     """Ask for all collisions in their order, then in reverse; an answer is None where it is not supported."""
-    needed: dict[str, Trial] = {}
-    for trial in judged:
-        chain = [trial]
-        while chain[0].of:
-            chain.insert(0, trials[chain[0].of])
-        needed |= {one.id: one for one in chain}
-    questions = [trial.question for trial in needed.values()]
-    first = ask(dict(questions[0]))
-    answers = {str(questions[0]["id"]): read_answer(questions[0], first)}
+    needed = {link.id: link.question for trial in judged for link in reversed(trial.chain)}
+    start = next(iter(needed))
+    first = ask(dict(needed[start]))
+    answers = {start: read_answer(needed[start], first)}
     facts = read_facts(first)
-    answers |= {str(question["id"]): read_answer(question, ask(dict(question))) for question in questions[1:]}
+    answers |= {key: read_answer(needed[key], ask(dict(needed[key]))) for key in needed if key != start}
     # another collision comes before each, so that what is kept from it shows
-    again = {str(question["id"]): read_answer(question, ask(dict(question))) for question in reversed(questions)}
+    again = {key: read_answer(needed[key], ask(dict(needed[key]))) for key in reversed(needed)}
     return facts, answers, again
 
 
 def _judge(
     facts: Facts,
-    trials: Mapping[str, Trial],
     checked: Sequence[tuple[Trial, str]],
     answers: Mapping[str, checks.Answer | None],
     again: Mapping[str, checks.Answer | None],
@@ -172,38 +163,58 @@ def _judge(
     betas: Mapping[str, float] = {}
     if facts.law and with_friction:
         betas = betas_of_law(with_friction, facts.law, facts.model, facts.parameters)
-    rebounds = {
-        name: None if answer is None else checks.Rebound(trials[name].question, answer)
-        for name, answer in answers.items()
-    }
-
-    def deliver(trial: Trial, name: str) -> checks.Delivered | None:
-        rebound, base = rebounds[trial.id], rebounds.get(trial.of)
-        if rebound is None:
-            return None
-        if name == "repeat":
-            return checks.repeat(rebound, again[trial.id] or {})
-        if name == "friction":
-            return checks.friction(rebound, betas.get(trial.id))
-        if name in checks.OF_AN_ANSWER:
-            return checks.OF_AN_ANSWER[name](rebound)
-        if base is None:
-            return None
-        if name != "step":
-            return checks.related(rebound, trial, base)
-        coarse = rebounds[trials[trial.of].of]
-        return None if coarse is None else checks.step(coarse, base, rebound)
-
     rows = []
     for trial, name in checked:
-        delivered = deliver(trial, name)
-        if delivered is None:
-            # what is asked for is independent of the answer, but for friction
-            silent = checks.Rebound(trial.question, dict.fromkeys(ANSWER_KEYS, float("nan")))
-            asked = checks.OF_AN_ANSWER[name](silent).asked if name in checks.OF_AN_ANSWER else float("nan")
-            rows.append((asked, float("nan"), tolerance[name], CHECK_STATUSES["not_supported"]))
-        else:
+        chain = trial.chain[: checks.CHAIN_LENGTHS.get(name, 1)]
+        rebounds = [checks.Rebound(link, answer) for link in chain if (answer := answers[link.id]) is not None]
+        further = {"repeat": (again[trial.id] or {},), "friction": (betas.get(trial.id),)}.get(name, ())
+        if len(rebounds) == len(chain):
+            asked, delivered = checks.CHECK_OF[name](*rebounds, *further)
             # NaN never passes
-            word = "pass" if excess_of(name, *delivered) <= tolerance[name] else "fail"
-            rows.append((*delivered, tolerance[name], CHECK_STATUSES[word]))
+            word = "pass" if excess_of(name, asked, delivered) <= tolerance[name] else "fail"
+        else:
+            word, delivered = "not_supported", float("nan")
+            # what is asked for is independent of the answer, but for friction
+            silent = checks.Rebound(trial, dict.fromkeys(ANSWER_KEYS, delivered))
+            asked = delivered if name in checks.CHAIN_LENGTHS else checks.CHECK_OF[name](silent).asked
+        rows.append((asked, delivered, tolerance[name], CHECK_STATUSES[word]))
     return EngineChecks(facts.engine, facts.version, facts.kind, *zip(*rows, strict=True))
+
+
+def betas_of_law(
+    questions: Sequence[Question], law: str, model: str, parameters: Mapping[str, float | str]
+) -> dict[str, float]:
+    """Compute beta = -g1/g0 of a friction law of the catalogue with a contact force, by the id of the collision.
+
+    Raises
+    ------
+    ConfigError : a parameter is none of the law, or the law is not combinable with the contact force
+    """
+    inputs = [_inputs(question) for question in questions]
+    cases = {name: [values[name] for values in inputs] for name in inputs[0]}
+    result = sweep(
+        {
+            "models": model,
+            "frictions": law,
+            "sweep": {"cases": cases, "n": 1.0},
+            "friction": {law: dict(parameters)},
+        }
+    )
+    return dict(zip((str(question["id"]) for question in questions), result["beta"].values.ravel(), strict=True))
+
+
+def _inputs(question: Question) -> dict[str, float]:
+    """Write a collision as the inputs of a config.
+
+    The stiffness is that of a linear spring with the contact time of the collision, K = m (pi^2 + ln^2 e)/t^2;
+    beta depends on it only if a parameter of the law has a unit.
+    """
+    names = ("v1", "v2", "u1", "u2", "omega1", "omega2", "e", "mu", "contact_time")
+    values = {name: float(question[name] or 0.0) for name in names}
+    for ball in "12":
+        mass, radius = (float(question[f"{name}{ball}"] or math.inf) for name in ("m", "R"))
+        inertia = question[f"inertia{ball}"]
+        factor = 0.4 if inertia is None else float(inertia) / (mass * radius**2)
+        values |= {f"m{ball}": mass, f"R{ball}": radius, f"inertia_factor{ball}": factor}
+    frequency = math.hypot(math.pi, math.log(values["e"])) / values.pop("contact_time")
+    return values | {"K": frequency**2 / (1.0 / values["m1"] + 1.0 / values["m2"])}

@@ -37,17 +37,22 @@ class Trial:
     Parameters
     ----------
     question : what an adapter gets
-    of, relation, change : the collision from which it follows, how, and by how much; "" without one
+    base, relation, change : the collision from which it follows, how, and by how much; None without one
     """
 
     question: Question
-    of: str = ""
+    base: Trial | None = None
     relation: Relation = ""
     change: Any = None
 
     @property
     def id(self) -> str:
         return str(self.question["id"])
+
+    @property
+    def chain(self) -> list[Trial]:
+        """The collision, that from which it follows, and so on."""
+        return [self, *(self.base.chain if self.base else ())]
 
 
 def suites() -> list[str]:
@@ -63,7 +68,7 @@ def read_suite(name: str = DEFAULT_SUITE) -> Mapping[str, Trial]:
     >>> trials = read_suite()
     >>> trials["slide-mu10-45-equal"].question["v1"], trials["normal-e50-slow-wall"].question["m2"]
     (0.707107, None)
-    >>> trials["frame-mirrored"].of, trials["frame-mirrored"].question["omega1"]
+    >>> trials["frame-mirrored"].base.id, trials["frame-mirrored"].question["omega1"]
     ('spin-both', -20.0)
     """
     require_known([name], suites(), f"{argument('suite')}: no set")
@@ -74,9 +79,9 @@ def read_suite(name: str = DEFAULT_SUITE) -> Mapping[str, Trial]:
     for values in (values for group in document.values() for values in group):
         if "of" in values:
             relation = next(word for word in RELATIONS if word in values)
-            base = trials[values["of"]].question
-            question = transform(relation, values[relation], base) | {"id": values["id"]}
-            trials[values["id"]] = Trial(question, values["of"], relation, values[relation])
+            base = trials[values["of"]]
+            question = transform(relation, values[relation], base.question) | {"id": values["id"]}
+            trials[values["id"]] = Trial(question, base, relation, values[relation])
         else:
             trials[values["id"]] = Trial(_question(defaults | values))
     return trials
