@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
+from typing import Any
 
 from ..evidence import Evidence
 from ..fixed_step import KICK_DRIFT
 from ..friction import FrictionLaw
 from ..model import Parameter
 from ..models.cited_sources import KRATOS, LIGGGHTS, YADE_2025
-from .parameters import CONSTANT_STIFFNESS, KT_OVER_KN, MINDLIN_STIFFNESS, XT, choice, limit
+from .textbook import CONSTANT_STIFFNESS, KT_OVER_KN, MINDLIN_STIFFNESS, XT, choice, limit
 
 # ---- LAMMPS
 
@@ -18,79 +20,56 @@ LAMMPS_REFERENCE = "LAMMPS, pair style granular, tangential"
 YEAR_NOT_SEEN = "its first year was not seen"
 LAMMPS_LIMIT = "|f| ≤ μ |F|, where it slips the spring takes what the dashpot leaves"
 
-LAMMPS_LINEAR_HISTORY = FrictionLaw(
-    key="lammps-linear-history",
-    title="LAMMPS linear_history",
-    year=2019,
-    equation=f"f = k_t ξ + xₜ c_n g,  ξ̇ = g,  {LAMMPS_LIMIT}",
-    reference=f"{LAMMPS_REFERENCE} linear_history",
-    kind="spring",
-    evidence=Evidence("seen", LAMMPS, note=YEAR_NOT_SEEN),
-    parameters=(*CONSTANT_STIFFNESS, XT, limit("abs")),
-    stiffness="constant",
-    damping="xt",
-)
 
-LAMMPS_MINDLIN = FrictionLaw(
-    key="lammps-mindlin",
-    title="LAMMPS mindlin",
-    year=2019,
-    equation=f"f = 8 G* a ξ + xₜ c_n g,  ξ̇ = g,  a = √(R* δ),  {LAMMPS_LIMIT}",
-    reference=f"{LAMMPS_REFERENCE} mindlin, whose coefficient [Pa] is k_t/√R*, NULL for 8 G*",
-    kind="spring",
-    evidence=Evidence("seen", f"{LAMMPS}, and gran_sub_mod.cpp @07b704ca (2026)", note=YEAR_NOT_SEEN),
-    parameters=(*MINDLIN_STIFFNESS, XT, limit("abs")),
-    stiffness="mindlin",
-    damping="xt",
-    memory=(1.0, 1.0),
-)
-
-
-def lammps_mindlin(option: str, key: str, equation: str, memory: tuple[float, float]) -> FrictionLaw:
-    """Make a variant of Mindlin's law in LAMMPS, by its name there."""
-    return replace(
-        LAMMPS_MINDLIN,
-        key=key,
+def lammps(
+    option: str, equation: str, *stiffness: Parameter, hint: str = "", source: str = LAMMPS, **fields: Any
+) -> FrictionLaw:
+    """Make the law of an option of LAMMPS, with a hint after its reference."""
+    return FrictionLaw(
+        key=f"lammps-{re.sub('[_/]', '-', option)}",
         title=f"LAMMPS {option}",
-        equation=f"{equation},  {LAMMPS_LIMIT}",
-        reference=LAMMPS_MINDLIN.reference.replace("mindlin", option),
-        memory=memory,
+        year=2019,
+        equation=equation,
+        reference=f"{LAMMPS_REFERENCE} {option}{hint}",
+        evidence=Evidence("seen", source, note=YEAR_NOT_SEEN),
+        damping="xt",
+        parameters=(*stiffness, XT, limit("abs")),
+        **fields,
     )
 
 
-LAMMPS_MINDLIN_VARIANTS = (
-    lammps_mindlin(
-        "mindlin/force", "lammps-mindlin-force", "f = f_e + xₜ c_n g,  ḟ_e = 8 G* a g,  a = √(R* δ)", (0.0, 0.0)
+LAMMPS_LINEAR = (
+    lammps(
+        "linear_history",
+        f"f = k_t ξ + xₜ c_n g,  ξ̇ = g,  {LAMMPS_LIMIT}",
+        *CONSTANT_STIFFNESS,
+        kind="spring",
+        stiffness="constant",
     ),
-    lammps_mindlin(
-        "mindlin_rescale",
-        "lammps-mindlin-rescale",
-        "f = 8 G* a ξ + xₜ c_n g,  ξ̇ = g,  and ξ ∝ a on unloading,  a = √(R* δ)",
-        (1.0, 2.0),
-    ),
-    lammps_mindlin(
-        "mindlin_rescale/force",
-        "lammps-mindlin-rescale-force",
-        "f = f_e + xₜ c_n g,  ḟ_e = 8 G* a g,  and f_e ∝ a on unloading,  a = √(R* δ)",
-        (0.0, 1.0),
-    ),
+    lammps("linear_nohistory", "f = min(xₜ c_n |g|, μ |F|) sgn g", kind="dashpot"),
 )
-
-LAMMPS_LINEAR_NOHISTORY = FrictionLaw(
-    key="lammps-linear-nohistory",
-    title="LAMMPS linear_nohistory",
-    year=2019,
-    equation="f = min(xₜ c_n |g|, μ |F|) sgn g",
-    reference=f"{LAMMPS_REFERENCE} linear_nohistory",
-    kind="dashpot",
-    evidence=Evidence("seen", LAMMPS, note=YEAR_NOT_SEEN),
-    parameters=(XT, limit("abs")),
-    damping="xt",
+LAMMPS_MINDLIN = tuple(
+    lammps(
+        option,
+        f"{equation},  a = √(R* δ),  {LAMMPS_LIMIT}",
+        *MINDLIN_STIFFNESS,
+        hint=", whose coefficient [Pa] is k_t/√R*, NULL for 8 G*",
+        source=f"{LAMMPS}, and gran_sub_mod.cpp @07b704ca (2026)",
+        kind="spring",
+        stiffness="mindlin",
+        memory=memory,
+    )
+    for option, equation, memory in (
+        ("mindlin", "f = 8 G* a ξ + xₜ c_n g,  ξ̇ = g", (1.0, 1.0)),
+        ("mindlin/force", "f = f_e + xₜ c_n g,  ḟ_e = 8 G* a g", (0.0, 0.0)),
+        ("mindlin_rescale", "f = 8 G* a ξ + xₜ c_n g,  ξ̇ = g,  and ξ ∝ a on unloading", (1.0, 2.0)),
+        ("mindlin_rescale/force", "f = f_e + xₜ c_n g,  ḟ_e = 8 G* a g,  and f_e ∝ a on unloading", (0.0, 1.0)),
+    )
 )
 
 # only a fixed step has the displacement that a slip leaves
 LAMMPS_CLASSIC = replace(
-    LAMMPS_MINDLIN,
+    LAMMPS_MINDLIN[0],
     key="lammps-classic-2025",
     title="LAMMPS fix wall/gran hooke/history and hertz/history (22 July 2025)",
     year=2025,

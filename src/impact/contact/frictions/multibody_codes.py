@@ -11,7 +11,7 @@ from ..friction import FrictionLaw
 from ..model import Parameter
 from ..models.cited_sources import SIMBODY
 from ..models.multibody_codes import MUJOCO_SOLREF, SIMBODY_HUNT_CROSSLEY as SIMBODY_FORCE
-from .parameters import limit
+from .textbook import limit
 
 DYNAMIC_FRICTION = Parameter(
     "mu_d", "1", "dynamic coefficient of friction, at most μ, which is the static one", least=0.0, optional=True
