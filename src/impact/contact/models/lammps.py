@@ -61,19 +61,23 @@ def renamed(pulling: ForceModel, limited: ForceModel) -> MakeLaw:
 
 
 def with_and_without_limit(
-    key: str,
     option: str,
-    since: str,
-    year: int,
-    equation: str,
+    damping: str,
     make: MakeLaw,
+    *,
+    key: str = "",
+    since: str = "since March 2019",
+    year: int = 2019,
     source: str = DAMPING_KERNEL_SOURCE,
     note: str = "",
 ) -> Iterator[ForceModel]:
     """Make the laws of one option of LAMMPS: the default, and the one with limit_damping.
 
-    `since` names the releases that have it, `year` is that of the first; `make` gets the key and the release.
+    `since` names the releases that have it, `year` is that of the first; `make` gets the key and the release. By
+    default the key is that of the option.
     """
+    key = key or re.sub("[_, ]+", "-", f"lammps-{option}")
+    spring = "F = K δ" if option.endswith("hooke") else "F = K δ^(3/2)"
     # limit_damping is newer than the oldest of these options
     limited = re.sub(r"(March )?2019", f"April {LIMIT_YEAR}", since)
     for release, suffix, keywords, end, releases, first_year in (
@@ -85,7 +89,7 @@ def with_and_without_limit(
             release=release,
             title=f"LAMMPS {keywords} ({releases})",
             year=first_year,
-            equation=f"{equation}, to {end}",
+            equation=f"{spring} + {damping}, to {end}",
             reference="LAMMPS, pair style granular",
             evidence=Evidence("seen", source, note=note),
             family="codes",
@@ -125,7 +129,6 @@ def viscoelastic(exponent: float) -> MakeLaw:
     )
 
 
-OLD_RELEASES = "releases from March 2019 to mid-2026"
 NOTE_WITHOUT_ROOT = (
     "where e = 0.5 is asked for LAMMPS itself delivers 0.616 with hertz, 0.581 with hooke, by default"
 )
@@ -133,64 +136,56 @@ NOTE_WITH_ROOT = (
     "the source credits the polynomial to Marshall (2009), equation 53; the factor √2 is of pull request 5113, "
     "and the first release with it was not seen"
 )
-HOOKE_SPRING, HERTZ_SPRING = "F = K δ", "F = K δ^(3/2)"
 LOGARITHM = "−ln e/√(π² + ln² e)"
+WITH_ROOT: dict[str, Any] = {
+    "since": "sources of July 2026",
+    "year": 2026,
+    "source": DAMPING_SOURCE,
+    "note": NOTE_WITH_ROOT,
+}
+WITHOUT_ROOT: dict[str, Any] = {
+    "since": "releases from March 2019 to mid-2026",
+    "source": DAMPING_SOURCE_2024,
+    "note": NOTE_WITHOUT_ROOT,
+}
+COEFF_RESTITUTION: dict[str, Any] = {"since": "since June 2024", "year": 2024, "source": DAMPING_SOURCE}
 
 LAMMPS_MODELS: tuple[ForceModel, ...] = (
+    *with_and_without_limit("velocity, hooke", "C δ̇", renamed(KELVIN_VOIGT, KELVIN_VOIGT_NO_TENSION)),
     *with_and_without_limit(
-        "lammps-velocity-hooke", "velocity, hooke", "since March 2019", 2019, f"{HOOKE_SPRING} + C δ̇",
-        renamed(KELVIN_VOIGT, KELVIN_VOIGT_NO_TENSION),
+        "velocity, hertz", "C δ̇", partial(drag, c=lambda C: C, q=0.0, parameters=DASHPOT_CONSTANT, exponent=1.5),
     ),
     *with_and_without_limit(
-        "lammps-velocity-hertz", "velocity, hertz", "since March 2019", 2019, f"{HERTZ_SPRING} + C δ̇",
-        partial(drag, c=lambda C: C, q=0.0, parameters=DASHPOT_CONSTANT, exponent=1.5),
-    ),
-    *with_and_without_limit(
-        "lammps-mass-velocity-hooke", "mass_velocity, hooke", "since 2019", 2019, f"{HOOKE_SPRING} + γ m δ̇",
+        "mass_velocity, hooke", "γ m δ̇",
         partial(
             dashpot, zeta=lambda gamma, m, K: 0.5 * gamma * np.sqrt(m / K), parameters=MASS_VELOCITY, exponent=1.0
         ),
+        since="since 2019",
+    ),
+    *with_and_without_limit("mass_velocity, hertz", "γ m δ̇", mass_velocity_hertz, since="since 2019"),
+    *with_and_without_limit("viscoelastic, hooke", "η m √(R* δ) δ̇", viscoelastic(1.0)),
+    *with_and_without_limit(
+        "viscoelastic, hertz", "η m √(R* δ) δ̇", viscoelastic(1.5), note="pair style gran/hertz/history has it too",
+    ),
+    *with_and_without_limit("tsuji, hooke", "α √(m K) δ̇,  α = √2 p(e)", tsuji(np.sqrt(2.0), 1.0), **WITH_ROOT),
+    *with_and_without_limit(
+        "tsuji, hooke", "α √(m K) δ̇,  α = p(e)", tsuji(1.0, 1.0),
+        key="lammps-tsuji-hooke-without-root", **WITHOUT_ROOT,
     ),
     *with_and_without_limit(
-        "lammps-mass-velocity-hertz", "mass_velocity, hertz", "since 2019", 2019, f"{HERTZ_SPRING} + γ m δ̇",
-        mass_velocity_hertz,
+        "tsuji, hertz", "α √(m K) δ^(1/4) δ̇,  α = √2 p(e), p of degree six", tsuji(np.sqrt(2.0), 1.5),
+        key="lammps-tsuji", **WITH_ROOT,
     ),
     *with_and_without_limit(
-        "lammps-viscoelastic-hooke", "viscoelastic, hooke", "since March 2019", 2019,
-        f"{HOOKE_SPRING} + η m √(R* δ) δ̇", viscoelastic(1.0),
+        "tsuji, hertz", "α √(m K) δ^(1/4) δ̇,  α = p(e), p of degree six", tsuji(1.0, 1.5),
+        key="lammps-tsuji-without-root", **WITHOUT_ROOT,
     ),
     *with_and_without_limit(
-        "lammps-viscoelastic-hertz", "viscoelastic, hertz", "since March 2019", 2019,
-        f"{HERTZ_SPRING} + η m √(R* δ) δ̇", viscoelastic(1.5), note="pair style gran/hertz/history has it too",
+        "coeff_restitution, hooke", f"2 ζ √(m K) δ̇,  ζ = {LOGARITHM}",
+        renamed(ANAGNOSTOPOULOS_1988, ANAGNOSTOPOULOS_1988_NO_TENSION), **COEFF_RESTITUTION,
     ),
     *with_and_without_limit(
-        "lammps-tsuji-hooke", "tsuji, hooke", "sources of July 2026", 2026,
-        f"{HOOKE_SPRING} + α √(m K) δ̇,  α = √2 p(e)",
-        tsuji(np.sqrt(2.0), 1.0), DAMPING_SOURCE, NOTE_WITH_ROOT,
-    ),
-    *with_and_without_limit(
-        "lammps-tsuji-hooke-without-root", "tsuji, hooke", OLD_RELEASES, 2019,
-        f"{HOOKE_SPRING} + α √(m K) δ̇,  α = p(e)",
-        tsuji(1.0, 1.0), DAMPING_SOURCE_2024, NOTE_WITHOUT_ROOT,
-    ),
-    *with_and_without_limit(
-        "lammps-tsuji", "tsuji, hertz", "sources of July 2026", 2026,
-        f"{HERTZ_SPRING} + α √(m K) δ^(1/4) δ̇,  α = √2 p(e), p of degree six",
-        tsuji(np.sqrt(2.0), 1.5), DAMPING_SOURCE, NOTE_WITH_ROOT,
-    ),
-    *with_and_without_limit(
-        "lammps-tsuji-without-root", "tsuji, hertz", OLD_RELEASES, 2019,
-        f"{HERTZ_SPRING} + α √(m K) δ^(1/4) δ̇,  α = p(e), p of degree six",
-        tsuji(1.0, 1.5), DAMPING_SOURCE_2024, NOTE_WITHOUT_ROOT,
-    ),
-    *with_and_without_limit(
-        "lammps-coeff-restitution-hooke", "coeff_restitution, hooke", "since June 2024", 2024,
-        f"{HOOKE_SPRING} + 2 ζ √(m K) δ̇,  ζ = {LOGARITHM}",
-        renamed(ANAGNOSTOPOULOS_1988, ANAGNOSTOPOULOS_1988_NO_TENSION), DAMPING_SOURCE,
-    ),
-    *with_and_without_limit(
-        "lammps-coeff-restitution-hertz", "coeff_restitution, hertz", "since June 2024", 2024,
-        f"{HERTZ_SPRING} + α √(m K) δ^(1/4) δ̇,  α = √5 ζ,  ζ = {LOGARITHM}",
-        renamed(TSUJI_1992, TSUJI_1992_NO_TENSION), DAMPING_SOURCE,
+        "coeff_restitution, hertz", f"α √(m K) δ^(1/4) δ̇,  α = √5 ζ,  ζ = {LOGARITHM}",
+        renamed(TSUJI_1992, TSUJI_1992_NO_TENSION), **COEFF_RESTITUTION,
     ),
 )  # fmt: skip
