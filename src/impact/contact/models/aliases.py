@@ -18,11 +18,14 @@ def same_law(law: ForceModel, key: str, *, doi: str = "", **about: Any) -> Force
 
 
 def in_code(
-    law: ForceModel, key: str, title: str, year: int, reference: str, source: str, note: str = ""
+    code: str, law: ForceModel, key: str, title: str, year: int, reference: str, source: str, note: str = ""
 ) -> ForceModel:
-    """Make a law of the catalogue under the name that a code has for it, with the law's own rule for K."""
-    evidence = Evidence("seen", source, note=note)
-    return same_law(law, key, title=title, year=year, reference=reference, evidence=evidence, family="codes")
+    """Make a law of the catalogue under the name that a code has for it, with the law's own rule for K.
+
+    The key and the title of the law begin with the name of the code.
+    """
+    about: dict[str, Any] = {"year": year, "reference": reference, "evidence": Evidence("seen", source, note=note)}
+    return same_law(law, f"{code.lower()}-{key}", title=f"{code} {title}", family="codes", **about)
 
 
 MARHEFKA_ORIN_1999 = same_law(

@@ -11,7 +11,7 @@ from ..closed_forms.dashpot import force_damping, gap_damping
 from ..evidence import Evidence
 from ..model import Parameter
 from ..powers import power
-from .aliases import in_code
+from .aliases import in_code, same_law
 from .cited_sources import CHRONO, DEMLAB_VISCOELASTIC, KRATOS, LIGGGHTS, YADE_2025
 from .dashpot import (
     ANAGNOSTOPOULOS_1988,
@@ -47,22 +47,13 @@ def stiffness_by_speed(E_eff: Array, R_eff: Array, m: Array, vc: Array) -> Array
 # ---- LIGGGHTS
 
 LIGGGHTS_REFERENCE = "LIGGGHTS-PUBLIC, pair style gran, model"
+OF_HERTZ = f"{LIGGGHTS_REFERENCE} hertz", f"{LIGGGHTS}normal_model_hertz.h"
+OF_HOOKE = f"{LIGGGHTS_REFERENCE} hooke, without the option viscous", f"{LIGGGHTS}normal_model_hooke.h"
+in_liggghts = partial(in_code, "LIGGGHTS")
 
-LIGGGHTS_HERTZ = in_code(
-    TSUJI_1992,
-    "liggghts-hertz",
-    "LIGGGHTS hertz (3.0.0 to 3.8.0)",
-    2014,
-    f"{LIGGGHTS_REFERENCE} hertz",
-    f"{LIGGGHTS}normal_model_hertz.h",
-)
-LIGGGHTS_HERTZ_LIMIT = in_code(
-    TSUJI_1992_NO_TENSION,
-    "liggghts-hertz-limit-force",
-    "LIGGGHTS hertz, limitForce (3.0.0 to 3.8.0)",
-    2014,
-    f"{LIGGGHTS_REFERENCE} hertz",
-    f"{LIGGGHTS}normal_model_hertz.h",
+LIGGGHTS_HERTZ = in_liggghts(TSUJI_1992, "hertz", "hertz (3.0.0 to 3.8.0)", 2014, *OF_HERTZ)
+LIGGGHTS_HERTZ_LIMIT = in_liggghts(
+    TSUJI_1992_NO_TENSION, "hertz-limit-force", "hertz, limitForce (3.0.0 to 3.8.0)", 2014, *OF_HERTZ
 )
 
 LIGGGHTS_HOOKE = linear_dashpot(
@@ -70,8 +61,8 @@ LIGGGHTS_HOOKE = linear_dashpot(
     title="LIGGGHTS hooke (3.0.0 to 3.8.0)",
     year=2014,
     equation=f"{LINEAR_DASHPOT},  {ZETA_BY_LOGARITHM}, to δ = 0;  {STIFFNESS_BY_SPEED}",
-    reference=f"{LIGGGHTS_REFERENCE} hooke, without the option viscous",
-    evidence=Evidence("seen", f"{LIGGGHTS}normal_model_hooke.h"),
+    reference=OF_HOOKE[0],
+    evidence=Evidence("seen", OF_HOOKE[1]),
     parameters=CHARACTERISTIC_SPEED,
     zeta=gap_damping,
     release="gap",
@@ -88,13 +79,8 @@ CHRONO_SMC_HOOKE = with_release(
     evidence=Evidence("seen", CHRONO, note="the multicore solver does not cut the tension off"),
 )
 
-LIGGGHTS_HOOKE_LIMIT = in_code(
-    CHRONO_SMC_HOOKE,
-    "liggghts-hooke-limit-force",
-    "LIGGGHTS hooke, limitForce (3.0.0 to 3.8.0)",
-    2014,
-    f"{LIGGGHTS_REFERENCE} hooke, without the option viscous",
-    f"{LIGGGHTS}normal_model_hooke.h",
+LIGGGHTS_HOOKE_LIMIT = in_liggghts(
+    CHRONO_SMC_HOOKE, "hooke-limit-force", "hooke, limitForce (3.0.0 to 3.8.0)", 2014, *OF_HOOKE
 )
 
 # ---- Lethe
@@ -104,9 +90,10 @@ LETHE = (
     "@8bf81c3b, doc/source/theory/dem/dem.rst @023e4352"
 )
 LETHE_LAWS = tuple(
-    in_code(
-        law, key, f"Lethe, {method} (2026)", 2020, "Lethe, particle particle contact force method", LETHE,
-        f"its year is that of the licence; {note}",
+    same_law(
+        law, key, title=f"Lethe, {method} (2026)", year=2020, family="codes",
+        reference="Lethe, particle particle contact force method",
+        evidence=Evidence("seen", LETHE, note=f"its year is that of the licence; {note}"),
     )
     for law, key, method, note in (
         (TSUJI_1992, "lethe-hertz", "hertz and hertz_mindlin_limit_overlap, _force", "its K is 3e-5 smaller"),
@@ -117,9 +104,10 @@ LETHE_LAWS = tuple(
 # ---- Chrono
 
 CHRONO_HERTZ = in_code(
+    "Chrono",
     TSUJI_1992_NO_TENSION,
-    "chrono-smc-hertz",
-    "Chrono SMC, Hertz (sequential core, 2016 to 2026)",
+    "smc-hertz",
+    "SMC, Hertz (sequential core, 2016 to 2026)",
     2016,
     "Project Chrono, ChContactSMC",
     CHRONO,
@@ -144,9 +132,49 @@ CHRONO_SMC_PLAINCOULOMB = hertzian_dashpot(
 
 # ---- YADE
 
-HERTZ_MINDLIN = "YADE, Law2_ScGeom_MindlinPhys_Mindlin"
-MINDLIN_SOURCE = f"{YADE_2025}, HertzMindlin.cpp"
-CLAMPED_SOURCE = "YADE, pkg/dem/HertzMindlin.cpp, commit 45c86581d (September 2013)"
+HERTZ_MINDLIN, VISCO_ELASTIC = "YADE, Law2_ScGeom_MindlinPhys_Mindlin", "YADE, Law2_ScGeom_ViscElPhys_Basic"
+MINDLIN, VISCO_PM = f"{YADE_2025}, HertzMindlin.cpp", f"{YADE_2025}, ViscoelasticPM.cpp"
+CLAMPED = "YADE, pkg/dem/HertzMindlin.cpp, commit 45c86581d (September 2013)"
+PULLING = "YADE, pkg/dem/HertzMindlin.cpp, commit ddb7a1a19 (January 2011)"
+WITH_LIMIT = "YADE, pkg/dem/ViscoelasticPM.cpp, commit fe8647e14 (January 2014), which adds the limit"
+EN_OF_TSUJI = f"{HERTZ_MINDLIN}, en, with the damping of Tsuji and others"
+EN_AT_SPEED, KN_AND_CN = f"{HERTZ_MINDLIN}, en at the speed vn", f"{VISCO_ELASTIC}, kn and cn"
+in_yade = partial(in_code, "YADE")
+
+YADE_RENAMED = (
+    in_yade(
+        TSUJI_1992_NO_TENSION,
+        "en-clamped",
+        "HertzMindlin en (September 2013 to 2022.01a)",
+        2013,
+        EN_OF_TSUJI,
+        CLAMPED,
+    ),
+    in_yade(TSUJI_1992, "en-pulling", "HertzMindlin en (2011 to September 2013)", 2011, EN_OF_TSUJI, PULLING),
+    in_yade(
+        KUWABARA_KONO_AT_SPEED,
+        "en-at-speed",
+        "HertzMindlin en and vn (since 2024.02a)",
+        2024,
+        EN_AT_SPEED,
+        MINDLIN,
+    ),
+    in_yade(
+        KELVIN_VOIGT_NO_TENSION, "viscoelastic", "viscoelastic (since January 2014)", 2014, KN_AND_CN, VISCO_PM
+    ),
+    in_yade(
+        KELVIN_VOIGT, "viscoelastic-pulling", "viscoelastic (2009 to January 2014)", 2009, KN_AND_CN, WITH_LIMIT
+    ),
+    in_yade(
+        SCHWAGER_POSCHEL_2007,
+        "viscoelastic-en",
+        "viscoelastic, en with young (since June 2015)",
+        2015,
+        f"{VISCO_ELASTIC}, en with young and poisson",
+        VISCO_PM,
+        "YADE finds the damping to 1 % of en, this law exactly",
+    ),
+)
 
 YADE_EN = hertzian_dashpot(
     "yade-en",
@@ -154,42 +182,17 @@ YADE_EN = hertzian_dashpot(
     year=2023,
     equation=THORNTON_EQUATION.replace("to F = 0", "β = 0 at e = 1, to F = 0"),
     reference=f"{HERTZ_MINDLIN}, en, by (B6), (B7) and Table 2 of Thornton, Cummins and Cleary (2013)",
-    evidence=Evidence("seen", MINDLIN_SOURCE),
+    evidence=Evidence("seen", MINDLIN),
     zeta=lambda e: np.where(e < 1.0, thornton_zeta(np.minimum(e, np.nextafter(1.0, 0.0))), 0.0),
     release="force",
 )
-YADE_EN_CLAMPED = in_code(
-    TSUJI_1992_NO_TENSION,
-    "yade-en-clamped",
-    "YADE HertzMindlin en (September 2013 to 2022.01a)",
-    2013,
-    f"{HERTZ_MINDLIN}, en, with the damping of Tsuji and others",
-    CLAMPED_SOURCE,
-)
-YADE_EN_PULLING = in_code(
-    TSUJI_1992,
-    "yade-en-pulling",
-    "YADE HertzMindlin en (2011 to September 2013)",
-    2011,
-    f"{HERTZ_MINDLIN}, en, with the damping of Tsuji and others",
-    "YADE, pkg/dem/HertzMindlin.cpp, commit ddb7a1a19 (January 2011)",
-)
-YADE_EN_AT_SPEED = in_code(
-    KUWABARA_KONO_AT_SPEED,
-    "yade-en-at-speed",
-    "YADE HertzMindlin en and vn (since 2024.02a)",
-    2024,
-    f"{HERTZ_MINDLIN}, en at the speed vn",
-    MINDLIN_SOURCE,
-)
-
 YADE_BETAN = hertzian_dashpot(
     "yade-betan",
     title="YADE HertzMindlin betan, by the traditional formula (since September 2013)",
     year=2013,
     equation=f"{TANGENT_DASHPOT},  β = −ln e/√(π² + ln² e), to F = 0",
     reference=f"{HERTZ_MINDLIN}, betan, which YADE leaves to the user, by the formula of a linear spring",
-    evidence=Evidence("seen", MINDLIN_SOURCE),
+    evidence=Evidence("seen", MINDLIN),
     # 2 β √(3/2) is α
     zeta=lambda e: np.sqrt(1.2) * gap_damping(e),
     release="force",
@@ -200,7 +203,7 @@ YADE_BETAN_PULLING = with_release(
     key="yade-betan-pulling",
     title="YADE HertzMindlin betan, by the traditional formula (2010 to September 2013)",
     year=2010,
-    evidence=Evidence("seen", f"{CLAMPED_SOURCE}, whose removed lines pull"),
+    evidence=Evidence("seen", f"{CLAMPED}, whose removed lines pull"),
 )
 YADE_BETAN_DIRECT = hertzian_dashpot(
     "yade-betan-direct",
@@ -208,44 +211,17 @@ YADE_BETAN_DIRECT = hertzian_dashpot(
     year=2013,
     equation=f"{TANGENT_DASHPOT}, to F = 0",
     reference=f"{HERTZ_MINDLIN}, betan",
-    evidence=Evidence("seen", MINDLIN_SOURCE),
+    evidence=Evidence("seen", MINDLIN),
     parameters=(Parameter("betan", "1", "damping ratio β of the tangent stiffness", least=0.0, is_damping=True),),
     zeta=lambda betan: np.sqrt(1.2) * betan,
     release="force",
-)
-
-VISCO_ELASTIC = "YADE, Law2_ScGeom_ViscElPhys_Basic"
-YADE_VISCOELASTIC = in_code(
-    KELVIN_VOIGT_NO_TENSION,
-    "yade-viscoelastic",
-    "YADE viscoelastic (since January 2014)",
-    2014,
-    f"{VISCO_ELASTIC}, kn and cn",
-    f"{YADE_2025}, ViscoelasticPM.cpp",
-)
-YADE_VISCOELASTIC_PULLING = in_code(
-    KELVIN_VOIGT,
-    "yade-viscoelastic-pulling",
-    "YADE viscoelastic (2009 to January 2014)",
-    2009,
-    f"{VISCO_ELASTIC}, kn and cn",
-    "YADE, pkg/dem/ViscoelasticPM.cpp, commit fe8647e14 (January 2014), which adds the limit",
-)
-YADE_VISCOELASTIC_EN = in_code(
-    SCHWAGER_POSCHEL_2007,
-    "yade-viscoelastic-en",
-    "YADE viscoelastic, en with young (since June 2015)",
-    2015,
-    f"{VISCO_ELASTIC}, en with young and poisson",
-    f"{YADE_2025}, ViscoelasticPM.cpp",
-    "YADE finds the damping to 1 % of en, this law exactly",
 )
 
 # ---- MFiX
 
 MFIX = "soufiane92/MFiX-21.3.2, model/check_data/check_solids_dem.f and model/des/calc_force_dem.f @e8a0d92 (2021)"
 MFIX_LSD = in_code(
-    ANAGNOSTOPOULOS_1988, "mfix-lsd", "MFiX DEM, LSD (2016 to 21.3.2)", 2016, "MFiX, DES_COLL_MODEL LSD", MFIX
+    "MFiX", ANAGNOSTOPOULOS_1988, "lsd", "DEM, LSD (2016 to 21.3.2)", 2016, "MFiX, DES_COLL_MODEL LSD", MFIX
 )
 MFIX_HERTZ = hertzian_dashpot(
     "mfix-hertz",
@@ -301,9 +277,10 @@ KRATOS_LINEAR = linear_dashpot(
 # ---- MercuryDPM and DEMLab
 
 MERCURYDPM_LINEAR = in_code(
+    "MercuryDPM",
     ANAGNOSTOPOULOS_1988,
-    "mercurydpm-linear-viscoelastic",
-    "MercuryDPM LinearViscoelastic (state of 2015)",
+    "linear-viscoelastic",
+    "LinearViscoelastic (state of 2015)",
     2013,
     "MercuryDPM, kernel",
     "gladk/MercuryDPM, Kernel/Interactions/NormalForceInteractions/LinearViscoelasticInteraction.cc @c50970e "

@@ -1,4 +1,4 @@
-"""Laws of multibody and robotics codes, in the parameters that those codes use.
+"""Laws of multibody, robotics and structural codes, in the parameters that those codes use.
 
 Where the user sets no K it is that of equation (12), or follows the code's own rule.
 """
@@ -14,10 +14,19 @@ from ..closed_forms.dashpot import force_restitution, limited_restitution
 from ..evidence import Evidence
 from ..model import ForceModel, Parameter
 from ..powers import power, powers
-from .aliases import in_code
-from .asymmetric import approach_dashpot
-from .cited_sources import MAPLESIM_HELP, MBDYN, MODIA3D_DOCUMENTATION, SIMBODY
+from .aliases import in_code, same_law
+from .asymmetric import JANKOWSKI_2006, approach_dashpot
+from .cited_sources import (
+    IMPACT_MATERIAL,
+    MAPLESIM_HELP,
+    MBDYN,
+    MODIA3D_DOCUMENTATION,
+    OPENSEES_HERTZDAMP,
+    OPENSEES_JANKOWSKI,
+    SIMBODY,
+)
 from .dashpot import KELVIN_VOIGT_NO_TENSION
+from .finite_element_fits import MUTHUKUMAR_2003
 from .hysteresis import (
     CARVALHO_MARTINS_2019,
     FLORES_2011,
@@ -218,14 +227,15 @@ MODELICA_ELASTOGAP = ForceModel(
     family="codes",
 )
 
-MAPLESIM_LINEAR = in_code(
+MAPLESIM_EVIDENCE = Evidence("seen", MAPLESIM_HELP, note="its first year was not seen")
+MAPLESIM_LINEAR = same_law(
     KELVIN_VOIGT_NO_TENSION,
     "maplesim-linear",
-    "MapleSim, linear",
-    2015,
-    "MapleSim, contact of the linear spring and damper",
-    MAPLESIM_HELP,
-    "its first year was not seen",
+    title="MapleSim, linear",
+    year=2015,
+    reference="MapleSim, contact of the linear spring and damper",
+    evidence=MAPLESIM_EVIDENCE,
+    family="codes",
 )
 
 MAPLESIM_LIMITED = replace(
@@ -235,7 +245,7 @@ MAPLESIM_LIMITED = replace(
     year=2015,
     equation="F = max(0, K δ + min(d δ̇, K δ))",
     reference="MapleSim, contact of the linear spring with a limited damper, its default",
-    evidence=Evidence("seen", MAPLESIM_HELP, note="its first year was not seen"),
+    evidence=MAPLESIM_EVIDENCE,
     oracle=lambda d, m, K: limited_restitution(d / (2 * np.sqrt(m * K))),
     exponent=1.0,
 )
@@ -376,12 +386,13 @@ SIMSCAPE_CONTACT = ForceModel(
 )
 
 
-def in_mbdyn(law: ForceModel, key: str, formulation: str) -> ForceModel:
+def in_mbdyn(law: ForceModel, formulation: str) -> ForceModel:
     """Make a law of the catalogue under its name in MBDyn."""
     return in_code(
+        "MBDyn",
         law,
-        key,
-        f"MBDyn continuous contact, {formulation} (since 1.5.0)",
+        formulation.replace(" ", "-"),
+        f"continuous contact, {formulation} (since 1.5.0)",
         2015,
         f"MBDyn, module-cont-contact, law continuous contact, formulation {formulation}; no damping at a speed of "
         "contact up to EpsPrimeTol, by default 1e-6",
@@ -390,9 +401,9 @@ def in_mbdyn(law: ForceModel, key: str, formulation: str) -> ForceModel:
     )
 
 
-MBDYN_FLORES = in_mbdyn(FLORES_2011, "mbdyn-flores", "flores")
-MBDYN_HUNT_CROSSLEY = in_mbdyn(HUNT_CROSSLEY_1975, "mbdyn-hunt-crossley", "hunt crossley")
-MBDYN_LANKARANI_NIKRAVESH = in_mbdyn(LANKARANI_NIKRAVESH_1990, "mbdyn-lankarani-nikravesh", "lankarani nikravesh")
+MBDYN_FLORES = in_mbdyn(FLORES_2011, "flores")
+MBDYN_HUNT_CROSSLEY = in_mbdyn(HUNT_CROSSLEY_1975, "hunt crossley")
+MBDYN_LANKARANI_NIKRAVESH = in_mbdyn(LANKARANI_NIKRAVESH_1990, "lankarani nikravesh")
 
 CARVALHO_CHI, GONTHIER_CHI = (law.coefficients["chi"] for law in (CARVALHO_MARTINS_2019, GONTHIER_2004))
 
@@ -430,4 +441,37 @@ NEWTON_SEMI_IMPLICIT = approach_dashpot(
     zeta=lambda kd, m, K: kd / (2 * np.sqrt(m * K)),
     exponent=1.0,
     family="codes",
+)
+
+
+def in_opensees(law: ForceModel, key: str, title: str, year: int, inputs: str, documented: str) -> ForceModel:
+    """Make a law for the pounding of buildings and bridges under the name of its material in OpenSees."""
+    file = f"SRC/material/uniaxial/{title.partition(',')[0]}.cpp"
+    source = f"OpenSees/OpenSees, {file} @2890cb36f (2026), the force; {documented}"
+    return in_code("OpenSees", law, key, title, year, f"OpenSees, {file} by {inputs}", source)
+
+
+OPENSEES_HERTZDAMP_MATERIAL = in_opensees(
+    FLORES_2011,
+    "hertzdamp",
+    "Hertzdamp, as its documentation recommends (since 2020)",
+    2019,
+    "PJ Hughes, whose input xiNorm is χ; recommended is 8(1 − e)/(5e)",
+    f"{OPENSEES_HERTZDAMP}, the χ it recommends",
+)
+OPENSEES_JANKOWSKI_IMPACT = in_opensees(
+    JANKOWSKI_2006,
+    "jankowski-impact",
+    "JankowskiImpact, as its documentation recommends (since 2020)",
+    2019,
+    "PJ Hughes, whose input is ξ",
+    f"{OPENSEES_JANKOWSKI}, the ξ it recommends",
+)
+OPENSEES_IMPACT_MATERIAL = in_opensees(
+    MUTHUKUMAR_2003,
+    "impact-material",
+    "ImpactMaterial, with K₁, K₂ and δ_y of its documentation (since 2008)",
+    2008,
+    "M Dryden, whose inputs are K₁, K₂ and δ_y",
+    f"{IMPACT_MATERIAL}, its inputs",
 )
