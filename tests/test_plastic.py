@@ -10,7 +10,7 @@ import impact
 from impact.contact.impacts import Impacts
 from impact.contact.model import ForceModel, Parameter
 from impact.contact.models import find
-from impact.contact.models.finite_element_fits import softer_poisson_ratio
+from impact.contact.models.elastoplastic import softer_poisson_ratio
 from impact.contact.output_formulas import Outputs, collide
 from impact.contact.status import Status
 

@@ -106,7 +106,6 @@ def mass_velocity_hertz(key: str, *, release: str, **about: Any) -> ForceModel:
         q=0.0,
         release="gap",
         parameters=MASS_VELOCITY,
-        exponent=1.5,
         **about,
     )
 
@@ -153,7 +152,7 @@ COEFF_RESTITUTION: dict[str, Any] = {"since": "since June 2024", "year": 2024, "
 LAMMPS_MODELS: tuple[ForceModel, ...] = (
     *with_and_without_limit("velocity, hooke", "C δ̇", renamed(KELVIN_VOIGT, KELVIN_VOIGT_NO_TENSION)),
     *with_and_without_limit(
-        "velocity, hertz", "C δ̇", partial(drag, c=lambda C: C, q=0.0, parameters=DASHPOT_CONSTANT, exponent=1.5),
+        "velocity, hertz", "C δ̇", partial(drag, c=lambda C: C, q=0.0, parameters=DASHPOT_CONSTANT),
     ),
     *with_and_without_limit(
         "mass_velocity, hooke", "γ m δ̇",

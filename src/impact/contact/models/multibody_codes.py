@@ -26,7 +26,7 @@ from .cited_sources import (
     SIMBODY,
 )
 from .dashpot import KELVIN_VOIGT_NO_TENSION
-from .finite_element_fits import MUTHUKUMAR_2003
+from .elastoplastic import MUTHUKUMAR_2003
 from .hysteresis import (
     CARVALHO_MARTINS_2019,
     FLORES_2011,

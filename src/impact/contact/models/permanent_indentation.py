@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..evidence import Evidence
@@ -31,7 +33,8 @@ LANKARANI_NIKRAVESH_1994 = ForceModel(
     family="permanent",
 )
 
-GHARIB_HURMUZLU_2012_ENERGETIC = ForceModel(
+GHARIB_HURMUZLU_2012_ENERGETIC = replace(
+    LANKARANI_NIKRAVESH_1994,
     key="gharib-hurmuzlu-2012-energetic",
     title="Gharib and Hurmuzlu, energetic",
     year=2012,
@@ -45,12 +48,8 @@ GHARIB_HURMUZLU_2012_ENERGETIC = ForceModel(
         doi=GHARIB_HURMUZLU,
         note="(39) as printed has K in the place of Kᵣ",
     ),
-    force=spring,
     coefficients={"Kr": lambda K, n, e: K / power(e * e, n)},
     unloading=unload_with_stiffness,
-    recovered=lambda e, peak: peak * (e * e),
-    oracle=lambda e: e,
-    family="permanent",
 )
 
 BILINEAR = ForceModel(
@@ -75,20 +74,17 @@ BILINEAR = ForceModel(
     family="permanent",
 )
 
-ISMAIL_STRONGE_2008 = ForceModel(
+ISMAIL_STRONGE_2008 = replace(
+    BILINEAR,
     key="ismail-stronge-2008",
     title="Ismail and Stronge",
     year=2008,
     equation="F = K δ, then F = Kᵣ(δ − δₚ),  Kᵣ = γ² K,  e = 1/γ  (43)",
     reference="Ismail KA, Stronge WJ (2008) Impact of viscoplastic bodies: dissipation and restitution. "
     "J. Appl. Mech. 75, 061011",
+    doi="",
     evidence=Evidence("seen", f"{GHARIB_HURMUZLU}, equation (43)", note="the paper itself was not seen"),
     parameters=(Parameter("gamma", "1", "plastic loss factor γ", 2.0, 1.0),),
-    exponent=1.0,
-    force=spring,
     coefficients={"Kr": lambda K, gamma: gamma * gamma * K},
-    unloading=unload_with_stiffness,
-    recovered=lambda K, Kr, peak: peak * (K / Kr),
     oracle=lambda gamma: np.divide(1.0, gamma),
-    family="permanent",
 )

@@ -18,12 +18,13 @@ def drag(
     *,
     c: Formula,
     q: float,
-    release: Literal["gap", "force"],
+    release: Literal["gap", "force"] = "force",
     coordinate_power: int = 2,
     **about: Unpack[About],
 ) -> ForceModel:
-    """Make a law of the form F = K δⁿ + c δ^q δ̇."""
+    """Make a law of the form F = K δⁿ + c δ^q δ̇, n = 3/2 by default."""
     about.setdefault("family", "rate-dependent")
+    about.setdefault("exponent", 1.5)
     return ForceModel(
         key,
         **about,
@@ -51,10 +52,8 @@ KUWABARA_KONO_1987 = drag(
         doi=DEMLAB_VISCOELASTIC,
     ),
     parameters=(Parameter("A", "s", "dissipative constant of the material", least=0.0, is_damping=True),),
-    exponent=1.5,
     c=lambda A, K: 1.5 * A * K,
     q=0.5,
-    release="force",
 )
 
 LEE_HERRMANN_1993 = drag(
@@ -67,10 +66,8 @@ LEE_HERRMANN_1993 = drag(
     doi="10.1088/0305-4470/26/2/021",
     evidence=Evidence("seen", DEMLAB_VISCOELASTIC, doi=DEMLAB_VISCOELASTIC),
     parameters=(Parameter("gamma", "1/s", "damping γ per effective mass", least=0.0, is_damping=True),),
-    exponent=1.5,
     c=lambda gamma, m: gamma * m,
     q=0.0,
-    release="force",
 )
 
 KUWABARA_KONO_AT_SPEED = drag(
@@ -90,11 +87,9 @@ KUWABARA_KONO_AT_SPEED = drag(
         note="delivers e at the speed v_e to 7e-4",
     ),
     parameters=(Parameter("ve", "m/s", "closing speed v_e at which e is wanted", default=1.0, least=1e-9),),
-    exponent=1.5,
     # A K (3/2), with g = w² of the speed v_e
     c=lambda e, ve, m, K: pade_damping(e) * m * power(K / m, 0.6) / power(ve, 0.2),
     q=0.5,
-    release="force",
 )
 
 HERTZ_POWER_DAMPING = ForceModel(
@@ -129,9 +124,7 @@ BORDBAR_HYPPANEN_2007 = drag(
         "0.65 is the same",
     ),
     parameters=(Parameter("C", "N s/m^1.65", "damping constant", least=0.0, is_damping=True),),
-    exponent=1.5,
     c=lambda C: C,
     q=0.65,
-    release="force",
     coordinate_power=4,
 )
