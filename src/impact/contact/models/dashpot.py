@@ -7,6 +7,7 @@ Such a force pulls before the balls separate, so that the end of the contact is 
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import Any, Literal, Unpack
 
 import numpy as np
@@ -75,7 +76,9 @@ LINEAR_DASHPOT = "F = K δ + 2 ζ √(m K) δ̇"
 HERTZIAN_DASHPOT = "F = K δ^(3/2) + α √(m K) δ^(1/4) δ̇"
 GENERAL_DASHPOT = "F = K δⁿ + α √(m K) δ^((n−1)/2) δ̇"
 ZETA_BY_LOGARITHM = "ζ = −ln e/√(π² + ln² e)"
-DASHPOT_CONSTANT = (Parameter("C", "N s/m", "damping constant of the dashpot", least=0.0, is_damping=True),)
+# a parameter that sets the restitution of a law without an e
+damping = partial(Parameter, least=0.0, is_damping=True)
+DASHPOT_CONSTANT = (damping("C", "N s/m", "damping constant of the dashpot"),)
 # coefficients of the polynomial p(e) of Thornton, Cummins and Cleary, from the zeroth power of e
 THORNTON_POLYNOMIAL = (
     -6.918798, -16.41105, 146.8049, -796.4559, 2928.711, -7206.864, 11494.29, -11342.18, 6276.757, -1489.915,

@@ -24,6 +24,7 @@ from .dashpot import (
     TSUJI_1992,
     TSUJI_1992_NO_TENSION,
     ZETA_BY_LOGARITHM,
+    damping,
     dashpot,
     thornton_zeta,
     with_release,
@@ -212,7 +213,7 @@ YADE_BETAN_DIRECT = hertzian_dashpot(
     equation=f"{TANGENT_DASHPOT}, to F = 0",
     reference=f"{HERTZ_MINDLIN}, betan",
     evidence=Evidence("seen", MINDLIN),
-    parameters=(Parameter("betan", "1", "damping ratio β of the tangent stiffness", least=0.0, is_damping=True),),
+    parameters=(damping("betan", "1", "damping ratio β of the tangent stiffness"),),
     zeta=lambda betan: np.sqrt(1.2) * betan,
     release="force",
 )

@@ -15,7 +15,7 @@ import numpy as np
 
 from ...array_types import Array
 from ..evidence import Evidence
-from ..model import ForceModel, Parameter
+from ..model import ForceModel
 from .aliases import same_law
 from .dashpot import (
     ANAGNOSTOPOULOS_1988,
@@ -25,6 +25,7 @@ from .dashpot import (
     KELVIN_VOIGT_NO_TENSION,
     TSUJI_1992,
     TSUJI_1992_NO_TENSION,
+    damping,
     dashpot,
 )
 from .viscoelastic import LEE_HERRMANN_1993, drag
@@ -36,10 +37,8 @@ DAMPING_SOURCE = "lammps/lammps, src/GRANULAR/gran_sub_mod_damping.cpp @07b704ca
 DAMPING_SOURCE_2024 = "LAMMPS release of 29 August 2024, src/GRANULAR/gran_sub_mod_damping.cpp"
 # limit_damping: pull request 2698, first in patch_8Apr2021
 LIMIT_YEAR = 2021
-MASS_VELOCITY = (Parameter("gamma", "1/s", "damping γ per effective mass", least=0.0, is_damping=True),)
-VISCOELASTIC = (
-    Parameter("eta", "1/m/s", "damping η per effective mass and contact radius", least=0.0, is_damping=True),
-)
+MASS_VELOCITY = (damping("gamma", "1/s", "damping γ per effective mass"),)
+VISCOELASTIC = (damping("eta", "1/m/s", "damping η per effective mass and contact radius"),)
 
 # (key, release="gap" or "force", fields of ForceModel) -> law that ends at zero indentation or at zero force
 MakeLaw = Callable[..., ForceModel]

@@ -6,6 +6,7 @@ Where the user sets no K it is that of equation (12), or follows the code's own 
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -25,7 +26,7 @@ from .cited_sources import (
     OPENSEES_JANKOWSKI,
     SIMBODY,
 )
-from .dashpot import KELVIN_VOIGT_NO_TENSION
+from .dashpot import KELVIN_VOIGT_NO_TENSION, damping
 from .elastoplastic import MUTHUKUMAR_2003
 from .hysteresis import (
     CARVALHO_MARTINS_2019,
@@ -36,6 +37,8 @@ from .hysteresis import (
     flores_chi,
     hysteresis,
 )
+
+code_law, code_hysteresis = partial(ForceModel, family="codes"), partial(hysteresis, family="codes")
 
 
 def springs_in_series(k1: Array, k2: Array) -> Array:
@@ -49,7 +52,7 @@ def smooth_step(t: Array) -> Array:
     return t * t * (3.0 - 2.0 * t)
 
 
-ADAMS_IMPACT = ForceModel(
+ADAMS_IMPACT = code_law(
     key="adams-impact",
     title="Adams IMPACT; MotionSolve and SolidWorks Motion",
     year=1990,
@@ -62,14 +65,13 @@ ADAMS_IMPACT = ForceModel(
         "seen",
     ),
     parameters=(
-        Parameter("c", "N s/m", "largest damping", least=0.0, is_damping=True),
+        damping("c", "N s/m", "largest damping"),
         Parameter("d", "m", "penetration at which the damping is full", least=1e-9),
     ),
     # below n = 2 the damping vanishes faster than the spring as δ goes to zero, which then pushes once more
     force=lambda elastic, x, v, c, d: np.maximum(elastic + c * smooth_step(x / d) * v, 0),
     # the second one is where the force becomes zero or positive; it is divided by the spring force to stay finite
     breakpoints=(lambda d: d, lambda elastic, x, v, c, d: 1 + c * smooth_step(x / d) * v / elastic),
-    family="codes",
 )
 
 RECURDYN_EVIDENCE = Evidence(
@@ -78,19 +80,18 @@ RECURDYN_EVIDENCE = Evidence(
     note="its first year was not seen",
 )
 
-RECURDYN = hysteresis(
+RECURDYN = code_hysteresis(
     "recurdyn",
     title="RecurDyn",
     year=2000,
     equation="F = K δⁿ (1 + χ δ̇/v₀),  χ = c v₀/K",
     reference="FunctionBay RecurDyn, standard contact, with the damping exponents m₂ = 1 and m₃ = m₁",
     evidence=RECURDYN_EVIDENCE,
-    parameters=(Parameter("c", "N s/m^(n+1)", "damping coefficient", least=0.0, is_damping=True),),
+    parameters=(damping("c", "N s/m^(n+1)", "damping coefficient"),),
     chi=lambda c, v0, K: c * v0 / K,
-    family="codes",
 )
 
-RECURDYN_EXPONENTS = ForceModel(
+RECURDYN_EXPONENTS = code_law(
     key="recurdyn-exponents",
     title="RecurDyn, free exponents",
     year=2000,
@@ -98,13 +99,7 @@ RECURDYN_EXPONENTS = ForceModel(
     reference="FunctionBay RecurDyn, standard contact, whose stiffness exponent m₁ is n",
     evidence=RECURDYN_EVIDENCE,
     parameters=(
-        Parameter(
-            "c",
-            "N s^damping_exponent/m^(damping_exponent+indentation_exponent)",
-            "damping coefficient",
-            least=0.0,
-            is_damping=True,
-        ),
+        damping("c", "N s^damping_exponent/m^(damping_exponent+indentation_exponent)", "damping coefficient"),
         Parameter("damping_exponent", "1", "damping exponent m₂, of δ̇", 1.0, 1.0, 4.0),
         Parameter("indentation_exponent", "1", "indentation exponent m₃, of δ", 1.0, 0.0, 10.0),
     ),
@@ -112,7 +107,6 @@ RECURDYN_EXPONENTS = ForceModel(
         elastic + c * np.sign(v) * powers(np.abs(v), damping_exponent) * powers(x, indentation_exponent)
     ),
     coordinate_power=4,
-    family="codes",
 )
 
 
@@ -128,7 +122,7 @@ def simbody_dissipation(c1: Array, c2: Array, E1: Array, E2: Array, nu1: Array, 
     return (c1 * k2 + c2 * k1) / (k1 + k2)
 
 
-SIMBODY_HUNT_CROSSLEY = hysteresis(
+SIMBODY_HUNT_CROSSLEY = code_hysteresis(
     "simbody-hunt-crossley",
     title="Simbody and OpenSim HuntCrossleyForce (2010 to 2026)",
     year=2010,
@@ -137,19 +131,10 @@ SIMBODY_HUNT_CROSSLEY = hysteresis(
     "IUTAM 2, 241",
     doi="10.1016/j.piutam.2011.04.023",
     evidence=Evidence("seen", SIMBODY, doi="simbody/simbody, CONTRIBUTING.md @f312d0dd (2026)"),
-    parameters=(
-        Parameter(
-            "c",
-            "s/m",
-            "dissipation of the pair, the slope of e over a small speed",
-            least=0.0,
-            is_damping=True,
-        ),
-    ),
+    parameters=(damping("c", "s/m", "dissipation of the pair, the slope of e over a small speed"),),
     exponent=1.5,
     chi=lambda c, v0: 1.5 * c * v0,
     stiffness=simbody_stiffness,
-    family="codes",
 )
 
 SIMBODY_HUNT_CROSSLEY_MIXED = replace(
@@ -159,7 +144,7 @@ SIMBODY_HUNT_CROSSLEY_MIXED = replace(
     equation="F = K δ^(3/2) (1 + χ δ̇/v₀),  χ = (3/2) c v₀,  c = (c₁ k₂ + c₂ k₁)/(k₁ + k₂),  "
     "k = (E/(1 − ν²))^(2/3)",
     parameters=(
-        Parameter("c1", "s/m", "dissipation of the material of ball 1", least=0.0, is_damping=True),
+        damping("c1", "s/m", "dissipation of the material of ball 1"),
         Parameter("c2", "s/m", "dissipation of the material of ball 2", least=0.0),
     ),
     coefficients={
@@ -172,7 +157,7 @@ POINT_STIFFNESS = (
     Parameter("k2", "N/m", "point stiffness k₂ of ball 2", default=1e6, least=1e-9),
 )
 
-DRAKE_POINT_CONTACT = hysteresis(
+DRAKE_POINT_CONTACT = code_hysteresis(
     "drake-point-contact",
     title="Drake, point contact (defaults since v1.36.0, December 2024)",
     year=2019,
@@ -186,13 +171,12 @@ DRAKE_POINT_CONTACT = hysteresis(
         "another law",
     ),
     parameters=(
-        Parameter("d", "s/m", "Hunt-Crossley dissipation of the pair", default=50.0, least=0.0, is_damping=True),
+        damping("d", "s/m", "Hunt-Crossley dissipation of the pair", default=50.0),
         *POINT_STIFFNESS,
     ),
     exponent=1.0,
     chi=lambda d, v0: d * v0,
     stiffness=springs_in_series,
-    family="codes",
 )
 
 DRAKE_POINT_CONTACT_MIXED = replace(
@@ -201,14 +185,14 @@ DRAKE_POINT_CONTACT_MIXED = replace(
     title="Drake, point contact of two materials (defaults since v1.36.0, December 2024)",
     equation="F = K δ (1 + χ δ̇/v₀),  χ = d v₀,  d = (k₂ d₁ + k₁ d₂)/(k₁ + k₂)",
     parameters=(
-        Parameter("d1", "s/m", "Hunt-Crossley dissipation d₁ of ball 1", default=50.0, least=0.0, is_damping=True),
+        damping("d1", "s/m", "Hunt-Crossley dissipation d₁ of ball 1", default=50.0),
         Parameter("d2", "s/m", "Hunt-Crossley dissipation d₂ of ball 2", default=50.0, least=0.0),
         *POINT_STIFFNESS,
     ),
     coefficients={"chi": lambda d1, d2, k1, k2, v0: (k2 * d1 + k1 * d2) / (k1 + k2) * v0},
 )
 
-MODELICA_ELASTOGAP = ForceModel(
+MODELICA_ELASTOGAP = code_law(
     key="modelica-elastogap",
     title="Modelica ElastoGap (state of 2026)",
     year=2008,
@@ -220,11 +204,10 @@ MODELICA_ELASTOGAP = ForceModel(
         "(2026)",
         note="its first year was not seen",
     ),
-    parameters=(Parameter("d", "N s/m", "damping constant", least=0.0, is_damping=True),),
+    parameters=(damping("d", "N s/m", "damping constant"),),
     force=lambda elastic, v, d: elastic + np.minimum(d * v, elastic),
     breakpoints=(lambda elastic, v, d: np.where(v > 0, elastic - d * v, np.nan),),
     release="force",
-    family="codes",
 )
 
 MAPLESIM_EVIDENCE = Evidence("seen", MAPLESIM_HELP, note="its first year was not seen")
@@ -253,7 +236,7 @@ MAPLESIM_LIMITED = replace(
 MODIA3D = "ModiaSim/Modia3D.jl, src/Composition/responseCalculation/elasticCollisionResponse.jl"
 SMALL_SPEED = Parameter("vs", "m/s", "speed v_s up to which e is reduced", default=0.01, least=1e-9)
 
-MODIA3D_PRESENT = hysteresis(
+MODIA3D_PRESENT = code_hysteresis(
     "modia3d",
     title="Modia3D (v0.6.0 to v0.12.3, since February 2022)",
     year=2022,
@@ -269,7 +252,6 @@ MODIA3D_PRESENT = hysteresis(
     parameters=(SMALL_SPEED, Parameter("d", "s/m", "largest damping", default=2000.0, least=0.0)),
     exponent=1.5,
     chi=lambda e, v0, vs, d: np.minimum(d * v0, flores_chi(np.where(v0 > vs, e, 0.0))),
-    family="codes",
 )
 
 MODIA3D_EXPONENTIAL = replace(
@@ -299,7 +281,7 @@ def modia3d_regularized_speed(v0: Array, vs: Array) -> Array:
     return np.where(v0 >= vs, v0, v0 * (v0 / vs) * (1 - v0 / (3 * vs)) + vs / 3)
 
 
-CHRONO_SMC_FLORES = hysteresis(
+CHRONO_SMC_FLORES = code_hysteresis(
     "chrono-smc-flores",
     title="Chrono SMC, Flores (multicore, since 5.0.0, February 2020)",
     year=2020,
@@ -314,10 +296,9 @@ CHRONO_SMC_FLORES = hysteresis(
     parameters=(Parameter("vc", "m/s", "characteristic speed v_c", least=1e-9),),
     exponent=1.5,
     chi=lambda e, v0, vc: flores_chi(np.maximum(e, 0.01)) * v0 / vc,
-    family="codes",
 )
 
-MUJOCO_SOLREF = ForceModel(
+MUJOCO_SOLREF = code_law(
     key="mujoco-solref",
     title="MuJoCo solref, standard format (since 2.1)",
     year=2014,
@@ -343,7 +324,6 @@ MUJOCO_SOLREF = ForceModel(
     oracle=lambda dampratio: force_restitution(dampratio),
     release="force",
     exponent=1.0,
-    family="codes",
 )
 
 MUJOCO_SOLREF_DIRECT = replace(
@@ -354,16 +334,14 @@ MUJOCO_SOLREF_DIRECT = replace(
     equation="F = m(k δ + b δ̇), to F = 0",
     parameters=(
         Parameter("k", "1/s^2", "stiffness per effective mass, the negative first number of solref", least=1e-9),
-        Parameter(
-            "b", "1/s", "damping per effective mass, the negative second number", least=0.0, is_damping=True
-        ),
+        damping("b", "1/s", "damping per effective mass, the negative second number"),
     ),
     stiffness=lambda m, k: m * k,
     force=lambda x, v, m, k, b: m * (k * x + b * v),
     oracle=lambda k, b: force_restitution(b / (2.0 * np.sqrt(k))),
 )
 
-SIMSCAPE_CONTACT = ForceModel(
+SIMSCAPE_CONTACT = code_law(
     key="simscape-contact",
     title="after Simscape Spatial Contact Force (R2019b)",
     year=2019,
@@ -375,14 +353,13 @@ SIMSCAPE_CONTACT = ForceModel(
         note="the cubic and the limit at zero are ours",
     ),
     parameters=(
-        Parameter("b", "N s/m", "damping", least=0.0, is_damping=True),
+        damping("b", "N s/m", "damping"),
         Parameter("w", "m", "transition region width", least=1e-9),
     ),
     force=lambda elastic, x, v, b, w: smooth_step(x / w) * (elastic + b * v),
     breakpoints=(lambda w: w,),
     release="force",
     exponent=1.0,
-    family="codes",
 )
 
 
@@ -407,7 +384,7 @@ MBDYN_LANKARANI_NIKRAVESH = in_mbdyn(LANKARANI_NIKRAVESH_1990, "lankarani nikrav
 
 CARVALHO_CHI, GONTHIER_CHI = (law.coefficients["chi"] for law in (CARVALHO_MARTINS_2019, GONTHIER_2004))
 
-EXUDYN_CARVALHO_GONTHIER = hysteresis(
+EXUDYN_CARVALHO_GONTHIER = code_hysteresis(
     "exudyn-carvalho-gonthier",
     title="EXUDYN ObjectContactSphereSphere, impactModel 2 (1.13.6)",
     year=2025,
@@ -421,7 +398,6 @@ EXUDYN_CARVALHO_GONTHIER = hysteresis(
     ),
     # both have 8/3 at e = 1/3
     chi=lambda e: np.where(e > 1 / 3, np.asarray(CARVALHO_CHI(e)), np.asarray(GONTHIER_CHI(e))),
-    family="codes",
 )
 
 NEWTON_SEMI_IMPLICIT = approach_dashpot(
@@ -435,9 +411,7 @@ NEWTON_SEMI_IMPLICIT = approach_dashpot(
         "newton 1.8.0, newton/_src/solvers/semi_implicit/kernels_contact.py",
         note="its year is that of the licence; of warp.sim a copy of its kernel was seen",
     ),
-    parameters=(
-        Parameter("kd", "N s/m", "damping on approach, the mean of kd of both shapes", least=0.0, is_damping=True),
-    ),
+    parameters=(damping("kd", "N s/m", "damping on approach, the mean of kd of both shapes"),),
     zeta=lambda kd, m, K: kd / (2 * np.sqrt(m * K)),
     exponent=1.0,
     family="codes",

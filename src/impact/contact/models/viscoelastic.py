@@ -11,6 +11,7 @@ from ..formula_calls import Formula
 from ..model import About, ForceModel, Parameter
 from ..powers import power, powers
 from .cited_sources import DEMLAB_VISCOELASTIC
+from .dashpot import damping
 
 
 def drag(
@@ -51,7 +52,7 @@ KUWABARA_KONO_1987 = drag(
         "(2024)",
         doi=DEMLAB_VISCOELASTIC,
     ),
-    parameters=(Parameter("A", "s", "dissipative constant of the material", least=0.0, is_damping=True),),
+    parameters=(damping("A", "s", "dissipative constant of the material"),),
     c=lambda A, K: 1.5 * A * K,
     q=0.5,
 )
@@ -65,7 +66,7 @@ LEE_HERRMANN_1993 = drag(
     "granular particles. J. Phys. A 26, 373",
     doi="10.1088/0305-4470/26/2/021",
     evidence=Evidence("seen", DEMLAB_VISCOELASTIC, doi=DEMLAB_VISCOELASTIC),
-    parameters=(Parameter("gamma", "1/s", "damping γ per effective mass", least=0.0, is_damping=True),),
+    parameters=(damping("gamma", "1/s", "damping γ per effective mass"),),
     c=lambda gamma, m: gamma * m,
     q=0.0,
 )
@@ -101,7 +102,7 @@ HERTZ_POWER_DAMPING = ForceModel(
     "(1/2)",
     evidence=Evidence("derived", "the form itself, for a damping of the user"),
     parameters=(
-        Parameter("C", "N s/m^(q+1)", "damping coefficient", least=0.0, is_damping=True),
+        damping("C", "N s/m^(q+1)", "damping coefficient"),
         Parameter("q", "1", "exponent of the indentation in the damping", default=0.5, least=0.0, most=10.0),
     ),
     force=lambda elastic, x, v, C, q: elastic + C * powers(x, q) * v,
@@ -123,7 +124,7 @@ BORDBAR_HYPPANEN_2007 = drag(
         note="the paper is in lists of references; the formula was seen nowhere; hertz-power-damping with q = "
         "0.65 is the same",
     ),
-    parameters=(Parameter("C", "N s/m^1.65", "damping constant", least=0.0, is_damping=True),),
+    parameters=(damping("C", "N s/m^1.65", "damping constant"),),
     c=lambda C: C,
     q=0.65,
     coordinate_power=4,
