@@ -8,7 +8,7 @@ from scipy.optimize import minimize_scalar
 
 from impact.config.tables import DEFAULT_RTOL
 from impact.contact import motion
-from impact.contact.closed_forms.elastic import peak_indentation
+from impact.contact.closed_forms.hysteresis import peak_indentation
 from impact.contact.impacts import Impacts
 from impact.contact.models import find
 from impact.contact.models.hysteresis import hysteresis

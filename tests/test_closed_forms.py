@@ -6,12 +6,12 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from impact.contact.closed_forms.elastic import peak_indentation
 from impact.contact.closed_forms.hysteresis import (
     SERIES_BELOW_CHI,
     SERIES_FROM_E,
     delivered_restitution,
     exact_damping_ratio,
+    peak_indentation,
 )
 
 from .problems import contact_time_ratio, damped_peak_indentation

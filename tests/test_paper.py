@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from impact.contact.closed_forms.elastic import peak_indentation
+from impact.contact.closed_forms.hysteresis import peak_indentation
 from impact.contact.history import history_of
 from impact.contact.impacts import Impacts
 from impact.contact.materials import hertz_stiffness, sphere_radius

@@ -100,7 +100,7 @@ def test_each_new_model_at_the_top_level_of_a_file_is_read_once(tmp_path: Path) 
     text = (
         "from __future__ import annotations\n"
         "import dataclasses\n"
-        "from impact.contact.models.elastic import *\n"
+        "from impact.contact.models.adhesive import *\n"
         "from impact.contact.models.hysteresis import GHARIB_HURMUZLU_2012 as BASE\n"
         "@dataclasses.dataclass\nclass Point:\n    x: float = 0.0\n"
         "A = dataclasses.replace(BASE, key='a')\n"

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..array_types import Array
-from .closed_forms.elastic import peak_indentation
+from .closed_forms.hysteresis import peak_indentation
 from .materials import effective_compliance, effective_mass, effective_radius
 from .model import ForceModel, Law
 from .powers import powers, replace_where

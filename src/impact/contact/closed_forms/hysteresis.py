@@ -1,4 +1,4 @@
-"""Closed forms of F = K δⁿ (1 + χ δ̇/v₀): equation (18), damping by the elastic force."""
+"""Closed forms of F = K δⁿ (1 + χ δ̇/v₀): equation (18), damping by the elastic force, and none, (10) and (31)."""
 
 from __future__ import annotations
 
@@ -25,6 +25,15 @@ DAMPING_SERIES = (
     0, 3 / 2, 3 / 2, 27 / 20, 6 / 5, 759 / 700, 351 / 350, 6639 / 7000, 1599 / 1750, 192537 / 215600,
     190221 / 215600, 10993971 / 12512500, 308346453 / 350350000, 6203405379 / 7007000000,
 )  # fmt: skip
+
+
+def peak_indentation(m: Array, v0: Array, K: Array, n: float | Array) -> Array:
+    """Peak indentation δₘ [m] without damping, equation (31): ((n + 1) m v₀²/(2 K))^(1/(n + 1)).
+
+    >>> print(peak_indentation(np.array([0.5]), np.array([1.0]), np.array([6.118486349e9]), 1.5)[0].round(13))
+    0.0001008542975
+    """
+    return np.power((n + 1.0) * 0.5 * m * v0 / K * v0, 1.0 / (n + 1.0))
 
 
 def delivered_restitution(chi: Array | float) -> Array:

@@ -1,4 +1,4 @@
-"""The hysteresis family, F = K δⁿ (1 + χ δ̇/v₀): equation (18) and the coefficients of (19) to (28)."""
+"""The hysteresis family, F = K δⁿ (1 + χ δ̇/v₀): equations (10), without damping, (18), and (19) to (28) for χ."""
 
 from __future__ import annotations
 
@@ -9,11 +9,19 @@ import numpy as np
 from ...array_types import Array
 from ..closed_forms.hysteresis import delivered_restitution, exact_damping_ratio
 from ..evidence import Evidence
-from ..force_expressions import damped
+from ..force_expressions import damped, spring
 from ..formula_calls import Formula
 from ..model import About, ForceModel
 from ..powers import power
-from .cited_sources import DYS, GHARIB_HURMUZLU, MBDYN, MODIA3D_DOCUMENTATION, OPENSEES_HERTZDAMP, RAILWAY
+from .cited_sources import (
+    DEMLAB_VISCOELASTIC,
+    DYS,
+    GHARIB_HURMUZLU,
+    MBDYN,
+    MODIA3D_DOCUMENTATION,
+    OPENSEES_HERTZDAMP,
+    RAILWAY,
+)
 
 
 def hysteresis(key: str, *, chi: Formula, **about: Unpack[About]) -> ForceModel:
@@ -51,6 +59,25 @@ def flores_chi(e: Array) -> Array:
     """χ [-] of Flores and others (2011), 8(1 − e)/(5e)."""
     return np.asarray(np.divide(8.0 * (1.0 - e), 5.0 * e))
 
+
+HERTZ = ForceModel(
+    key="hertz",
+    title="Hertz",
+    year=1882,
+    equation="F = K δⁿ  (10)",
+    reference="Hertz H (1882) Über die Berührung fester elastischer Körper. J. reine angew. Math. 92, 156",
+    domain_source="by definition",
+    doi="10.1515/crll.1882.92.156",
+    evidence=Evidence(
+        "seen",
+        f"{GHARIB_HURMUZLU}, equation (10)",
+        doi=DEMLAB_VISCOELASTIC,
+    ),
+    force=spring,
+    domain={"e": (1.0, 1.0)},
+    oracle=lambda: 1.0,
+    family="elastic",
+)
 
 HUNT_CROSSLEY_1975 = hysteresis(
     "hunt-crossley-1975",
