@@ -16,7 +16,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, SupportsFloat
@@ -91,6 +91,7 @@ def open_adapter(adapter: object, timeout_s: float, folder: str | None = None) -
         try:
             process = subprocess.Popen(
                 words,
+                bufsize=0,
                 cwd=folder,
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
@@ -99,14 +100,11 @@ def open_adapter(adapter: object, timeout_s: float, folder: str | None = None) -
             )
         except OSError as error:
             raise AdapterError(f"{words[0]}: {error.strerror}") from None
-        try:
-            yield _Conversation(process, errors.fileno(), timeout_s).ask
-        finally:
-            for pipe in (process.stdin, process.stdout):
-                assert pipe is not None
-                with suppress(BrokenPipeError):
-                    pipe.close()
-            kill(process)
+        with process:
+            try:
+                yield _Conversation(process, errors.fileno(), timeout_s).ask
+            finally:
+                kill(process)
 
 
 def _command(adapter: object) -> list[str]:
@@ -145,7 +143,6 @@ class _Conversation:
         name = f"collision {question['id']}"
         try:
             self.process.stdin.write(json.dumps(question).encode() + b"\n")
-            self.process.stdin.flush()
         except BrokenPipeError:
             raise self._ended(name) from None
         line = self._read_line(name)

@@ -12,48 +12,16 @@ NU = 0.3
 # the stiffness is this times E* R*, between two spheres 1.432 as much
 STIFFNESS = 0.31225 * math.pi
 STEPS_BEFORE, CONTACTS = 1, 2.0
-MESH = """
-Begin Properties 0
-End Properties
-Begin Nodes
-{nodes}End Nodes
-Begin Elements SphericParticle3D
-{elements}End Elements
-Begin NodalData RADIUS
-{radii}End NodalData
-{parts}"""
-BALL = """
-Begin SubModelPart ball{number}
-Begin SubModelPartNodes
-{number}
-End SubModelPartNodes
-Begin SubModelPartElements
-{number}
-End SubModelPartElements
-End SubModelPart
-"""
-WALL = """
-Begin Properties 0
-End Properties
-Begin Nodes
-3 0 -{reach} -{reach}
-4 0 {reach} -{reach}
-5 0 0 {reach}
-End Nodes
-Begin Conditions RigidFace3D3N
-1 0 3 4 5
-End Conditions
-Begin SubModelPart wall
-Begin SubModelPartNodes
-3
-4
-5
-End SubModelPartNodes
-Begin SubModelPartConditions
-1
-End SubModelPartConditions
-End SubModelPart
-"""
+
+
+def block(head: str, *lines: str) -> str:
+    """Write a block of a mesh."""
+    return "\n".join((f"Begin {head}", *lines, f"End {head.split()[0]}", ""))
+
+
+def part(name: str, nodes: str, kind: str, number: str) -> str:
+    """Write the part of a ball or of the wall, whose nodes have numbers of one digit."""
+    return block(f"SubModelPart {name}", block("SubModelPartNodes", *nodes), block(f"SubModelPart{kind}", number))
 
 
 def collide(c: dict[str, Any]) -> dict[str, Any]:
@@ -74,16 +42,24 @@ def collide(c: dict[str, Any]) -> dict[str, Any]:
     # E* of two equal materials is E/(2 (1 - nu^2))
     modulus = 2.0 * (1.0 - NU**2) * effective_mass * frequency**2 / (stiffness * radius)
     starts = {ball.number: ball.start(STEPS_BEFORE * c["dt"]) for ball in balls}
-    mesh = MESH.format(
-        nodes="".join(f"{number} {x!r} {y!r} 0\n" for number, (x, y) in starts.items()),
-        elements="".join(f"{number} 0 {number}\n" for number in starts),
-        radii="".join(f"{ball.number} 0 {ball.R!r}\n" for ball in balls),
-        parts="".join(BALL.format(number=number) for number in starts),
-    )
-    Path("ballsDEM.mdpa").write_text(mesh, encoding="utf-8")
+    mesh = [
+        block("Properties 0"),
+        block("Nodes", *(f"{number} {x!r} {y!r} 0" for number, (x, y) in starts.items())),
+        block("Elements SphericParticle3D", *(f"{number} 0 {number}" for number in starts)),
+        block("NodalData RADIUS", *(f"{ball.number} 0 {ball.R!r}" for ball in balls)),
+        *(part(f"ball{number}", number, "Elements", number) for number in starts),
+    ]
+    Path("ballsDEM.mdpa").write_text("".join(mesh), encoding="utf-8")
     Path("ballsDEM_FEM_boundary.mdpa").unlink(missing_ok=True)
     if len(balls) == 1:
-        Path("ballsDEM_FEM_boundary.mdpa").write_text(WALL.format(reach=10.0 * c["R1"]), encoding="utf-8")
+        reach = 10.0 * c["R1"]
+        wall = [
+            block("Properties 0"),
+            block("Nodes", f"3 0 -{reach} -{reach}", f"4 0 {reach} -{reach}", f"5 0 0 {reach}"),
+            block("Conditions RigidFace3D3N", "1 0 3 4 5"),
+            part("wall", "345", "Conditions", "1"),
+        ]
+        Path("ballsDEM_FEM_boundary.mdpa").write_text("".join(wall), encoding="utf-8")
     relation = {
         "COEFFICIENT_OF_RESTITUTION": c["e"],
         "DEM_DISCONTINUUM_CONSTITUTIVE_LAW_NAME": "DEM_D_Linear_viscous_Coulomb",
