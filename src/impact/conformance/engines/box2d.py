@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+SETTINGS = "lengths over the radius of ball 1, 50 iterations, no continuous collision, one step"
 # of the radius, so that the first step finds the contact in single precision
 OVERLAP = 1e-6
 ITERATIONS = 50

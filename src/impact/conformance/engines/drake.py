@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
+SETTINGS = "point contact, TAMSI, dissipation for e at the closing speed, stiction tolerance 1e-4 of it, dt/4"
+SETTINGS_SAP = "point contact, SAP, relaxation_time for e, stiction tolerance 1e-4 of the closing speed, dt/4"
 # of the closing speed, below which friction is regularized
 STICTION = 1e-4
 STEPS_BEFORE, CONTACTS = 1, 3.0

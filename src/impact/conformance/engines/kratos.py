@@ -8,6 +8,7 @@ import os
 from pathlib import Path
 from typing import Any
 
+SETTINGS = "DEM_D_Linear_viscous_Coulomb, Symplectic_Euler, YOUNG_MODULUS for the time, no rolling friction"
 NU = 0.3
 # the stiffness is this times E* R*, between two spheres 1.432 as much
 STIFFNESS = 0.31225 * math.pi

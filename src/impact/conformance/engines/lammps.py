@@ -9,6 +9,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+SETTINGS = "granular hooke with coeff_restitution and linear_history, k_t = 2/7 k_n, xt = 0"
+SETTINGS_HOOKE_HISTORY = (
+    "pair style gran/hooke/history, fix wall/gran hooke/history, k_t = 2/7 k_n, gamma_n for e, no gamma_t"
+)
 SCRIPT = """
 units si
 atom_style sphere

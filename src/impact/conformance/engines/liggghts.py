@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+SETTINGS = "hooke with tangential history, ktToKnUser on for k_t = 2/7 k_n, tangential_damping off"
 # Young's moduli outside 5e6 to 1e9 Pa have to be allowed: here, they follow from the contact time
 SCRIPT = """
 units si

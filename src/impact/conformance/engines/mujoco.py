@@ -5,6 +5,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
+SETTINGS = (
+    "Euler, elliptic cone, constant impedance, solref for e and the contact time, a tenth of it in solreffriction"
+)
 WORLD = """
 <mujoco>
   <option timestep="{dt}" gravity="0 0 0" integrator="Euler" cone="elliptic" iterations="100" tolerance="0">

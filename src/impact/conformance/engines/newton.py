@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+SETTINGS = "SolverSemiImplicit, kd for e, kf that ends a slip in five steps, no angular_damping, 4 dt"
 STEPS_BEFORE, CONTACTS = 1, 2.0
 # over the suggested contact time and step, so that single precision resolves the motion within a step
 SLOWER = 4.0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+SETTINGS = "restitution and lateralFriction, contactERP = 0, restitutionVelocityThreshold = 0, 200 iterations"
 STEPS = 3
 
 

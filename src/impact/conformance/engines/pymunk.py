@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+SETTINGS = "collision_slop = 0; e and mu are those of the pair"
 # of the radius, so that the first step finds the contact whatever the rounding is
 OVERLAP = 1e-9
 STEPS = 3

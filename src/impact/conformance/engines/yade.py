@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+SETTINGS = "ViscElMat, kn and cn for e and the contact time, ks = 2/7 kn, cs = 0, NewtonIntegrator(damping=0)"
 # over that of the normal spring: both have the same period for solid balls
 TANGENTIAL_STIFFNESS = 2.0 / 7.0
 # the balls touch after half of a step, and three contact times are run
