@@ -8,7 +8,7 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 import impact
-from impact.contact.closed_forms.adhesive import jkr_root
+from impact.contact.closed_forms.plastic import jkr_root
 from impact.contact.impacts import Impacts
 from impact.contact.models import find
 from impact.contact.output_formulas import Outputs, collide

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...array_types import Array
-from ..closed_forms.adhesive import edinburgh_adhesion, edinburgh_restitution, jkr_restitution, jkr_root
+from ..closed_forms.plastic import edinburgh_adhesion, edinburgh_restitution, jkr_restitution, jkr_root
 from ..evidence import Evidence
 from ..force_expressions import spring
 from ..model import ForceModel, Parameter

@@ -21,10 +21,10 @@ from ..model import About, ForceModel, Parameter
 from ..powers import power
 from .cited_sources import CHRONO, DEMLAB_VISCOELASTIC, LIGGGHTS, MAPLESIM_HELP, YADE_2025, YADE_BIBLIOGRAPHY
 
-# closed forms of the restitution, by where the contact ends
-DELIVERED_RESTITUTION: dict[str, Formula] = {
-    "gap": gap_restitution,
-    "force": force_restitution,
+# by where the contact ends: its words in an equation, and the closed form of the restitution
+ENDS: dict[str, tuple[str, Formula]] = {
+    "gap": ("to δ = 0", gap_restitution),
+    "force": ("to F = 0", force_restitution),
 }
 
 
@@ -58,7 +58,7 @@ def dashpot(key: str, *, zeta: Formula, release: Literal["gap", "force"], **abou
         force=dashpot_force,
         release=release,
         velocity_coordinate="force",
-        oracle=DELIVERED_RESTITUTION[release],
+        oracle=ENDS[release][1],
         # with n = 3/2 the dashpot is proportional to the fourth root of the indentation
         coordinate_power=2 if about.get("exponent") == 1.0 else 4,
     )
@@ -66,9 +66,9 @@ def dashpot(key: str, *, zeta: Formula, release: Literal["gap", "force"], **abou
 
 def with_release(law: ForceModel, release: Literal["gap", "force"], **changes: Any) -> ForceModel:
     """Change where the contact of a law made by `dashpot` ends, with the same damping ratio."""
-    ends = {"gap": "to δ = 0", "force": "to F = 0"}
-    equation = law.equation.replace(ends[law.release], ends[release])
-    return replace(law, release=release, equation=equation, oracle=DELIVERED_RESTITUTION[release], **changes)
+    end, oracle = ENDS[release]
+    equation = law.equation.replace(ENDS[law.release][0], end)
+    return replace(law, release=release, equation=equation, oracle=oracle, **changes)
 
 
 # the forces and damping ratios as texts of `equation`
