@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..formatting import number
-from .code import Code, Collision, Parameters
+from .code import Code, Collision, Lines, Parameters
 
 MM_PER_M = 1000.0
 
@@ -32,19 +32,17 @@ def lines(collision: Collision, parameters: Parameters) -> list[str]:
     ]
 
 
-def notes(collision: Collision) -> list[str]:
+def notes(collision: Collision) -> Lines:
     n = number(collision["n"])
-    return [
-        f"in mm, N, s, kg (MMKS); in other units the stiffness is another number, K/1000^{n} for K in N/m^{n}",
-        "IMPACT: max(0, stiffness (x1 - x)^exponent - STEP(x, x1 - dmax, damping, x1, 0) dx/dt)",
-        "the statement CONTACT has the same parameters: STIFFNESS, EXPONENT, DAMPING, DMAX",
-        "two materials: there is no mixing; the values are those of the pair",
-        "the force is never negative; no speed switches the restitution off",
-        "the damping grows until a penetration of dmax: a rebound from less than that is damped less",
-        "the defaults 1e5 N/mm, 2.2, 10 N s/mm are meant for steel parts of about 1 kg",
-        "restitution_coefficient is of another normal force, POISSON",
-        "the integrator chooses its steps: limit them to a small share of the contact time",
-    ]
+    yield f"in mm, N, s, kg (MMKS); in other units the stiffness is another number, K/1000^{n} for K in N/m^{n}"
+    yield "IMPACT: max(0, stiffness (x1 - x)^exponent - STEP(x, x1 - dmax, damping, x1, 0) dx/dt)"
+    yield "the statement CONTACT has the same parameters: STIFFNESS, EXPONENT, DAMPING, DMAX"
+    yield "two materials: there is no mixing; the values are those of the pair"
+    yield "the force is never negative; no speed switches the restitution off"
+    yield "the damping grows until a penetration of dmax: a rebound from less than that is damped less"
+    yield "the defaults 1e5 N/mm, 2.2, 10 N s/mm are meant for steel parts of about 1 kg"
+    yield "restitution_coefficient is of another normal force, POISSON"
+    yield "the integrator chooses its steps: limit them to a small share of the contact time"
 
 
 CODE = Code(

@@ -9,7 +9,7 @@ from ..contact.closed_forms.dashpot import gap_damping
 from ..contact.models.cited_sources import CHRONO
 from ..errors import UsageError
 from ..formatting import number, quantity
-from .code import Code, Collision, Parameters
+from .code import Code, Collision, Lines, Parameters
 
 # system, contact force model, and whether coefficients follow from the properties of the material
 SETTINGS = {
@@ -137,50 +137,47 @@ def settings(collision: Collision, parameters: Parameters) -> list[str]:
     return written + ([] if speed is None else [f"sys.GetSettings()->solver.characteristic_vel = {speed!r};"])
 
 
-def notes(collision: Collision) -> list[str]:
+def notes(collision: Collision) -> Lines:
     system, force, _ = SETTINGS[collision.model.key]
     multicore = system == "ChSystemMulticoreSMC"
-    remarks = ["in SI, C++; the material keeps its values in single precision"]
+    yield "in SI, C++; the material keeps its values in single precision"
     if from_material(collision):
-        remarks.append("two materials: E* = 1/((1 - nu1^2)/E1 + (1 - nu2^2)/E2), and the smaller restitution")
+        yield "two materials: E* = 1/((1 - nu1^2)/E1 + (1 - nu2^2)/E2), and the smaller restitution"
         if not collision.has_materials:
-            remarks.append(
-                f"the modulus gives K = {number(collision['K'])} with a Poisson ratio of {POISSON_RATIO}"
-            )
+            yield f"the modulus gives K = {number(collision['K'])} with a Poisson ratio of {POISSON_RATIO}"
     else:
-        remarks.append("two materials: the arithmetic means of Kn and of Gn")
+        yield "two materials: the arithmetic means of Kn and of Gn"
         factors = "Gn by m" if force == "Hooke" else "Kn by R* sqrt(delta), Gn by R* sqrt(delta) m"
-        remarks.append(f"the system multiplies {factors}, with m = m1 m2/(m1 + m2)")
+        yield f"the system multiplies {factors}, with m = m1 m2/(m1 + m2)"
     if force == "Hooke" and from_material(collision):
-        remarks.append("the stiffness follows from the characteristic impact velocity, by default 1 m/s")
+        yield "the stiffness follows from the characteristic impact velocity, by default 1 m/s"
     if force == "PlainCoulomb":
-        remarks.append("the stiffness does not depend on the radii")
+        yield "the stiffness does not depend on the radii"
     elif not multicore and (force == "Hertz" or from_material(collision)):
-        remarks.append("with Bullet, R* is one value for all contacts, by default 0.1 m, not that of the shapes")
+        yield "with Bullet, R* is one value for all contacts, by default 0.1 m, not that of the shapes"
     if force == "Flores":
-        remarks += [
+        yield from (
             "the damping is divided by characteristic_vel, in MultiStep by the larger of it and the closing speed",
             "ChSystemSMC has no Flores; it takes Hooke instead",
-        ]
-    remarks += [
+        )
+    yield (
         "the force may become attractive before separation; ChSystemSMC removes this and changes the law"
         if multicore
-        else "the force is never negative, but for adhesion, by default 0; ChSystemMulticoreSMC lets it pull",
-        "no speed switches the restitution off; SetMinBounceSpeed is of the other contact method, NSC",
-    ]
+        else "the force is never negative, but for adhesion, by default 0; ChSystemMulticoreSMC lets it pull"
+    )
+    yield "no speed switches the restitution off; SetMinBounceSpeed is of the other contact method, NSC"
     if math.inf in (collision["m1"], collision["m2"]):
-        remarks.append("m is taken with the mass of a fixed body too, by default 1 kg: it has to be large")
-    return [*remarks, "the same law in 6.0.0 to 10.0.0; before 9.0.0 the material was ChMaterialSurfaceSMC"]
+        yield "m is taken with the mass of a fixed body too, by default 1 kg: it has to be large"
+    yield "the same law in 6.0.0 to 10.0.0; before 9.0.0 the material was ChMaterialSurfaceSMC"
 
 
-def warnings(collision: Collision) -> list[str]:
+def warnings(collision: Collision) -> Lines:
     c = collision
     if c.model.key == "chrono-smc-flores" and abs(c["vc"] / c["v0"] - 1.0) > 0.01:
-        return [
+        yield (
             f"Flores takes characteristic_vel = {quantity(c['vc'], 'm/s')} for the closing speed, which is "
             f"{quantity(c['v0'], 'm/s')}: the restitution depends on their ratio"
-        ]
-    return []
+        )
 
 
 CODE = Code(

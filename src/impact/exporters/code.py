@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 
 from ..contact.model import ForceModel
@@ -12,6 +12,8 @@ from ..formatting import number
 from .programs import Program
 
 Parameters = Mapping[str, float | str]
+# what is written for a collision
+Lines = Iterable[str]
 # moment of inertia of a ball over m R^2, in scripts
 SOLID = 0.4
 # largest difference of e between a code and the map of its scheme
@@ -171,8 +173,8 @@ class Code:
     law_for_version: Callable[[str, str], str] = lambda key, version: key
     read_version: Callable[[str], str] = lambda text: text
     comment: tuple[str, str] = ("# ", "")
-    notes: Callable[[Collision], list[str]] = lambda collision: []
-    warnings: Callable[[Collision], list[str]] = lambda collision: []
+    notes: Callable[[Collision], Lines] = lambda collision: ()
+    warnings: Callable[[Collision], Lines] = lambda collision: ()
     template: str = ""
     frictions: Mapping[str, str] = field(default_factory=dict)
     has_friction: Callable[[str, str], bool] = lambda key, friction: True

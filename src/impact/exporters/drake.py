@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .code import Code, Collision, Parameters
+from .code import Code, Collision, Lines, Parameters
 from .programs import python_package
 
 # slip over the closing speed below which TAMSI takes less friction than mu N
@@ -101,7 +101,7 @@ def lines(collision: Collision, parameters: Parameters) -> list[str]:
     ]
 
 
-def notes(collision: Collision) -> list[str]:
+def notes(collision: Collision) -> Lines:
     return [
         "point_stiffness [N/m] is of one ball, two equal balls act with half of it; dissipation is in s/m",
         "two materials: k = k1 k2/(k1 + k2), dissipation d = (k2 d1 + k1 d2)/(k1 + k2)",
@@ -117,13 +117,12 @@ def notes(collision: Collision) -> list[str]:
     ]
 
 
-def warnings(collision: Collision) -> list[str]:
-    if not collision.friction:
-        return []
-    return [
-        "friction only with TAMSI: at 12 steps, mu = 0.3, 80 degrees friction changed e_out of SAP from 0.114 to "
-        "0.826, of SIMILAR from 0.607 to 0.656, and beta of LAGGED differed by 0.012"
-    ]
+def warnings(collision: Collision) -> Lines:
+    if collision.friction:
+        yield (
+            "friction only with TAMSI: at 12 steps, mu = 0.3, 80 degrees friction changed e_out of SAP from 0.114 "
+            "to 0.826, of SIMILAR from 0.607 to 0.656, and beta of LAGGED differed by 0.012"
+        )
 
 
 CODE = Code(

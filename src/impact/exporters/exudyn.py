@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .code import Code, Collision, Parameters, keyword_arguments
+from .code import Code, Collision, Lines, Parameters, keyword_arguments
 from .programs import python_package
 
 # impactModel of each law; linear damping is added to the other two where it is not 0
@@ -49,7 +49,7 @@ def lines(collision: Collision, parameters: Parameters) -> list[str]:
     return [f"contact = dict({keyword_arguments(parameters)})", f"dt = {collision.dt!r}"]
 
 
-def notes(collision: Collision) -> list[str]:
+def notes(collision: Collision) -> Lines:
     return [
         "in SI, of the pair: each contact of CreateSphereSphereContact has its own values, without any mixing",
         "contactStiffness is in N/m^n; unset, the exponent n is 1, impactModel 0 and restitutionCoefficient 1",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 
-from .code import Code, Collision, Parameters
+from .code import Code, Collision, Lines, Parameters
 from .programs import python_package
 
 LAWS = {
@@ -196,31 +196,22 @@ def lines(collision: Collision, parameters: Parameters) -> list[str]:
     ]
 
 
-def notes(collision: Collision) -> list[str]:
-    remarks = [
-        "in SI; material1, material2 and relation are the Variables of materials and of their relation in",
-        "MaterialsDEM.json, parameters are keys of ProjectParametersDEM.json",
-        "two materials: 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2; the restitution is that of the pair",
-        "an e below 0.001 is raised to it, and above 0.999 there is no damping; the force is never negative",
-    ]
+def notes(collision: Collision) -> Lines:
+    yield "in SI; material1, material2 and relation are the Variables of materials and of their relation in"
+    yield "MaterialsDEM.json, parameters are keys of ProjectParametersDEM.json"
+    yield "two materials: 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2; the restitution is that of the pair"
+    yield "an e below 0.001 is raised to it, and above 0.999 there is no damping; the force is never negative"
     if collision.has_wall:
-        remarks.append(
-            "material2 is of the rigid face; it is found within search_tolerance_against_walls, unset 0"
-        )
+        yield "material2 is of the rigid face; it is found within search_tolerance_against_walls, unset 0"
     if collision.friction:
-        remarks += [
-            "the tangential stiffness follows from nu: k_t/k_n = 4 G*/E*, 2 (1 - nu)/(2 - nu) of equal materials",
-            "RotationOption is true: without it balls slide, but do not spin",
-            "friction acts at less than the radius from the centre, by a part of the indentation",
-        ]
+        yield "the tangential stiffness follows from nu: k_t/k_n = 4 G*/E*, 2 (1 - nu)/(2 - nu) of equal materials"
+        yield "RotationOption is true: without it balls slide, but do not spin"
+        yield "friction acts at less than the radius from the centre, by a part of the indentation"
     else:
-        remarks.append("no friction: replace STATIC_FRICTION and DYNAMIC_FRICTION by yours")
+        yield "no friction: replace STATIC_FRICTION and DYNAMIC_FRICTION by yours"
     if collision.model.key == "kratos-linear":
-        remarks.append("Kratos finds the damping ratio by bisection to 1e-4")
-    remarks.append(
-        "a sphere finds its neighbours only every NeighbourSearchFrequency steps, within SearchTolerance"
-    )
-    return remarks
+        yield "Kratos finds the damping ratio by bisection to 1e-4"
+    yield "a sphere finds its neighbours only every NeighbourSearchFrequency steps, within SearchTolerance"
 
 
 CODE = Code(

@@ -11,7 +11,7 @@ import numpy as np
 from ..contact.materials import effective_shear_modulus
 from ..errors import UsageError
 from ..formatting import argument, number
-from .code import Code, Collision, Parameters
+from .code import Code, Collision, Lines, Parameters
 from .programs import Program, printed_version
 
 # normal and damping model of pair style granular, by key of the catalogue
@@ -225,69 +225,59 @@ def lines(collision: Collision, parameters: Parameters) -> list[str]:
     ]
 
 
-def notes(collision: Collision) -> list[str]:
+def notes(collision: Collision) -> Lines:
     spring, damping, limit = OPTIONS[collision.model.key]
-    remarks = ["in SI (units si, atom_style sphere); R* and m are the effective radius and mass, 1/(1/R1 + 1/R2)"]
+    yield "in SI (units si, atom_style sphere); R* and m are the effective radius and mass, 1/(1/R1 + 1/R2)"
     if collision.version < MATERIAL_SINCE and spring == "hertz" and not takes_moduli(collision):
-        remarks.append("hertz/material has another stiffness at a wall and for two materials in old releases")
+        yield "hertz/material has another stiffness at a wall and for two materials in old releases"
     elif collision.has_wall:
-        remarks.append(
-            "hertz/material takes one material, of the ball and the wall; hertz with k_n takes two into account"
-        )
+        yield "hertz/material takes one material, of the ball and the wall; hertz with k_n takes two into account"
     if takes_moduli(collision) and not collision.has_wall:
-        remarks.append(
+        yield (
             "two materials: E* = 1/((1 - nu1^2)/E1 + (1 - nu2^2)/E2); damping is the geometric mean of both types"
         )
     if spring == "hertz" and not takes_moduli(collision):
-        remarks.append(
-            f"k_n = K/sqrt(R*), for R* = {number(collision.effective_radius)} m; hertz/material takes E and nu"
-        )
+        yield f"k_n = K/sqrt(R*), for R* = {number(collision.effective_radius)} m; hertz/material takes E and nu"
     if damping == "viscoelastic":
-        remarks.append("eta_n0 is per effective mass and contact radius, in 1/(m s)")
+        yield "eta_n0 is per effective mass and contact radius, in 1/(m s)"
     if damping == "mass_velocity":
-        remarks.append("eta_n0 is per effective mass, in 1/s")
+        yield "eta_n0 is per effective mass, in 1/s"
     if damping == "velocity":
-        remarks.append("eta_n0 is the damping constant, in N s/m")
-    remarks.append(
+        yield "eta_n0 is the damping constant, in N s/m"
+    yield (
         "limit_damping: the force is never negative"
         if limit
         else "the force becomes attractive before separation; limit_damping removes this and changes the law"
     )
     if not collision.friction:
-        remarks.append(
-            "no friction: replace the tangential model by yours; comm_modify vel yes is needed in any case"
-        )
-        return remarks
-    remarks.append("x_gammat multiplies the damping of the normal model; comm_modify vel yes is needed")
+        yield "no friction: replace the tangential model by yours; comm_modify vel yes is needed in any case"
+        return
+    yield "x_gammat multiplies the damping of the normal model; comm_modify vel yes is needed"
     if collision.has_wall:
-        remarks += [
+        yield from (
             "fix wall/gran hooke/history and hertz/history of 22 July 2025: their friction depends on the unit of",
             "length, and 13 of 41 impacts had another beta than their law; in that of 23 June 2022 none had",
-        ]
-    else:
-        remarks.append(
-            "the normal of two balls turns during the contact, by some indentation/radius; here it is fixed"
         )
-    return remarks
+    else:
+        yield "the normal of two balls turns during the contact, by some indentation/radius; here it is fixed"
 
 
-def warnings(collision: Collision) -> list[str]:
+def warnings(collision: Collision) -> Lines:
     if OPTIONS[collision.model.key][1] == "tsuji" and collision.version < ROOT_SINCE:
         other = (
             f"use {argument('model', 'lammps-coeff-restitution-hertz')}"
             if collision.version >= COEFF_RESTITUTION_SINCE
             else f"releases since {COEFF_RESTITUTION_SINCE} have coeff_restitution"
         )
-        return [
+        yield (
             f"damping tsuji of LAMMPS {collision.version} lacks the factor sqrt(2) of pull request 5113 (July "
             f"2026): where e = 0.5 is asked for, hertz delivers 0.616; {other}"
-        ]
-    if collision.friction == "lammps-mindlin" and collision["xt"]:
-        return [
+        )
+    elif collision.friction == "lammps-mindlin" and collision["xt"]:
+        yield (
             "tangential mindlin with damping comes to its limit slowly: with x_gammat = 1, beta is off by 0.03 at "
             "100 steps per contact; use a variant"
-        ]
-    return []
+        )
 
 
 CODE = Code(

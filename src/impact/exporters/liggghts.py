@@ -7,7 +7,7 @@ import re
 
 from ..errors import UsageError
 from ..formatting import number
-from .code import Code, Collision, Parameters
+from .code import Code, Collision, Lines, Parameters
 from .lammps import PRINT_BETA, RUN
 from .programs import Program, printed_version
 
@@ -131,44 +131,38 @@ def lines(collision: Collision, parameters: Parameters) -> list[str]:
     ]
 
 
-def notes(collision: Collision) -> list[str]:
+def notes(collision: Collision) -> Lines:
     model, options = OPTIONS[collision.model.key]
-    remarks = [
-        "in SI (units si); the two atom types are those of ball 1 and ball 2",
-        "two materials: 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2; coefficientRestitution is of each pair of types",
-        f"refused: e <= {LEAST_E}, and Young's moduli outside 5e6 to 1e9 Pa without soft_ or hard_particles yes",
-    ]
+    yield "in SI (units si); the two atom types are those of ball 1 and ball 2"
+    yield "two materials: 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2; coefficientRestitution is of each pair of types"
+    yield f"refused: e <= {LEAST_E}, and Young's moduli outside 5e6 to 1e9 Pa without soft_ or hard_particles yes"
     if collision.has_wall:
-        remarks.append("the wall has the properties of type 2")
+        yield "the wall has the properties of type 2"
     if model == "hooke":
-        remarks.append("the stiffness follows from characteristicVelocity: set it to your speed of contact")
+        yield "the stiffness follows from characteristicVelocity: set it to your speed of contact"
     if model == "edinburgh" and collision.has_wall:
-        remarks.append("a wall does not adhere, whatever its surfaceEnergy is: 0 here")
+        yield "a wall does not adhere, whatever its surfaceEnergy is: 0 here"
     if model == "edinburgh":
-        remarks.append("without its dashpot: coefficientRestitution is 1; UnloadingStiffness is k2/K")
+        yield "without its dashpot: coefficientRestitution is 1; UnloadingStiffness is k2/K"
     else:
-        remarks.append(
+        yield (
             "limitForce on: the force is never negative"
             if options
             else "the force becomes attractive before separation; limitForce on removes this and changes the law"
         )
     if not collision.friction:
-        remarks.append("no friction: replace tangential no_history and coefficientFriction by yours")
-        return remarks
-    return [
-        *remarks,
-        "tangential_damping is on by default; ktToKnUser on: the tangential stiffness is 2/7 of that of hooke",
-        "friction acts at less than the radius from the centre, by a part of the indentation",
-    ]
+        yield "no friction: replace tangential no_history and coefficientFriction by yours"
+        return
+    yield "tangential_damping is on by default; ktToKnUser on: the tangential stiffness is 2/7 of that of hooke"
+    yield "friction acts at less than the radius from the centre, by a part of the indentation"
 
 
-def warnings(collision: Collision) -> list[str]:
+def warnings(collision: Collision) -> Lines:
     if collision.friction == "liggghts-history" and collision["tangential_damping"]:
-        return [
+        yield (
             "tangential history with damping alternates between slip and stick from step to step: 3 of 240 runs "
             "differed by up to 0.02 of the speed from what is predicted; with tangential_damping off none did"
-        ]
-    return []
+        )
 
 
 PROGRAM = Program(

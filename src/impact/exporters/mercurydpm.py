@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from ..formatting import quantity
-from .code import Code, Collision, Parameters
+from .code import Code, Collision, Lines, Parameters
 
 SPECIES = {
     "mercurydpm-linear-viscoelastic": "LinearViscoelasticSpecies",
@@ -35,28 +35,24 @@ def lines(collision: Collision, parameters: Parameters) -> list[str]:
     return [f"{name} species;", *setters, f"setTimeStep({collision.dt!r});"]
 
 
-def notes(collision: Collision) -> list[str]:
+def notes(collision: Collision) -> Lines:
     c = collision
-    remarks = ["in SI, C++; the values are those of the pair"]
+    yield "in SI, C++; the values are those of the pair"
     if c.model.key == "mercurydpm-linear-viscoelastic":
-        remarks += [
-            "two species: the mixed one has the harmonic means 2/(1/a + 1/b) of stiffness and dissipation",
-            f"the mass is twice the effective one: 2 m1 m2/(m1 + m2) = {quantity(2.0 * c['m'], 'kg')}",
-            "the setter stores a dissipation constant: other masses of the same species have another restitution",
-            "after setConstantRestitution (since 2021) stiffness and dissipation are per mass 2 m1 m2/(m1 + m2)",
-        ]
+        yield "two species: the mixed one has the harmonic means 2/(1/a + 1/b) of stiffness and dissipation"
+        yield f"the mass is twice the effective one: 2 m1 m2/(m1 + m2) = {quantity(2.0 * c['m'], 'kg')}"
+        yield "the setter stores a dissipation constant: other masses of the same species have another restitution"
+        yield "after setConstantRestitution (since 2021) stiffness and dissipation are per mass 2 m1 m2/(m1 + m2)"
     else:
-        remarks += [
-            "the modulus is E* = 1/((1 - nu1^2)/E1 + (1 - nu2^2)/E2)",
-            "two species: the mixed one has the harmonic means 2/(1/a + 1/b), which is right for their own E*",
-        ]
+        yield "the modulus is E* = 1/((1 - nu1^2)/E1 + (1 - nu2^2)/E2)"
+        yield "two species: the mixed one has the harmonic means 2/(1/a + 1/b), which is right for their own E*"
     if c.model.key == "tsuji-1992":
-        remarks.append("before September 2021 the setter was setElasticModulusAndRestitutionCoefficient")
+        yield "before September 2021 the setter was setElasticModulusAndRestitutionCoefficient"
     if c.model.key == "kuwabara-kono-1987":
-        remarks.append("the force is never negative; the species exists since September 2022")
+        yield "the force is never negative; the species exists since September 2022"
     else:
-        remarks.append("the force pulls before the contact ends")
-    return [*remarks, "no speed switches the restitution off"]
+        yield "the force pulls before the contact ends"
+    yield "no speed switches the restitution off"
 
 
 CODE = Code(

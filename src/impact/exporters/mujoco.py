@@ -6,7 +6,7 @@ import math
 
 from ..errors import UsageError
 from ..formatting import argument
-from .code import Code, Collision, Parameters
+from .code import Code, Collision, Lines, Parameters
 from .programs import python_package
 
 # least and largest impedance are equal: with the default, 0.9 and 0.95, the restitution depends on the indentation
@@ -118,27 +118,25 @@ def lines(collision: Collision, parameters: Parameters) -> list[str]:
     ]
 
 
-def notes(collision: Collision) -> list[str]:
-    is_standard = collision.model.key == "mujoco-solref"
-    return [
-        *(["timeconst >= 2 dt: MuJoCo raises a smaller one to 2 dt (flag refsafe)"] if is_standard else []),
-        "solref is per effective mass: the restitution does not depend on the masses, nor on the speed",
-        "unset, solref is 0.02 1, critical damping: e is 0.135 at any speed; a timeconst below 2 dt is raised",
-        "these lines assume constant solimp; the default, 0.9 0.95 0.001 0.5 2, gives a different restitution",
-        "two geoms: their solref and solimp are averaged by solmix, or those of the higher priority are taken",
-        "the force is never negative; a geom margin above 0 begins the contact earlier",
-        *(OF_FRICTION if collision.friction else ()),
-    ]
+def notes(collision: Collision) -> Lines:
+    if collision.model.key == "mujoco-solref":
+        yield "timeconst >= 2 dt: MuJoCo raises a smaller one to 2 dt (flag refsafe)"
+    yield "solref is per effective mass: the restitution does not depend on the masses, nor on the speed"
+    yield "unset, solref is 0.02 1, critical damping: e is 0.135 at any speed; a timeconst below 2 dt is raised"
+    yield "these lines assume constant solimp; the default, 0.9 0.95 0.001 0.5 2, gives a different restitution"
+    yield "two geoms: their solref and solimp are averaged by solmix, or those of the higher priority are taken"
+    yield "the force is never negative; a geom margin above 0 begins the contact earlier"
+    if collision.friction:
+        yield from OF_FRICTION
 
 
-def warnings(collision: Collision) -> list[str]:
-    if not (collision.friction and math.isnan(collision["b_t"])):
-        return []
-    return [
-        "solreffriction is unset, and thus that of solref, whose damping is small where e is large: with e = 0.8, "
-        "mu = 0.3, 40 degrees, 31 steps a ball kept 0.62 of its slip, and with rigid friction none; with a b_t "
-        "of 1/dt it kept none, and its e was 0.35 to 0.39"
-    ]
+def warnings(collision: Collision) -> Lines:
+    if collision.friction and math.isnan(collision["b_t"]):
+        yield (
+            "solreffriction is unset, and thus that of solref, whose damping is small where e is large: with "
+            "e = 0.8, mu = 0.3, 40 degrees, 31 steps a ball kept 0.62 of its slip, and with rigid friction none; "
+            "with a b_t of 1/dt it kept none, and its e was 0.35 to 0.39"
+        )
 
 
 CODE = Code(

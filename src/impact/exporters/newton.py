@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from ..formatting import number
-from .code import Code, Collision, Parameters, keyword_arguments
+from .code import Code, Collision, Lines, Parameters, keyword_arguments
 from .programs import python_package
 
 # the normal is along x, the tangent along y, so that spins are about z
@@ -72,27 +72,24 @@ def lines(collision: Collision, parameters: Parameters) -> list[str]:
     return [f"contact = newton.ModelBuilder.ShapeConfig({values}{smooth})", f"dt = {collision.dt!r}"]
 
 
-def notes(collision: Collision) -> list[str]:
+def notes(collision: Collision) -> Lines:
     c = collision
     # the spacing of coordinates near a radius, over the peak indentation of the undamped spring
     share = 2.0**-23 * c["R1"] / (c["v0"] * math.sqrt(c["m"] / c["K"]))
-    return [
-        "in SI, the same for both shapes: ke and kd of a contact are the means, not those of springs in series",
-        "kd acts on approach only; the restitution depends on kd/(2 sqrt(ke m)), thus on the masses, not on speed",
-        "unset, ke is 2500 N/m, kd 100 N s/m and mu 1; a margin above 0 begins the contact earlier",
-        "restitution is ignored here; SolverXPBD has it with enable_restitution=True, which is not its default",
-        "SolverFeatherstone has the same contact force; other solvers make other forces of ke and kd",
-        f"single precision: the indentation is resolved to {number(share, 2)} of its peak, and e about as well",
-        *(
-            (
-                "friction is min(kf g, mu N) with the slip g; with kf = m_t/dt, m_t 2/7 of the effective mass,",
-                "it is Coulomb's: at 40 degrees, mu = 0.3, 12 steps a 27th of it left 0.65 of the slip, 1.8 times",
-                "it reversed 0.014 of it; it depends on dt and the masses; unset, kf is 1000 N s/m",
-            )
-            if c.friction
-            else ("no friction: replace mu by yours",)
-        ),
-    ]
+    yield "in SI, the same for both shapes: ke and kd of a contact are the means, not those of springs in series"
+    yield (
+        "kd acts on approach only; the restitution depends on kd/(2 sqrt(ke m)), thus on the masses, not on speed"
+    )
+    yield "unset, ke is 2500 N/m, kd 100 N s/m and mu 1; a margin above 0 begins the contact earlier"
+    yield "restitution is ignored here; SolverXPBD has it with enable_restitution=True, which is not its default"
+    yield "SolverFeatherstone has the same contact force; other solvers make other forces of ke and kd"
+    yield f"single precision: the indentation is resolved to {number(share, 2)} of its peak, and e about as well"
+    if c.friction:
+        yield "friction is min(kf g, mu N) with the slip g; with kf = m_t/dt, m_t 2/7 of the effective mass,"
+        yield "it is Coulomb's: at 40 degrees, mu = 0.3, 12 steps a 27th of it left 0.65 of the slip, 1.8 times"
+        yield "it reversed 0.014 of it; it depends on dt and the masses; unset, kf is 1000 N s/m"
+    else:
+        yield "no friction: replace mu by yours"
 
 
 CODE = Code(

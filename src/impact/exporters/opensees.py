@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from .code import Code, Collision, Parameters
+from .code import Code, Collision, Lines, Parameters
 from .programs import python_package
 
 MATERIALS = {
@@ -79,21 +79,20 @@ def lines(collision: Collision, parameters: Parameters) -> list[str]:
     ]
 
 
-def notes(collision: Collision) -> list[str]:
-    remarks = [
+def notes(collision: Collision) -> Lines:
+    yield (
         "in SI; the order of the arguments is that of the element: "
         f"{', '.join(name for name in parameters(collision) if name != 'n')}, gap"
-        + (", n" if "n" in parameters(collision) else ""),
-        "compression is negative: the gap, and delta_y, are numbers below 0; set the gap to yours",
-    ]
+        + (", n" if "n" in parameters(collision) else "")
+    )
+    yield "compression is negative: the gap, and delta_y, are numbers below 0; set the gap to yours"
     if collision.model.key == "opensees-jankowski-impact":
-        remarks.append("Meff is the effective mass m1 m2/(m1 + m2), not the sum")
+        yield "Meff is the effective mass m1 m2/(m1 + m2), not the sum"
     if collision.model.key == "opensees-impact-material":
-        remarks.append("a bilinear spring for one indentation d only: another speed gives another restitution")
+        yield "a bilinear spring for one indentation d only: another speed gives another restitution"
     if collision.model.key == "kelvin-voigt":
-        remarks.append("the force pulls before the gap opens")
-    remarks.append("make the element before the nodes have velocities, which it would subtract")
-    return remarks
+        yield "the force pulls before the gap opens"
+    yield "make the element before the nodes have velocities, which it would subtract"
 
 
 CODE = Code(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .code import Code, Collision, Parameters
+from .code import Code, Collision, Lines, Parameters
 
 
 def parameters(collision: Collision) -> dict[str, float | str]:
@@ -24,7 +24,7 @@ def lines(collision: Collision, parameters: Parameters) -> list[str]:
     ]
 
 
-def notes(collision: Collision) -> list[str]:
+def notes(collision: Collision) -> Lines:
     return [
         "in SI; two materials: by default the mean of both; with a rigid one, the values of the compliant one",
         "a restitution from 0 to 1 is another law, rigid, without rebound below bounceThresholdVelocity (0.2 m/s)",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from .code import Code, Collision, Parameters, keyword_arguments
+from .code import Code, Collision, Lines, Parameters, keyword_arguments
 from .programs import python_package
 
 # the normal is along x, the tangent along y, so that spins are about z
@@ -64,26 +64,21 @@ def lines(collision: Collision, parameters: Parameters) -> list[str]:
     ]
 
 
-def notes(collision: Collision) -> list[str]:
-    return [
-        "in SI, of each of two equal bodies; two bodies: K = 1/(1/k1 + 1/k2), C = c1 + c2",
-        "contact is passed to changeDynamics of both bodies; stiffness and damping only together",
-        "a body without them is rigid and adds its default damping of 0.1 N s/m",
-        "contactSlop=0: by default the force begins at an indentation of 1e-5 m, and the rebound is slower",
-        "contactProcessingThreshold=0: by default shapes other than two spheres push a step before they touch",
-        "restitution=0: a value above 0 acts too where the speed is above restitutionVelocityThreshold (0.2 m/s)",
-        "linearDamping=0: its default of 0.04 damps every motion",
-        "maxJointVelocity=1e9: by default a body, a free one too, is never faster than 100 m/s",
-        "the force is that at the end of the step, never negative; each step takes energy, so that e is smaller",
-        *(
-            (
-                "lateralFriction is sqrt(mu): a contact has the product of those of both bodies; unset it is 0.5",
-                "angularDamping=0: its default of 0.04 damps every spin",
-            )
-            if collision.friction
-            else ("no friction: replace lateralFriction by yours; unset it is 0.5",)
-        ),
-    ]
+def notes(collision: Collision) -> Lines:
+    yield "in SI, of each of two equal bodies; two bodies: K = 1/(1/k1 + 1/k2), C = c1 + c2"
+    yield "contact is passed to changeDynamics of both bodies; stiffness and damping only together"
+    yield "a body without them is rigid and adds its default damping of 0.1 N s/m"
+    yield "contactSlop=0: by default the force begins at an indentation of 1e-5 m, and the rebound is slower"
+    yield "contactProcessingThreshold=0: by default shapes other than two spheres push a step before they touch"
+    yield "restitution=0: a value above 0 acts too where the speed is above restitutionVelocityThreshold (0.2 m/s)"
+    yield "linearDamping=0: its default of 0.04 damps every motion"
+    yield "maxJointVelocity=1e9: by default a body, a free one too, is never faster than 100 m/s"
+    yield "the force is that at the end of the step, never negative; each step takes energy, so that e is smaller"
+    if collision.friction:
+        yield "lateralFriction is sqrt(mu): a contact has the product of those of both bodies; unset it is 0.5"
+        yield "angularDamping=0: its default of 0.04 damps every spin"
+    else:
+        yield "no friction: replace lateralFriction by yours; unset it is 0.5"
 
 
 CODE = Code(

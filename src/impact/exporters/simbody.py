@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .code import Code, Collision, Parameters
+from .code import Code, Collision, Lines, Parameters
 from .programs import python_package
 
 LAWS = {
@@ -94,13 +94,11 @@ def lines(collision: Collision, parameters: Parameters) -> list[str]:
     ]
 
 
-def notes(collision: Collision) -> list[str]:
-    return [
-        "in SI; stiffness is the modulus of plane strain E/(1 - nu^2) of a sphere, not E and not K",
-        "dissipation is c of F = K x^1.5 (1 + 1.5 c v), in s/m: the restitution depends on the speed",
-        "two materials: c = (c1 k2 + c2 k1)/(k1 + k2), where k1 and k2 are the stiffnesses to the power 2/3",
-        "the force is never negative",
-    ]
+def notes(collision: Collision) -> Lines:
+    yield "in SI; stiffness is the modulus of plane strain E/(1 - nu^2) of a sphere, not E and not K"
+    yield "dissipation is c of F = K x^1.5 (1 + 1.5 c v), in s/m: the restitution depends on the speed"
+    yield "two materials: c = (c1 k2 + c2 k1)/(k1 + k2), where k1 and k2 are the stiffnesses to the power 2/3"
+    yield "the force is never negative"
 
 
 CODE = Code(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from ..formatting import number, quantity
-from .code import Code, Collision, Parameters
+from .code import Code, Collision, Lines, Parameters
 
 # of the peak indentation of the undamped spring: a wider transition region is warned about
 WIDE_TRANSITION = 0.1
@@ -33,29 +33,27 @@ def transition_share(collision: Collision) -> float:
     return c["w"] / (c["v0"] * math.sqrt(c["m"] / c["K"]))
 
 
-def notes(collision: Collision) -> list[str]:
+def notes(collision: Collision) -> Lines:
     share = number(transition_share(collision), 3)
-    return [
-        "in the default units of the block, N/m, N/(m/s) and m; block is its path in the model",
-        "in its dialog: Stiffness, Damping and Transition Region Width, in the section Normal Force",
-        "the documentation gives no formula for s, only that it goes from 0 to 1 and is level at both ends",
-        "the cubic s and that the force is never negative are our assumptions",
-        f"the width is {share} of the peak indentation of the undamped spring; the less, the less s matters",
-        "two materials: there is no mixing; the values are those of the pair",
-        "no speed switches the restitution off",
-        "a variable-step solver chooses its steps: limit them to a small share of the contact time",
-        "the block exists since R2019b",
-    ]
+    yield "in the default units of the block, N/m, N/(m/s) and m; block is its path in the model"
+    yield "in its dialog: Stiffness, Damping and Transition Region Width, in the section Normal Force"
+    yield "the documentation gives no formula for s, only that it goes from 0 to 1 and is level at both ends"
+    yield "the cubic s and that the force is never negative are our assumptions"
+    yield f"the width is {share} of the peak indentation of the undamped spring; the less, the less s matters"
+    yield "two materials: there is no mixing; the values are those of the pair"
+    yield "no speed switches the restitution off"
+    yield "a variable-step solver chooses its steps: limit them to a small share of the contact time"
+    yield "the block exists since R2019b"
 
 
-def warnings(collision: Collision) -> list[str]:
+def warnings(collision: Collision) -> Lines:
     share = transition_share(collision)
-    if share <= WIDE_TRANSITION:
-        return []
-    return [
-        f"Transition Region Width = {quantity(collision['w'], 'm')} is {number(share, 3)} of the peak indentation "
-        "of the undamped spring: the restitution depends on s of the block, whose formula is not documented"
-    ]
+    if share > WIDE_TRANSITION:
+        yield (
+            f"Transition Region Width = {quantity(collision['w'], 'm')} is {number(share, 3)} of the peak "
+            "indentation of the undamped spring: the restitution depends on s of the block, whose "
+            "formula is not documented"
+        )
 
 
 CODE = Code(

@@ -7,7 +7,7 @@ import re
 
 from ..contact.closed_forms.dashpot import gap_damping
 from ..errors import UsageError
-from .code import Code, Collision, Parameters, keyword_arguments
+from .code import Code, Collision, Lines, Parameters, keyword_arguments
 from .programs import Program, printed_version
 
 LAWS = {
@@ -167,35 +167,27 @@ def lines(collision: Collision, parameters: Parameters) -> list[str]:
     ]
 
 
-def notes(collision: Collision) -> list[str]:
-    remarks = ["in SI; NewtonIntegrator(damping=0): its default of 0.2 damps every motion"]
+def notes(collision: Collision) -> Lines:
+    yield "in SI; NewtonIntegrator(damping=0): its default of 0.2 damps every motion"
     if collision.friction:
-        remarks += [
-            "frictionAngle is atan(mu), of both materials",
-            "friction acts at less than the radius from the centre, by a part of the indentation",
-        ]
+        yield "frictionAngle is atan(mu), of both materials"
+        yield "friction acts at less than the radius from the centre, by a part of the indentation"
     if "viscoelastic" in collision.model.key:
-        return [
-            *remarks,
-            "kn, cn, ks and cs are of one ball: two balls act in series, and they are twice those of the contact",
-            "en of ViscElMat finds its damping only roughly; kn and cn are exact",
-            "the force is never negative (since January 2014)",
-        ]
+        yield "kn, cn, ks and cs are of one ball: two balls act in series, and they are twice those of the contact"
+        yield "en of ViscElMat finds its damping only roughly; kn and cn are exact"
+        yield "the force is never negative (since January 2014)"
+        return
     if collision.has_wall:
         by_default = "hertzian=True: by default " if is_hertzian(collision.version) else ""
-        remarks.append(f"{by_default}a wall has R* = R1/2, 0.7071 of a plane's K, and 1.149 of its contact time")
-    return [
-        *remarks,
-        "two materials: 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2; en and betan are set for each pair by MatchMaker",
-        "set en or betan, not both; en of 2023.02a is by Thornton and others, before that by Tsuji and others",
-        "the force is never negative (since September 2013)"
-        + ("" if collision.friction else "; frictionAngle=0: replace it by yours"),
-        *(
-            ["unset, betas is betan; beside en it is ignored: betas=0 gave a beta of 0.097 where 0.279 was due"]
-            if collision.friction
-            else []
-        ),
-    ]
+        yield f"{by_default}a wall has R* = R1/2, 0.7071 of a plane's K, and 1.149 of its contact time"
+    yield "two materials: 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2; en and betan are set for each pair by MatchMaker"
+    yield "set en or betan, not both; en of 2023.02a is by Thornton and others, before that by Tsuji and others"
+    remark = "the force is never negative (since September 2013)"
+    if collision.friction:
+        yield remark
+        yield "unset, betas is betan; beside en it is ignored: betas=0 gave a beta of 0.097 where 0.279 was due"
+    else:
+        yield f"{remark}; frictionAngle=0: replace it by yours"
 
 
 PROGRAM = Program(
