@@ -19,17 +19,15 @@ def parameters(collision: Collision) -> dict[str, float | str]:
     }
 
 
-def lines(collision: Collision, parameters: Parameters) -> list[str]:
+def lines(collision: Collision, parameters: Parameters) -> Lines:
     stiffness, exponent, damping, dmax = (repr(value) for value in parameters.values())
-    return [
-        "contact modify &",
-        "   contact_name = CONTACT_1 &",
-        f"   stiffness = {stiffness} &",
-        f"   damping = {damping} &",
-        f"   exponent = {exponent} &",
-        f"   dmax = {dmax}",
-        f"! as a function: IMPACT(x, dx/dt, x1, {stiffness}, {exponent}, {damping}, {dmax})",
-    ]
+    yield "contact modify &"
+    yield "   contact_name = CONTACT_1 &"
+    yield f"   stiffness = {stiffness} &"
+    yield f"   damping = {damping} &"
+    yield f"   exponent = {exponent} &"
+    yield f"   dmax = {dmax}"
+    yield f"! as a function: IMPACT(x, dx/dt, x1, {stiffness}, {exponent}, {damping}, {dmax})"
 
 
 def notes(collision: Collision) -> Lines:

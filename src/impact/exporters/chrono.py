@@ -94,47 +94,43 @@ def coefficients(collision: Collision) -> dict[str, float | str]:
     return {"Kn": K, "Gn": 2.0 * float(gap_damping(c["e"])) * math.sqrt(K / m)}
 
 
-def lines(collision: Collision, parameters: Parameters) -> list[str]:
+def lines(collision: Collision, parameters: Parameters) -> Lines:
     new_names = version_numbers(collision.version) >= RENAMED_SINCE
     material_class = "ChContactMaterialSMC" if new_names else "ChMaterialSurfaceSMC"
     info = "ChCollisionInfo" if new_names else "collision::ChCollisionInfo"
     names = ["material1", "material2"] if "YoungModulus2" in parameters else ["material"]
-    written = []
     for name, suffix in zip(names, ("", "2"), strict=False):
-        written.append(f"auto {name} = chrono_types::make_shared<{material_class}>();")
+        yield f"auto {name} = chrono_types::make_shared<{material_class}>();"
         for setter in ("YoungModulus", "PoissonRatio", "Restitution", "Kn", "Gn"):
             value = parameters.get(setter + suffix, parameters.get(setter))
             if value is not None:
-                written.append(f"{name}->Set{setter}({value!r});")
-    written += settings(collision, parameters)
+                yield f"{name}->Set{setter}({value!r});"
+    yield from settings(collision, parameters)
     if "EffectiveCurvatureRadius" in parameters:
-        radius = parameters["EffectiveCurvatureRadius"]
-        written.append(f"{info}::SetDefaultEffectiveCurvatureRadius({radius!r});")
+        yield f"{info}::SetDefaultEffectiveCurvatureRadius({parameters['EffectiveCurvatureRadius']!r});"
     masses = (collision["m1"], collision["m2"])
     if math.inf in masses:
-        written.append(f"wall->SetMass({FIXED_MASS_RATIO * min(masses)!r});")
-    return [*written, f"sys.DoStepDynamics({collision.dt!r});"]
+        yield f"wall->SetMass({FIXED_MASS_RATIO * min(masses)!r});"
+    yield f"sys.DoStepDynamics({collision.dt!r});"
 
 
-def settings(collision: Collision, parameters: Parameters) -> list[str]:
+def settings(collision: Collision, parameters: Parameters) -> Lines:
     """Write the lines that choose the law in the system."""
     system, force, _ = SETTINGS[collision.model.key]
     properties = str(from_material(collision)).lower()
     speed = parameters.get("CharacteristicImpactVelocity")
+    yield f"{system} sys;"
     if system == "ChSystemSMC":
-        written = [
-            "ChSystemSMC sys;",
-            f"sys.UseMaterialProperties({properties});",
-            f"sys.SetContactForceModel(ChSystemSMC::{force});",
-        ]
-        return written + ([] if speed is None else [f"sys.SetCharacteristicImpactVelocity({speed!r});"])
-    written = [
-        "ChSystemMulticoreSMC sys;",
-        f"sys.GetSettings()->solver.use_material_properties = {properties};",
-        f"sys.GetSettings()->solver.contact_force_model = ChSystemSMC::{force};",
-        "sys.GetSettings()->solver.tangential_displ_mode = ChSystemSMC::OneStep;",
-    ]
-    return written + ([] if speed is None else [f"sys.GetSettings()->solver.characteristic_vel = {speed!r};"])
+        yield f"sys.UseMaterialProperties({properties});"
+        yield f"sys.SetContactForceModel(ChSystemSMC::{force});"
+        if speed is not None:
+            yield f"sys.SetCharacteristicImpactVelocity({speed!r});"
+    else:
+        yield f"sys.GetSettings()->solver.use_material_properties = {properties};"
+        yield f"sys.GetSettings()->solver.contact_force_model = ChSystemSMC::{force};"
+        yield "sys.GetSettings()->solver.tangential_displ_mode = ChSystemSMC::OneStep;"
+        if speed is not None:
+            yield f"sys.GetSettings()->solver.characteristic_vel = {speed!r};"
 
 
 def notes(collision: Collision) -> Lines:

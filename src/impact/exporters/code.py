@@ -167,7 +167,7 @@ class Code:
     newest: str
     tested: str
     parameters: Callable[[Collision], dict[str, float | str]]
-    lines: Callable[[Collision, Parameters], list[str]]
+    lines: Callable[[Collision, Parameters], Lines]
     scheme: str | None = None
     uncertainty: Mapping[str, float] = field(default_factory=dict)
     law_for_version: Callable[[str, str], str] = lambda key, version: key
@@ -196,7 +196,7 @@ class Code:
         # only scripts need it
         from jinja2 import Environment, StrictUndefined
 
-        lines = self.lines(collision, parameters)
+        lines = list(self.lines(collision, parameters))
         material2 = "material2" if any(line.startswith("material2 = ") for line in lines) else "material1"
         values = {"material1": "material1", "material2": material2, **collision.script_values()}
         balls = [

@@ -80,25 +80,21 @@ def parameters(collision: Collision) -> dict[str, float | str]:
     return values if (k1, d1) == (k2, d2) else {**values, "point_stiffness2": k2, "dissipation2": d2}
 
 
-def lines(collision: Collision, parameters: Parameters) -> list[str]:
-    text, mu = [], parameters.get("friction", 0.0)
+def lines(collision: Collision, parameters: Parameters) -> Lines:
+    mu = parameters.get("friction", 0.0)
     for ball in ("1", "2") if "point_stiffness2" in parameters else ("1",):
-        text += [
-            f"material{ball} = ProximityProperties()",
-            "AddContactMaterial(",
-            f"    dissipation={parameters[f'dissipation{ball}']!r},",
-            f"    point_stiffness={parameters[f'point_stiffness{ball}']!r},",
-            f"    friction=CoulombFriction({mu}, {mu}),",
-            f"    properties=material{ball},",
-            ")",
-        ]
-    return [
-        *text,
-        f"plant, scene_graph = AddMultibodyPlantSceneGraph(builder, time_step={collision.dt!r})",
-        "plant.set_contact_model(ContactModel.kPoint)",
-        "plant.set_discrete_contact_approximation(DiscreteContactApproximation.kTamsi)",
-        *([f"plant.set_stiction_tolerance({parameters['stiction_tolerance']!r})"] if collision.friction else []),
-    ]
+        yield f"material{ball} = ProximityProperties()"
+        yield "AddContactMaterial("
+        yield f"    dissipation={parameters[f'dissipation{ball}']!r},"
+        yield f"    point_stiffness={parameters[f'point_stiffness{ball}']!r},"
+        yield f"    friction=CoulombFriction({mu}, {mu}),"
+        yield f"    properties=material{ball},"
+        yield ")"
+    yield f"plant, scene_graph = AddMultibodyPlantSceneGraph(builder, time_step={collision.dt!r})"
+    yield "plant.set_contact_model(ContactModel.kPoint)"
+    yield "plant.set_discrete_contact_approximation(DiscreteContactApproximation.kTamsi)"
+    if collision.friction:
+        yield f"plant.set_stiction_tolerance({parameters['stiction_tolerance']!r})"
 
 
 def notes(collision: Collision) -> Lines:

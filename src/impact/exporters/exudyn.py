@@ -45,7 +45,7 @@ def parameters(collision: Collision) -> dict[str, float | str]:
     return {"impactModel": number, "contactStiffness": c["K"], "contactStiffnessExponent": c["n"], **loss}
 
 
-def lines(collision: Collision, parameters: Parameters) -> list[str]:
+def lines(collision: Collision, parameters: Parameters) -> Lines:
     return [f"contact = dict({keyword_arguments(parameters)})", f"dt = {collision.dt!r}"]
 
 

@@ -174,10 +174,11 @@ def parameters(collision: Collision) -> dict[str, float | str]:
     }
 
 
-def lines(collision: Collision, parameters: Parameters) -> list[str]:
+def lines(collision: Collision, parameters: Parameters) -> Lines:
     elastic = ("YOUNG_MODULUS", "POISSON_RATIO")
-    materials = [{name: parameters[name] for name in elastic}]
-    materials.append({name: parameters.get(f"{name}2", parameters[name]) for name in elastic})
+    for i in ("1", "2"):
+        material = {name: parameters.get(f"{name}{i}", parameters[name]) for name in elastic}
+        yield f"material{i} = {json.dumps(material)}"
     relation = {
         "COEFFICIENT_OF_RESTITUTION": parameters["COEFFICIENT_OF_RESTITUTION"],
         "DEM_DISCONTINUUM_CONSTITUTIVE_LAW_NAME": parameters["DEM_DISCONTINUUM_CONSTITUTIVE_LAW_NAME"],
@@ -186,14 +187,11 @@ def lines(collision: Collision, parameters: Parameters) -> list[str]:
         "FRICTION_DECAY": 500.0,
         "ROLLING_FRICTION": 0.0,
     }
+    yield "relation = {"
+    yield from (f"    {json.dumps(name)}: {json.dumps(value)}," for name, value in relation.items())
+    yield "}"
     project = {"TranslationalIntegrationScheme": "Symplectic_Euler", "MaxTimeStep": collision.dt}
-    return [
-        *(f"material{i} = {json.dumps(material)}" for i, material in enumerate(materials, 1)),
-        "relation = {",
-        *(f"    {json.dumps(name)}: {json.dumps(value)}," for name, value in relation.items()),
-        "}",
-        f"parameters = {json.dumps(project)}",
-    ]
+    yield f"parameters = {json.dumps(project)}"
 
 
 def notes(collision: Collision) -> Lines:

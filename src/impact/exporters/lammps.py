@@ -203,7 +203,7 @@ def takes_moduli(collision: Collision) -> bool:
     return collision.has_one_material or not collision.has_wall
 
 
-def lines(collision: Collision, parameters: Parameters) -> list[str]:
+def lines(collision: Collision, parameters: Parameters) -> Lines:
     spring, damping, limit = OPTIONS[collision.model.key]
     # without friction the tangential force is zero
     names = [name for name in ("k_t", "x_gammat", "mu") if name in parameters]
@@ -215,14 +215,15 @@ def lines(collision: Collision, parameters: Parameters) -> list[str]:
         E, strength, nu, E2, nu2 = of_normal
         by_types = {"1 1": [E, strength, nu], "2 2": [E2, strength, nu2]}
     model = "hertz/material" if "E" in parameters else spring
-    contacts = {types: f"{model} {' '.join(words)} {rest}" for types, words in by_types.items()}
-    written = ["pair_style      granular", *(f"pair_coeff      {types} {law}" for types, law in contacts.items())]
-    if collision.has_wall:
-        written = [f"fix             wall all wall/gran granular {contacts['* *']} xplane NULL 0.0"]
-    return [
-        *written,
-        f"timestep        {collision.dt!r}",
-    ]
+    if not collision.has_wall:
+        yield "pair_style      granular"
+    for types, words in by_types.items():
+        contact = f"{model} {' '.join(words)} {rest}"
+        if collision.has_wall:
+            yield f"fix             wall all wall/gran granular {contact} xplane NULL 0.0"
+        else:
+            yield f"pair_coeff      {types} {contact}"
+    yield f"timestep        {collision.dt!r}"
 
 
 def notes(collision: Collision) -> Lines:

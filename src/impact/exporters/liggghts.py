@@ -111,24 +111,22 @@ def friction_options(collision: Collision) -> str:
     return words + (" ktToKnUser on" if is_reduced else "")
 
 
-def lines(collision: Collision, parameters: Parameters) -> list[str]:
+def lines(collision: Collision, parameters: Parameters) -> Lines:
     model, options = OPTIONS[collision.model.key]
     moduli = collision["E1"], collision["E2"]
     contact = f"gran model {model} tangential {FRICTIONS.get(collision.friction, 'no_history')}"
     options += friction_options(collision)
-    wall = f"fix             wall all wall/{contact} primitive type 2 xplane 0.0{options}"
-    return [
-        *(["soft_particles  yes"] if min(moduli) < SOFT else []),
-        *(["hard_particles  yes"] if max(moduli) > HARD else []),
-        *(
-            f"fix             m{number} all property/global {name} {words}"
-            for number, (name, words) in enumerate(parameters.items(), 1)
-        ),
-        f"pair_style      {contact}{options}",
-        "pair_coeff      * *",
-        *([wall] if collision.has_wall else []),
-        f"timestep        {collision.dt!r}",
-    ]
+    if min(moduli) < SOFT:
+        yield "soft_particles  yes"
+    if max(moduli) > HARD:
+        yield "hard_particles  yes"
+    for position, (name, words) in enumerate(parameters.items(), 1):
+        yield f"fix             m{position} all property/global {name} {words}"
+    yield f"pair_style      {contact}{options}"
+    yield "pair_coeff      * *"
+    if collision.has_wall:
+        yield f"fix             wall all wall/{contact} primitive type 2 xplane 0.0{options}"
+    yield f"timestep        {collision.dt!r}"
 
 
 def notes(collision: Collision) -> Lines:

@@ -23,16 +23,18 @@ def parameters(collision: Collision) -> dict[str, float | str]:
     return {"effectiveElasticModulus": 0.75 * c["K"] / math.sqrt(c.effective_radius), **loss}
 
 
-def lines(collision: Collision, parameters: Parameters) -> list[str]:
+def lines(collision: Collision, parameters: Parameters) -> Lines:
     name = SPECIES[collision.model.key]
     values = [repr(value) for value in parameters.values()]
+    yield f"{name} species;"
     if name == "LinearViscoelasticSpecies":
-        setters = [f"species.setStiffnessAndRestitutionCoefficient({', '.join(values)});"]
+        yield f"species.setStiffnessAndRestitutionCoefficient({', '.join(values)});"
     elif name == "HertzianViscoelasticSpecies":
-        setters = [f"species.setEffectiveElasticModulusAndRestitutionCoefficient({', '.join(values)});"]
+        yield f"species.setEffectiveElasticModulusAndRestitutionCoefficient({', '.join(values)});"
     else:
-        setters = [f"species.setEffectiveElasticModulus({values[0]});", f"species.setDissipation({values[1]});"]
-    return [f"{name} species;", *setters, f"setTimeStep({collision.dt!r});"]
+        yield f"species.setEffectiveElasticModulus({values[0]});"
+        yield f"species.setDissipation({values[1]});"
+    yield f"setTimeStep({collision.dt!r});"
 
 
 def notes(collision: Collision) -> Lines:

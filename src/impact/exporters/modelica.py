@@ -12,7 +12,7 @@ def parameters(collision: Collision) -> dict[str, float | str]:
     return {"c": collision["K"], "d": collision["d"], "n": collision["n"], "s_rel0": 0.0}
 
 
-def lines(collision: Collision, parameters: Parameters) -> list[str]:
+def lines(collision: Collision, parameters: Parameters) -> Lines:
     modifiers = ", ".join(f"{name} = {value!r}" for name, value in parameters.items())
     return [f"Modelica.Mechanics.Translational.Components.ElastoGap contact({modifiers});"]
 

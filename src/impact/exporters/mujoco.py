@@ -97,25 +97,18 @@ def parameters(collision: Collision) -> dict[str, float | str]:
     }
 
 
-def lines(collision: Collision, parameters: Parameters) -> list[str]:
+def lines(collision: Collision, parameters: Parameters) -> Lines:
+    names = [name for name in ("friction", "solref", "solreffriction", "solimp") if name in parameters]
+    values = " ".join(f'{name}="{parameters[name]}"' for name in names)
+    cone = f' cone="elliptic" impratio="{parameters["impratio"]}"' if collision.friction else ""
+    yield f'<option timestep="{collision.dt!r}" integrator="Euler"{cone}/>'
+    yield "<default>"
+    yield f'  <pair condim="3" {values}/>' if collision.friction else f"  <geom {values}/>"
+    yield "</default>"
     if collision.friction:
-        return [
-            f'<option timestep="{collision.dt!r}" integrator="Euler" cone="elliptic" '
-            f'impratio="{parameters["impratio"]}"/>',
-            "<default>",
-            '  <pair condim="3" friction="{friction}" solref="{solref}" solreffriction="{solreffriction}" '
-            'solimp="{solimp}"/>'.format(**parameters),
-            "</default>",
-            "<contact>",
-            '  <pair geom1="ball1" geom2="ball2"/>',
-            "</contact>",
-        ]
-    return [
-        f'<option timestep="{collision.dt!r}" integrator="Euler"/>',
-        "<default>",
-        f'  <geom solref="{parameters["solref"]}" solimp="{parameters["solimp"]}"/>',
-        "</default>",
-    ]
+        yield "<contact>"
+        yield '  <pair geom1="ball1" geom2="ball2"/>'
+        yield "</contact>"
 
 
 def notes(collision: Collision) -> Lines:

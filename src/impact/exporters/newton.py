@@ -67,7 +67,7 @@ def parameters(collision: Collision) -> dict[str, float | str]:
     return {**normal, "kf": 1.0 / (slip_per_impulse * c.dt), "mu": c["mu"]}
 
 
-def lines(collision: Collision, parameters: Parameters) -> list[str]:
+def lines(collision: Collision, parameters: Parameters) -> Lines:
     values, smooth = keyword_arguments(parameters), "" if collision.friction else ", mu=0"
     return [f"contact = newton.ModelBuilder.ShapeConfig({values}{smooth})", f"dt = {collision.dt!r}"]
 

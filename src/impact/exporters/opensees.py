@@ -68,15 +68,12 @@ def parameters(collision: Collision) -> dict[str, float | str]:
     return {"K": c["K"], "C": c["C"]}
 
 
-def lines(collision: Collision, parameters: Parameters) -> list[str]:
-    name = MATERIALS[collision.model.key]
-    before = [repr(value) for key, value in parameters.items() if key != "n"]
-    after = [repr(parameters["n"])] if "n" in parameters else []
-    arguments = ", ".join([*before, "gap", *after])
-    return [
-        f'ops.uniaxialMaterial("{name}", 1, {arguments})',
-        'ops.element("zeroLength", 1, 1, 2, "-mat", 1, "-dir", 1)',
-    ]
+def lines(collision: Collision, parameters: Parameters) -> Lines:
+    values = [repr(value) for value in parameters.values()]
+    # only an exponent follows the gap
+    values.insert(-1 if "n" in parameters else len(values), "gap")
+    yield f'ops.uniaxialMaterial("{MATERIALS[collision.model.key]}", 1, {", ".join(values)})'
+    yield 'ops.element("zeroLength", 1, 1, 2, "-mat", 1, "-dir", 1)'
 
 
 def notes(collision: Collision) -> Lines:

@@ -10,18 +10,16 @@ def parameters(collision: Collision) -> dict[str, float | str]:
     return {"compliantContactStiffness": collision["K"], "compliantContactDamping": collision["C"]}
 
 
-def lines(collision: Collision, parameters: Parameters) -> list[str]:
+def lines(collision: Collision, parameters: Parameters) -> Lines:
     stiffness, damping = parameters.values()
-    return [
-        f"PxMaterial* material = physics->createMaterial(0.0f, 0.0f, -{stiffness!r});",
-        f"material->setDamping({damping!r});",
-        "sceneDesc.solverType = PxSolverType::ePGS;",
-        f"scene->simulate({collision.dt!r});",
-        "// in USD, on the material:",
-        *(f"//   float physxMaterial:{name} = {value!r}" for name, value in parameters.items()),
-        "// in Isaac Lab, of RigidBodyMaterialCfg:",
-        f"//   compliant_contact_stiffness={stiffness!r}, compliant_contact_damping={damping!r}",
-    ]
+    yield f"PxMaterial* material = physics->createMaterial(0.0f, 0.0f, -{stiffness!r});"
+    yield f"material->setDamping({damping!r});"
+    yield "sceneDesc.solverType = PxSolverType::ePGS;"
+    yield f"scene->simulate({collision.dt!r});"
+    yield "// in USD, on the material:"
+    yield from (f"//   float physxMaterial:{name} = {value!r}" for name, value in parameters.items())
+    yield "// in Isaac Lab, of RigidBodyMaterialCfg:"
+    yield f"//   compliant_contact_stiffness={stiffness!r}, compliant_contact_damping={damping!r}"
 
 
 def notes(collision: Collision) -> Lines:

@@ -54,14 +54,12 @@ def parameters(collision: Collision) -> dict[str, float | str]:
     return {**normal, "lateralFriction": math.sqrt(c["mu"])} if c.friction else {**normal}
 
 
-def lines(collision: Collision, parameters: Parameters) -> list[str]:
+def lines(collision: Collision, parameters: Parameters) -> Lines:
     smooth = "angularDamping=0" if collision.friction else "lateralFriction=0"
-    return [
-        f"bullet.setTimeStep({collision.dt!r})",
-        "bullet.setPhysicsEngineParameter(contactSlop=0)",
-        f"contact = dict({keyword_arguments(parameters)}, restitution=0, contactProcessingThreshold=0)",
-        f"contact |= dict({smooth}, linearDamping=0, maxJointVelocity=1e9)",
-    ]
+    yield f"bullet.setTimeStep({collision.dt!r})"
+    yield "bullet.setPhysicsEngineParameter(contactSlop=0)"
+    yield f"contact = dict({keyword_arguments(parameters)}, restitution=0, contactProcessingThreshold=0)"
+    yield f"contact |= dict({smooth}, linearDamping=0, maxJointVelocity=1e9)"
 
 
 def notes(collision: Collision) -> Lines:

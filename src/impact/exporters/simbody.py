@@ -77,21 +77,16 @@ def parameters(collision: Collision) -> dict[str, float | str]:
     }
 
 
-def lines(collision: Collision, parameters: Parameters) -> list[str]:
-    return [
-        line
-        for i in (1, 2)
-        for line in (
-            "<HuntCrossleyForce::ContactParameters>",
-            f"  <geometry>{'wall' if i == 2 and collision.has_wall else f'sphere{i}'}</geometry>",
-            f"  <stiffness>{parameters[f'stiffness{i}']!r}</stiffness>",
-            f"  <dissipation>{parameters[f'dissipation{i}']!r}</dissipation>",
-            "  <static_friction>0</static_friction>",
-            "  <dynamic_friction>0</dynamic_friction>",
-            "  <viscous_friction>0</viscous_friction>",
-            "</HuntCrossleyForce::ContactParameters>",
-        )
-    ]
+def lines(collision: Collision, parameters: Parameters) -> Lines:
+    for i in (1, 2):
+        yield "<HuntCrossleyForce::ContactParameters>"
+        yield f"  <geometry>{'wall' if i == 2 and collision.has_wall else f'sphere{i}'}</geometry>"
+        yield f"  <stiffness>{parameters[f'stiffness{i}']!r}</stiffness>"
+        yield f"  <dissipation>{parameters[f'dissipation{i}']!r}</dissipation>"
+        yield "  <static_friction>0</static_friction>"
+        yield "  <dynamic_friction>0</dynamic_friction>"
+        yield "  <viscous_friction>0</viscous_friction>"
+        yield "</HuntCrossleyForce::ContactParameters>"
 
 
 def notes(collision: Collision) -> Lines:

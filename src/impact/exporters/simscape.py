@@ -22,7 +22,7 @@ def parameters(collision: Collision) -> dict[str, float | str]:
     }
 
 
-def lines(collision: Collision, parameters: Parameters) -> list[str]:
+def lines(collision: Collision, parameters: Parameters) -> Lines:
     pairs = [f"'{name}', '{value}'" for name, value in parameters.items()]
     return ["set_param(block, ...", *(f"    {pair}, ..." for pair in pairs[:-1]), f"    {pairs[-1]});"]
 

@@ -135,7 +135,7 @@ def is_hertzian(version: str) -> bool:
     return version >= "2023.02a"
 
 
-def lines(collision: Collision, parameters: Parameters) -> list[str]:
+def lines(collision: Collision, parameters: Parameters) -> Lines:
     remaining = dict(parameters)
     angle = {"frictionAngle": remaining.pop("frictionAngle", 0)}
     second = {name: remaining.pop(f"{name}2") for name in ("young", "poisson") if f"{name}2" in remaining}
@@ -148,23 +148,20 @@ def lines(collision: Collision, parameters: Parameters) -> list[str]:
         material = f"FrictMat({keyword_arguments(elastic | angle)})"
         physics = f"Ip2_FrictMat_FrictMat_MindlinPhys({keyword_arguments(remaining)})"
         law = "Law2_ScGeom_MindlinPhys_Mindlin()"
-    text = [f"material1 = O.materials.append({material})"]
+    yield f"material1 = O.materials.append({material})"
     if second:
-        text.append(f"material2 = O.materials.append(FrictMat({keyword_arguments(second | angle)}))")
+        yield f"material2 = O.materials.append(FrictMat({keyword_arguments(second | angle)}))"
     bounds, geometries = "Bo1_Sphere_Aabb()", "Ig2_Sphere_Sphere_ScGeom()"
     if collision.has_wall:
         bounds += ", Bo1_Wall_Aabb()"
         geometries += f", Ig2_Wall_Sphere_ScGeom({'hertzian=True' if is_hertzian(collision.version) else ''})"
-    return [
-        *text,
-        "O.engines = [",
-        "    ForceResetter(),",
-        f"    InsertionSortCollider([{bounds}]),",
-        f"    InteractionLoop([{geometries}], [{physics}], [{law}]),",
-        "    NewtonIntegrator(damping=0),",
-        "]",
-        f"O.dt = {collision.dt!r}",
-    ]
+    yield "O.engines = ["
+    yield "    ForceResetter(),"
+    yield f"    InsertionSortCollider([{bounds}]),"
+    yield f"    InteractionLoop([{geometries}], [{physics}], [{law}]),"
+    yield "    NewtonIntegrator(damping=0),"
+    yield "]"
+    yield f"O.dt = {collision.dt!r}"
 
 
 def notes(collision: Collision) -> Lines:
