@@ -212,7 +212,10 @@ def export(
     (dt,) = timestep.time_steps(contact_time, [] if given else [STEPS_PER_CONTACT], given)
     collision = problem.collision(dt, 0.5)
     parameters = code.parameters(collision)
-    at_dt = _row(problem, dt)
+    # NaN without a scheme
+    at_dt = timestep.TimestepRow(dt, contact_time / dt, math.nan, math.nan, math.nan, math.nan)
+    if code.scheme is not None:
+        (at_dt,) = timestep.timestep_rows(problem.law, [dt])
     advised = None
     # with friction that changes e, no step delivers the e that is asked for
     if code.scheme is not None and problem.requested_e > 0.0 and not problem.law.is_coupled:
@@ -227,7 +230,7 @@ def export(
         if name:
             needed = timestep.needed_parameter(problem.point, name, dt, ADVISED_TOL, problem.law, advised)
     needed_text = str(needed or (timestep.missing_parameter(parameter, ADVISED_TOL) if parameter else ""))
-    header = _header(problem, collision, at_dt, advised, needed_text)
+    header = tuple(_header(problem, collision, at_dt, advised, needed_text))
     result = Export(
         code=code.name,
         version=problem.version,
@@ -242,7 +245,7 @@ def export(
         at_dt=at_dt,
         needed=needed,
         parameters=parameters,
-        header=tuple(header),
+        header=header,
         lines=tuple(code.lines(collision, parameters)),
         script="\n".join([*comment_lines(header), code.script(collision, parameters)]) if script else None,
         warnings=tuple(_warnings(problem, collision, at_dt)),
@@ -281,30 +284,21 @@ def export_codes() -> list[dict[str, Any]]:
     ]
 
 
-def _warnings(problem: ExportProblem, collision: Collision, row: timestep.TimestepRow) -> list[str]:
+def _warnings(problem: ExportProblem, collision: Collision, row: timestep.TimestepRow) -> Iterator[str]:
     """List what a user has to know before using the lines."""
-    warnings = list(problem.code.warnings(collision))
+    yield from problem.code.warnings(collision)
     if problem.better_fit:
-        warnings.append(problem.better_fit)
+        yield problem.better_fit
     if abs(problem.e_continuous - problem.requested_e) > ASKED_TOL:
         key, requested = problem.model.key, number(problem.requested_e)
-        warnings.append(
+        yield (
             f"{key} delivers {number(problem.e_continuous)} where e = {requested} is asked for; impact solve "
             f"--model {key} --for e --target e_out={requested} finds the e to enter"
         )
     if problem.left_out:
         laws = ", ".join(problem.left_out)
-        warnings.append(f"{laws}: {problem.code.title} has no such friction law, the lines have no friction")
-    return [*warnings, *row.warnings(problem.law.phases)]
-
-
-def _row(problem: ExportProblem, dt: float) -> timestep.TimestepRow:
-    """Compute what the code delivers at a time step [s]; NaN without a scheme."""
-    if problem.code.scheme is None:
-        nan = math.nan
-        return timestep.TimestepRow(dt, problem.law.contact_time / dt, nan, nan, nan, nan)
-    (row,) = timestep.timestep_rows(problem.law, [dt])
-    return row
+        yield f"{laws}: {problem.code.title} has no such friction law, the lines have no friction"
+    yield from row.warnings(problem.law.phases)
 
 
 def _header(
@@ -313,56 +307,44 @@ def _header(
     row: timestep.TimestepRow,
     advised: timestep.NeededSteps | None,
     needed: str,
-) -> list[str]:
+) -> Iterator[str]:
     """Write what a comment above the lines says."""
     code, law = problem.code, problem.law
-    header = [
-        f"{code.title}, {problem.version}; written by impact {__version__}",
-        f"law: {problem.model.key}, {problem.model.equation}",
-    ]
-    if problem.missing_law:
-        header.append(f"release {problem.version} lacks the default law of {code.newest}, {problem.missing_law}")
-    header += [*([problem.better_fit] if problem.better_fit else []), *problem.fit_notes]
-    if problem.defaults:
-        header.append(f"defaults of Table 1 of the paper: {', '.join(problem.defaults)}")
-    if problem.point.defaulted_axes:
-        header.append(f"first value of each axis of the source: {', '.join(problem.point.defaulted_axes)}")
+    yield f"{code.title}, {problem.version}; written by impact {__version__}"
+    yield f"law: {problem.model.key}, {problem.model.equation}"
+    yield from problem.notes
     if problem.has_wall:
-        radius = float(law.impact.R_eff[0])
+        radius = collision["R_eff"]
         known = "" if math.isnan(radius) else f", R* = {quantity(radius, 'm')}"
         moving = "; in a script it is at rest, and ball 1 has v1 - v2" if collision["v2"] else ""
-        header.append(f"ball 2 is a plane wall: m = m1{known}{moving}")
+        yield f"ball 2 is a plane wall: m = m1{known}{moving}"
     for name, value in (problem.point.solved or {}).items():
-        header.append(f"{name} = {value!r} gives the e that is wanted")
+        yield f"{name} = {value!r} gives the e that is wanted"
     asked = f"e = {number(law.e)} is asked for; " if law.has_e else ""
-    contact_time = quantity(law.contact_time, "s")
-    header.append(
-        f"{asked}the continuous law delivers {number(problem.e_continuous)} in a contact time of {contact_time}"
-    )
+    delivered, contact_time = number(problem.e_continuous), quantity(law.contact_time, "s")
+    yield f"{asked}the continuous law delivers {delivered} in a contact time of {contact_time}"
     steps = f"dt = {quantity(row.dt, 's')}, {number(row.steps_per_contact)} steps per contact"
     if law.rayleigh_time == law.rayleigh_time:
         steps += f", {number(row.dt / law.rayleigh_time, 3)} of the Rayleigh time"
     if code.scheme is None:
-        header.append(f"{steps}: what the code's scheme delivers there is not predicted")
+        yield f"{steps}: what the code's scheme delivers there is not predicted"
     else:
         spread = f"{decimals(row.e_least)} to {decimals(row.e_largest)} by the phase in the step"
         delivered = row.failure(law.phases) if row.failed else f"mean e {decimals(row.e_mean)}, {spread}"
-        header.append(f"{steps}: {delivered} ({law.scheme})")
+        yield f"{steps}: {delivered} ({law.scheme})"
         if law.oblique is not None and not row.failed:
-            beta = (
-                f"mean beta {decimals(row.beta_mean)}, {decimals(row.beta_least)} to {decimals(row.beta_largest)}"
-            )
+            spread = f"{decimals(row.beta_least)} to {decimals(row.beta_largest)}"
             # without slip there is no beta
-            delivered = beta if row.beta_mean == row.beta_mean else "no beta without slip"
-            header.append(f"friction: {law.oblique.pair.friction.key}, {delivered}")
+            has_slip = row.beta_mean == row.beta_mean
+            delivered = f"mean beta {decimals(row.beta_mean)}, {spread}" if has_slip else "no beta without slip"
+            yield f"friction: {law.oblique.pair.friction.key}, {delivered}"
         if row.e_to_ask == row.e_to_ask:
-            header.append(
-                f"a mean of {number(problem.requested_e)} at this dt: enter e = {decimals(row.e_to_ask)}"
-            )
+            yield f"a mean of {number(problem.requested_e)} at this dt: enter e = {decimals(row.e_to_ask)}"
         if advised is not None:
             within = f"within {number(100.0 * ADVISED_TOL)} % of {number(problem.requested_e)}"
             dt = quantity(rounded(advised.dt, 3, up=False), "s", 3)
-            header.append(f"recommended: dt <= {dt} keeps e {within} whatever the phase")
+            yield f"recommended: dt <= {dt} keeps e {within} whatever the phase"
         if needed:
-            header.append(needed)
-    return [*header, *code.notes(collision), code.tested]
+            yield needed
+    yield from code.notes(collision)
+    yield code.tested

@@ -43,10 +43,8 @@ class ExportProblem:
     ----------
     law : the law, the impact and the contact time of the continuous law
     point : the config, the axes of the source that are at their first value, and the damping that was solved for
-    fit_notes : of a calibration, the rank of the law and its weight, and other laws that were fitted
+    notes : where the law and its values come from: a release, a calibration, Table 1 of the paper, first values
     better_fit : a remark on the law of a calibration that fits best, where it is none of the code; else ""
-    missing_law : the default law of the newest release, where this one lacks it and none was requested; else ""
-    defaults : values of Table 1 of the paper that enter, since nothing else gives them
     left_out : friction laws of the source, where the code has none of them
     """
 
@@ -54,10 +52,8 @@ class ExportProblem:
     version: str
     law: FixedStepLaw
     point: PointWithE
-    fit_notes: tuple[str, ...]
+    notes: tuple[str, ...]
     better_fit: str
-    missing_law: str
-    defaults: tuple[str, ...]
     left_out: tuple[str, ...]
 
     @property
@@ -133,14 +129,15 @@ def prepare_export(
     """Choose the law, and reduce the source to one impact; the damping of a law without e is solved for."""
     opened = open_source(source, overrides, Plugins(()))
     point_source = replace(opened, config_draft=replace(opened.config_draft, has_own_scheme=True))
-    missing = ""
+    notes = []
     if model is not None:
         key = law_of_code(code, model, version)
     elif models := point_source.models:
         key = first_law(code, models, version, is_fitted=point_source.calibration is not None)
     else:
         key, newest = (first_law(code, tuple(code.laws), release) for release in (version, code.newest))
-        missing = "" if key == newest else newest
+        if key != newest:
+            notes.append(f"release {version} lacks the default law of {code.newest}, {newest}")
     point_source = _with_parameters(point_source, key)
     chosen, left_out = _choose_friction(code, point_source, key, friction)
     point = point_with_e(
@@ -153,17 +150,21 @@ def prepare_export(
     warn_of_point(point_source, point, fixed.impact, fixed.continuous)
     if fixed.oblique is not None:
         _check_limit(code, fixed.oblique)
-    calibration = point_source.calibration
-    better_fit, fit_notes = _fit_notes(code, version, key, calibration) if calibration else ("", ())
+    better_fit = ""
+    if calibration := point_source.calibration:
+        better_fit, fit_notes = _fit_notes(code, version, key, calibration)
+        notes += [better_fit, *fit_notes] if better_fit else fit_notes
+    if point_source.is_starter and (defaults := _defaults(point_source, at, point.config)):
+        notes.append(f"defaults of Table 1 of the paper: {', '.join(defaults)}")
+    if point.defaulted_axes:
+        notes.append(f"first value of each axis of the source: {', '.join(point.defaulted_axes)}")
     return ExportProblem(
         code=code,
         version=version,
         law=fixed,
         point=point,
-        fit_notes=fit_notes,
+        notes=tuple(notes),
         better_fit=better_fit,
-        missing_law=missing,
-        defaults=_defaults(point_source, at, point.config) if point_source.is_starter else (),
         left_out=left_out,
     )
 
