@@ -95,6 +95,7 @@ def coefficients(collision: Collision) -> dict[str, float | str]:
 
 
 def lines(collision: Collision, parameters: Parameters) -> Lines:
+    system, force, _ = SETTINGS[collision.model.key]
     new_names = version_numbers(collision.version) >= RENAMED_SINCE
     material_class = "ChContactMaterialSMC" if new_names else "ChMaterialSurfaceSMC"
     info = "ChCollisionInfo" if new_names else "collision::ChCollisionInfo"
@@ -105,32 +106,25 @@ def lines(collision: Collision, parameters: Parameters) -> Lines:
             value = parameters.get(setter + suffix, parameters.get(setter))
             if value is not None:
                 yield f"{name}->Set{setter}({value!r});"
-    yield from settings(collision, parameters)
+    properties = str(from_material(collision)).lower()
+    yield f"{system} sys;"
+    if system == "ChSystemSMC":
+        set_speed = "sys.SetCharacteristicImpactVelocity({!r});"
+        yield f"sys.UseMaterialProperties({properties});"
+        yield f"sys.SetContactForceModel(ChSystemSMC::{force});"
+    else:
+        set_speed = "sys.GetSettings()->solver.characteristic_vel = {!r};"
+        yield f"sys.GetSettings()->solver.use_material_properties = {properties};"
+        yield f"sys.GetSettings()->solver.contact_force_model = ChSystemSMC::{force};"
+        yield "sys.GetSettings()->solver.tangential_displ_mode = ChSystemSMC::OneStep;"
+    if "CharacteristicImpactVelocity" in parameters:
+        yield set_speed.format(parameters["CharacteristicImpactVelocity"])
     if "EffectiveCurvatureRadius" in parameters:
         yield f"{info}::SetDefaultEffectiveCurvatureRadius({parameters['EffectiveCurvatureRadius']!r});"
     masses = (collision["m1"], collision["m2"])
     if math.inf in masses:
         yield f"wall->SetMass({FIXED_MASS_RATIO * min(masses)!r});"
     yield f"sys.DoStepDynamics({collision.dt!r});"
-
-
-def settings(collision: Collision, parameters: Parameters) -> Lines:
-    """Write the lines that choose the law in the system."""
-    system, force, _ = SETTINGS[collision.model.key]
-    properties = str(from_material(collision)).lower()
-    speed = parameters.get("CharacteristicImpactVelocity")
-    yield f"{system} sys;"
-    if system == "ChSystemSMC":
-        yield f"sys.UseMaterialProperties({properties});"
-        yield f"sys.SetContactForceModel(ChSystemSMC::{force});"
-        if speed is not None:
-            yield f"sys.SetCharacteristicImpactVelocity({speed!r});"
-    else:
-        yield f"sys.GetSettings()->solver.use_material_properties = {properties};"
-        yield f"sys.GetSettings()->solver.contact_force_model = ChSystemSMC::{force};"
-        yield "sys.GetSettings()->solver.tangential_displ_mode = ChSystemSMC::OneStep;"
-        if speed is not None:
-            yield f"sys.GetSettings()->solver.characteristic_vel = {speed!r};"
 
 
 def notes(collision: Collision) -> Lines:

@@ -160,15 +160,12 @@ def parameters(collision: Collision) -> dict[str, float | str]:
     """Variables of the materials and of their relation, by their names in Kratos."""
     c = collision
     c.require_materials("Kratos takes Young's modulus and Poisson's ratio")
-    second: dict[str, float | str] = (
-        {} if c.has_one_material else {"YOUNG_MODULUS2": c["E2"], "POISSON_RATIO2": c["nu2"]}
-    )
-    friction = dict.fromkeys(("STATIC_FRICTION", "DYNAMIC_FRICTION"), c["mu"]) if c.friction else {}
-    return {
-        "YOUNG_MODULUS": c["E1"],
-        "POISSON_RATIO": c["nu1"],
-        **second,
-        **friction,
+    values: dict[str, float | str] = {"YOUNG_MODULUS": c["E1"], "POISSON_RATIO": c["nu1"]}
+    if not c.has_one_material:
+        values |= {"YOUNG_MODULUS2": c["E2"], "POISSON_RATIO2": c["nu2"]}
+    if c.friction:
+        values |= {"STATIC_FRICTION": c["mu"], "DYNAMIC_FRICTION": c["mu"]}
+    return values | {
         "COEFFICIENT_OF_RESTITUTION": c["e"],
         "DEM_DISCONTINUUM_CONSTITUTIVE_LAW_NAME": LAWS[c.model.key],
     }

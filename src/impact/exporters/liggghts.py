@@ -102,20 +102,14 @@ def parameters(collision: Collision) -> dict[str, float | str]:
     return properties
 
 
-def friction_options(collision: Collision) -> str:
-    """Write the settings of the tangential model, which follow those of the normal model."""
-    if not collision.friction:
-        return ""
-    words = "" if collision["tangential_damping"] else " tangential_damping off"
-    is_reduced = collision["n"] == 1.0 and collision.values.get("tangential_reduce", 0.0)
-    return words + (" ktToKnUser on" if is_reduced else "")
-
-
 def lines(collision: Collision, parameters: Parameters) -> Lines:
     model, options = OPTIONS[collision.model.key]
     moduli = collision["E1"], collision["E2"]
     contact = f"gran model {model} tangential {FRICTIONS.get(collision.friction, 'no_history')}"
-    options += friction_options(collision)
+    if collision.friction:
+        is_reduced = collision["n"] == 1.0 and collision.values.get("tangential_reduce", 0.0)
+        options += "" if collision["tangential_damping"] else " tangential_damping off"
+        options += " ktToKnUser on" if is_reduced else ""
     if min(moduli) < SOFT:
         yield "soft_particles  yes"
     if max(moduli) > HARD:

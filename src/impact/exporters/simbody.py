@@ -66,15 +66,11 @@ def parameters(collision: Collision) -> dict[str, float | str]:
     """Write stiffness and dissipation of each sphere; the stiffness is the modulus of plane strain."""
     c = collision
     c.require_materials("Simbody takes the moduli of both spheres")
-    mixed = c.model.key == "simbody-hunt-crossley-mixed"
-    return {
-        f"{name}{i}": value
-        for i in (1, 2)
-        for name, value in (
-            ("stiffness", c[f"E{i}"] / (1.0 - c[f"nu{i}"] ** 2)),
-            ("dissipation", c[f"c{i}"] if mixed else c["c"]),
-        )
-    }
+    values: dict[str, float | str] = {}
+    for i in (1, 2):
+        values[f"stiffness{i}"] = c[f"E{i}"] / (1.0 - c[f"nu{i}"] ** 2)
+        values[f"dissipation{i}"] = c[f"c{i}"] if c.model.key == "simbody-hunt-crossley-mixed" else c["c"]
+    return values
 
 
 def lines(collision: Collision, parameters: Parameters) -> Lines:

@@ -90,44 +90,36 @@ def law_for_version(key: str, version: str) -> str:
 
 
 def parameters(collision: Collision) -> dict[str, float | str]:
-    """Arguments of the material and of the functor that makes the contact."""
+    """Arguments of the material and of the functor that makes the contact.
+
+    Those of viscoelastic contacts are of each ball, whose springs and dashpots act in series. The tangential
+    stiffness of the other contacts is 8 G* a.
+    """
     c = collision
+    angle = {"frictionAngle": math.atan(c["mu"])} if c.friction else {}
     if "viscoelastic" in c.model.key:
-        # the springs and dashpots of the two balls act in series
-        return {"kn": 2.0 * c["K"], "cn": 2.0 * c["C"], **viscoelastic_friction(c)}
+        values: dict[str, float | str] = {"kn": 2.0 * c["K"], "cn": 2.0 * c["C"], "ks": 0.0, "cs": 0.0}
+        if c.friction:
+            k_t = c["kt_over_kn"] * c["K"] if math.isnan(c["k_t"]) else c["k_t"]
+            values |= {"ks": 2.0 * k_t, "cs": 2.0 * c["c_t"]}
+        return values | angle
     c.require_materials("YADE takes Young's modulus and Poisson's ratio")
-    elastic: dict[str, float | str] = {"young": c["E1"], "poisson": c["nu1"]}
+    values = {"young": c["E1"], "poisson": c["nu1"]}
     if not c.has_one_material:
-        elastic |= {"young2": c["E2"], "poisson2": c["nu2"]}
+        values |= {"young2": c["E2"], "poisson2": c["nu2"]}
     if c.model.key.startswith("yade-en"):
-        elastic |= {"en": c["e"]}
-    else:
-        # ζ of the law is √1.2 β
-        elastic |= {"betan": c["betan"] if c.model.key == "yade-betan-direct" else float(gap_damping(c["e"]))}
-    return elastic | mindlin_friction(c)
-
-
-def viscoelastic_friction(collision: Collision) -> dict[str, float]:
-    """Return the tangential springs and dashpots of each ball, which act in series."""
-    if not collision.friction:
-        return {"ks": 0.0, "cs": 0.0}
-    k_t = collision["k_t"]
-    if math.isnan(k_t):
-        k_t = collision["kt_over_kn"] * collision["K"]
-    angle = {"frictionAngle": math.atan(collision["mu"])}
-    return {"ks": 2.0 * k_t, "cs": 2.0 * collision["c_t"], **angle}
-
-
-def mindlin_friction(collision: Collision) -> dict[str, float]:
-    """Return the damping of the tangential stiffness, which is 8 G* a."""
-    c = collision
-    if not c.friction:
-        return {}
-    for name in ("k_t", "kt_over_kn"):
-        if not math.isnan(c[name]):
-            raise UsageError(f"{name}: YADE has none with its MindlinPhys, whose tangential stiffness is 8 G* a")
-    betas = float(gap_damping(c["e"])) if math.isnan(c["betas"]) else c["betas"]
-    return {"betas": betas, "frictionAngle": math.atan(c["mu"])}
+        return values | {"en": c["e"]}
+    # ζ of the law is √1.2 β
+    beta = float(gap_damping(c["e"]))
+    values["betan"] = c["betan"] if c.model.key == "yade-betan-direct" else beta
+    if c.friction:
+        for name in ("k_t", "kt_over_kn"):
+            if not math.isnan(c[name]):
+                raise UsageError(
+                    f"{name}: YADE has none with its MindlinPhys, whose tangential stiffness is 8 G* a"
+                )
+        values["betas"] = beta if math.isnan(c["betas"]) else c["betas"]
+    return values | angle
 
 
 def is_hertzian(version: str) -> bool:
