@@ -248,7 +248,6 @@ WARM_UP_COMMANDS = (
 )
 # and imports these, with SciPy's statistics, which take longer than what most tests do with them
 WARM_UP_MODULES = (
-    "impact.cli.calibrate",
     "impact.inverse.calibrate",
     "impact.inverse.solve",
     "impact.uncertainty.sensitivity",
