@@ -8,7 +8,7 @@ import pytest
 
 import impact
 from impact.config.load import Config, read_config
-from impact.config.tables import expand_models
+from impact.config.tables import expand_laws
 from impact.contact.models import built_in, catalogue, find
 from impact.errors import ModelError
 from impact.results.single_impact import Impact
@@ -110,7 +110,7 @@ def test_a_law_gives_the_same_bits_under_its_alias(key):
 
 
 def expanded_keys(choice: object) -> list[str]:
-    models, problems = expand_models(choice, catalogue())
+    models, problems = expand_laws(choice, catalogue())
     assert not problems
     return [model.key for model in models]
 

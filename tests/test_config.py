@@ -16,7 +16,7 @@ from hypothesis import given, settings, strategies as st
 
 import impact
 from impact.config.load import Config, parse_config, read_config
-from impact.config.tables import Output, Solver, expand_models
+from impact.config.tables import Output, Solver, expand_laws
 from impact.contact.materials import Material
 from impact.contact.model import Parameter
 from impact.contact.models import catalogue
@@ -781,7 +781,7 @@ def test_the_schema_refuses(old: str, new: str) -> None:
 )
 def test_the_schema_accepts_the_models_that_the_reader_accepts(models: str, accepted: bool) -> None:
     data = tomllib.loads(changed('["lankarani-nikravesh-1990"]', models))
-    faults = expand_models(data["models"], catalogue())[1]
+    faults = expand_laws(data["models"], catalogue())[1]
     assert (not faults) is accepted
     assert validator_of_configs().is_valid(data) is accepted
 

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 import impact
-from impact.config.tables import expand_frictions
+from impact.config.tables import expand_laws
+from impact.contact.frictions import frictions
 from impact.errors import ConfigError, UsageError
 
 # hard: so stiff that the lever arm of a code is the radius but for a ten-thousandth
@@ -197,13 +198,11 @@ def test_a_friction_law_of_a_scheme_has_no_continuous_answer(friction: str, sche
 
 def test_a_pattern_does_not_select_a_friction_law_of_a_scheme() -> None:
     for selection, one in (("lammps-*", "lammps-mindlin"), ("all", "coulomb-1785")):
-        keys = [law.key for law in expand_frictions(selection)[0]]
+        keys = [law.key for law in expand_laws(selection, frictions(), "friction law")[0]]
         assert one in keys
         assert not {"lammps-classic-2025", CONE} & {*keys}
-    assert [law.key for law in expand_frictions(["lammps-classic-2025", "mujoco-*"])[0]] == [
-        "lammps-classic-2025",
-        CONE,
-    ]
+    named, _ = expand_laws(["lammps-classic-2025", "mujoco-*"], frictions(), "friction law")
+    assert [law.key for law in named] == ["lammps-classic-2025", CONE]
 
 
 def test_timestep_has_the_restitution_of_the_cone() -> None:

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import impact
-from impact.config.tables import expand_models
+from impact.config.tables import expand_laws
 from impact.contact.frictions import frictions
 from impact.contact.models import catalogue
 
@@ -115,7 +115,7 @@ def test_the_examples_of_choosing_models_are_valid() -> None:
     choices = re.findall(r"`(models = [^`]*)`", PAGE)
     assert len(choices) == 3
     for choice in choices:
-        models, problems = expand_models(tomllib.loads(choice)["models"], catalogue())
+        models, problems = expand_laws(tomllib.loads(choice)["models"], catalogue())
         assert models, choice
         assert not problems, choice
 

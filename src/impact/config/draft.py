@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from ..contact.friction import FrictionLaw
+from ..contact.frictions import frictions
 from ..contact.model import ForceModel, Parameter
 from ..contact.models import catalogue
 from ..errors import ConfigError, MissingFileError, UsageError
@@ -32,7 +33,7 @@ from .lines import MAX_PROBLEM_LINES, key_lines, path_text
 from .material_library import library
 from .quantities import VALUE_FORMS, ConfigProblem, KeyPath
 from .starter import STARTER_CONFIG
-from .tables import MATERIAL_KEYS, SWEEP_DEFAULTS, SWEEP_QUANTITIES, Loss, Noise, expand_frictions, expand_models
+from .tables import MATERIAL_KEYS, SWEEP_DEFAULTS, SWEEP_QUANTITIES, Loss, Noise, expand_laws
 
 # keys of [sweep] that arrange inputs
 NO_INPUTS = (("sweep", "zip"), ("sweep", "cases"))
@@ -152,12 +153,14 @@ class Draft:
     @cached_property
     def models(self) -> Sequence[ForceModel]:
         """The selected models, without those that are unknown."""
-        return expand_models(self.data.get("models"), self.known_models)[0]
+        return expand_laws(self.data.get("models"), self.known_models)[0]
 
     @cached_property
     def frictions(self) -> Sequence[FrictionLaw]:
         """The selected friction laws, without those that are unknown; none for central impacts."""
-        return expand_frictions(self.data["frictions"])[0] if "frictions" in self.data else ()
+        if "frictions" not in self.data:
+            return ()
+        return expand_laws(self.data["frictions"], frictions(), "friction law")[0]
 
     @property
     def laws(self) -> dict[str, Sequence[ForceModel | FrictionLaw]]:

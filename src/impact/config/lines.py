@@ -18,7 +18,7 @@ from .quantities import VALUE_FORMS, Column, ConfigProblem, KeyPath, as_text
 MAX_PROBLEM_LINES = 100
 EXPECTED_BY_KEY = {
     "sweep": "a table [sweep] of what to sweep: e or alpha, v1, m1, m2, material, ...",
-    "models": tables.MODELS_EXPECTED,
+    "models": tables.LAWS_EXPECTED["model"],
     **{name: f"{quantity.expected}: {quantity.meaning}" for name, quantity in tables.MATERIAL_QUANTITIES.items()},
     **{name: str(info.description) for name, info in Column.model_fields.items()},
     "n": f"the number of {tables.Design.model_fields['n'].description}, such as 1024",

@@ -33,11 +33,11 @@ from .files import as_table, set_value
 from .input_names import InputName, paths_with
 from .quantities import MAX_PROBLEMS, ConfigProblem, KeyPath, Quantity, as_text, value_error
 from .tables import (
+    DEVIATION,
     GRAVITY,
     LABORATORY,
     LOSSES,
     MAX_MEASURED,
-    MIN_SIGMA,
     NOISES,
     STANDARD_GRAVITY,
     SWEEP_DEFAULTS,
@@ -366,7 +366,7 @@ def _column_of(header: str, outputs: Sequence[str], models: Mapping[str, ForceMo
 
 
 def _deviation(output: str) -> Quantity:
-    return Quantity(OUTPUTS[output].unit, "standard deviation", least=MIN_SIGMA, most=MAX_MEASURED)
+    return replace(DEVIATION, unit=OUTPUTS[output].unit)
 
 
 def read_data_file(draft: Draft) -> tuple[dict[KeyPath, object], list[ConfigError], list[str]]:

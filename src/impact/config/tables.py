@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import field
 from fnmatch import fnmatchcase
 from functools import lru_cache
@@ -75,8 +75,10 @@ STANDARD_GRAVITY = 9.80665
 GRAVITY = Quantity("m/s^2", "acceleration that turns heights and flight times into velocities", 0, above=True)
 DESIGN_METHODS = ("sobol", "lhs", "halton", "random")
 MAX_SAMPLES = 2**22
-MODELS_EXPECTED = 'a model, or a list of models; "all" are all'
-FRICTIONS_EXPECTED = 'a friction law, or a list of friction laws; "all" are all but those of one scheme'
+LAWS_EXPECTED = {
+    "model": 'a model, or a list of models; "all" are all',
+    "friction law": 'a friction law, or a list of friction laws; "all" are all but those of one scheme',
+}
 L = TypeVar("L", ForceModel, FrictionLaw)
 
 
@@ -307,8 +309,7 @@ LABORATORY = {
 }
 
 
-def _is_deviation(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and MIN_SIGMA <= value <= MAX_MEASURED
+DEVIATION = Quantity("1", "standard deviation", MIN_SIGMA, MAX_MEASURED)
 
 
 def _sigma(value: object) -> object:
@@ -318,13 +319,12 @@ def _sigma(value: object) -> object:
         raise value_error(
             'got a fit, expected noise = "scale", which estimates sigma, or "excess", which adds to it'
         )
-    if not all(isinstance(element, str) or _is_deviation(element) for element in deviations):
-        raise mismatch_error(value, SIGMA_EXPECTED)
+    if any(not isinstance(each, str) and math.isnan(DEVIATION.read_or_nan(each)) for each in deviations):
+        expectation = f"{DEVIATION.expected} in the unit of the output, or a list of one for each point"
+        raise mismatch_error(value, expectation)
     return value
 
 
-_SIGMA_INTERVAL = f"a number from {MIN_SIGMA:g} to {MAX_MEASURED:g}"
-SIGMA_EXPECTED = f"{_SIGMA_INTERVAL} in the unit of the output, or a list of one for each point"
 _Sigma: Any = Annotated[float, Field(ge=MIN_SIGMA, le=MAX_MEASURED)] | str
 
 
@@ -443,16 +443,15 @@ def _words(quantity: Quantity) -> Any:
     return PlainValidator(read, json_schema_input_type=schema)
 
 
-def _select_laws(value: object, info: ValidationInfo) -> tuple[ForceModel | FrictionLaw, ...]:
-    """Find the laws that the key `models` or `frictions` names."""
-    selection: Sequence[ForceModel | FrictionLaw]
-    if info.field_name == "models":
-        selection, problems = expand_models(value, cast(ValidationContext, info.context).models)
+def _check_laws(value: object, info: ValidationInfo) -> object:
+    """Check the key `models` or `frictions`, of which `Draft` lists the laws."""
+    if info.field_name == "frictions":
+        _, problems = expand_laws(value, frictions(), "friction law")
     else:
-        selection, problems = expand_frictions(value)
+        _, problems = expand_laws(value, cast(ValidationContext, info.context).models)
     if problems:
         raise located_errors(problems)
-    return tuple(selection)
+    return value
 
 
 class Document(Table):
@@ -464,8 +463,8 @@ class Document(Table):
     title: Annotated[str, Field(strict=True), expected("text")] = Field(
         DEFAULT_TITLE, description="title of the sweep"
     )
-    models: Annotated[tuple[ForceModel, ...], PlainValidator(_select_laws)] = ()
-    frictions: Annotated[tuple[FrictionLaw, ...], PlainValidator(_select_laws)] = ()
+    models: Any = None
+    frictions: Any = None
     sweep: Sweep
     materials: Annotated[dict[str, MaterialTable], expected("a table")] = Field(
         default_factory=dict, description="materials by name"
@@ -524,7 +523,7 @@ def _document_type(
         }
         meaning = f"Parameters of {'friction laws' if name == 'friction' else 'models'}, by key."
         parameters_type = create_model(name, __base__=Table, __doc__=meaning, **columns)
-        selection = PlainValidator(_select_laws, json_schema_input_type=_selection_type(words))
+        selection = PlainValidator(_check_laws, json_schema_input_type=_selection_type(words))
         default = ... if name == "model" else ()
         fields[f"{name}s"] = Annotated[Any, selection, Field(description=description)], default
         fields[name] = parameters_type, Field(default_factory=parameters_type)
@@ -589,23 +588,12 @@ def _selection_type(words: tuple[str, ...]) -> Any:
     return name | Annotated[list[name | excluded], Field(min_length=1, json_schema_extra=first)]
 
 
-def expand_models(
-    selection: object, models: Mapping[str, ForceModel]
-) -> tuple[list[ForceModel], list[ConfigProblem]]:
-    """Find the models of a key, "all", "family:NAME", a pattern, or a list of those, some excluded by "!"."""
-    return _expand_laws(selection, models, "model", MODELS_EXPECTED)
-
-
-def expand_frictions(selection: object) -> tuple[list[FrictionLaw], list[ConfigProblem]]:
-    """Find the friction laws of a key, "all", a pattern, or a list of those, some excluded by "!"."""
-    return _expand_laws(selection, frictions(), "friction law", FRICTIONS_EXPECTED)
-
-
-def _expand_laws(
-    selection: object, laws: Mapping[str, L], what: str, expectation: str
+def expand_laws(
+    selection: object, laws: Mapping[str, L], what: str = "model"
 ) -> tuple[list[L], list[ConfigProblem]]:
+    """Find the laws of a key, "all", "family:NAME", a pattern, or a list of those, some excluded by "!"."""
     if not isinstance(selection, str | list) or not selection:
-        return [], [((), mismatch_error(selection, expectation).message())]
+        return [], [((), mismatch_error(selection, LAWS_EXPECTED[what]).message())]
     selected: dict[str, L] = {}
     problems: list[ConfigProblem] = []
     for index, word in enumerate([selection] if isinstance(selection, str) else selection):

@@ -23,7 +23,7 @@ from ..config.input_names import SWEEP_INPUTS, InputName, input_values, paths_wi
 from ..config.load import Config, build, inline_files
 from ..config.quantities import DISTRIBUTION_FORMS
 from ..config.rules import has_other_stiffness
-from ..config.tables import DEFAULT_RTOL, MATERIAL_QUANTITIES, SWEEP_DEFAULTS, expand_models, law_quantities
+from ..config.tables import DEFAULT_RTOL, MATERIAL_QUANTITIES, SWEEP_DEFAULTS, expand_laws, law_quantities
 from ..contact.fixed_step import EXACT
 from ..contact.force_expressions import unload_to_residual, unload_with_stiffness
 from ..contact.friction import FrictionLaw, Pair
@@ -575,7 +575,7 @@ class PointSource:
         is_chosen = ("models",) in draft.origins if self.is_starter else "models" in draft.data
         if not is_chosen:
             return ()
-        _, problems = expand_models(draft.data["models"], draft.known_models)
+        _, problems = expand_laws(draft.data["models"], draft.known_models)
         return tuple(model.key for model in (build(draft).models if problems else draft.models))
 
     def draft(self, model: str | None = None, friction: str | None = None) -> Draft:
