@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -44,19 +44,18 @@ def unit_samples(design: Design, dimensions: int) -> Array:
     return np.clip(samples, LEAST_UNIT, 1.0 - LEAST_UNIT)
 
 
-def draw(distribution: Distribution, u: Array) -> Array:
-    """Evaluate the inverse of the cumulative distribution function at probabilities u.
+def draw(kind: str, numbers: Sequence[float], u: Array) -> Array:
+    """Evaluate the inverse of the cumulative function of a distribution at probabilities u.
 
-    >>> draw(Distribution(triangular=(0.0, 1.0, 2.0)), np.array([0.125, 0.5, 0.875])).tolist()
+    >>> draw("triangular", (0.0, 1.0, 2.0), np.array([0.125, 0.5, 0.875])).tolist()
     [0.5, 1.0, 1.5]
-    >>> draw(Distribution(empirical=(3.0, 1.0)), np.array([0.2, 0.7])).tolist()
+    >>> draw("empirical", (3.0, 1.0), np.array([0.2, 0.7])).tolist()
     [1.0, 3.0]
     """
     from scipy import stats
 
-    numbers = [float(number) for number in distribution.parameters]
     with np.errstate(all="ignore"):
-        match distribution.kind, numbers:
+        match kind, numbers:
             case "uniform", [least, most]:
                 drawn = stats.uniform(least, most - least).ppf(u)
             case "normal", [mean, deviation]:
@@ -82,7 +81,7 @@ def draw_columns(
     columns: dict[str, Array] = {}
     problems: dict[str, str] = {}
     for (name, distribution), probabilities in zip(distributions.items(), u.T, strict=True):
-        columns[name] = drawn = draw(distribution, probabilities)
+        columns[name] = drawn = draw(distribution.kind, distribution.numbers, probabilities)
         quantity = InputName.parse(name).quantity(models)
         assert quantity is not None
         refused = drawn[~(quantity.contains(drawn) & np.isfinite(drawn))]

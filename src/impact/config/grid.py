@@ -60,15 +60,6 @@ class Axis:
         return (self.numbers or tuple(range(self.size))) if self.numbered else self.columns[self.name]
 
 
-@dataclass(frozen=True)
-class Grid:
-    """Scalars by name, axes in config order, and their problems."""
-
-    scalars: Mapping[str, float | str]
-    axes: tuple[Axis, ...]
-    problems: tuple[ConfigProblem, ...]
-
-
 def build_grid(
     draft: Draft,
     values: Mapping[str, Numbers | Names],
@@ -77,15 +68,16 @@ def build_grid(
     max_points: int,
     *,
     in_full: bool,
-) -> Grid:
-    """Build the grid that valid values span, by config name; `groups` and `samples` name those that vary together.
+) -> tuple[tuple[Axis, ...], list[ConfigProblem]]:
+    """Build the axes of valid values by config name, and list problems.
+
+    `groups` and `samples` name those that vary together.
 
     Unless every point is stored (`in_full`), the number of trajectories is limited later.
     """
     cases = [str(InputName.of_path(path)) for path in draft.cases]
     sizes = {name: value.size for name, value in values.items() if isinstance(value, Range)}
     sizes |= {name: len(value) for name, value in values.items() if isinstance(value, tuple)}
-    scalars = {name: value for name, value in values.items() if isinstance(value, float | str)}
     # also properties of a material, and parameters of laws that are not selected: these are no inputs of the grid
     written = {str(name): value for name, value in input_values(draft.data)}
     fixed = [name for name, value in written.items() if not isinstance(value, list | dict)]
@@ -98,7 +90,7 @@ def build_grid(
     for numbered in (cases, samples):
         columns_of = [name for name in values if name in numbered]
         member_of |= dict.fromkeys(columns_of, columns_of)
-    axis_names = [name for name in values if name not in scalars]
+    axis_names = [name for name, value in values.items() if not isinstance(value, float | str)]
     # a group takes the position of its first member
     leaders = [name for name in axis_names if member_of.get(name, (name,))[0] == name]
     laws = len(draft.models) * max(1, len(draft.frictions))
@@ -132,7 +124,7 @@ def build_grid(
     # a group member with an invalid value has no column; that problem is reported by the validation
     groups = [member_of.get(name, (name,)) for name in leaders]
     is_complete = not problems and all(name in columns for group in groups for name in group)
-    return Grid(scalars, _build_axes(groups, columns, cases, samples) if is_complete else (), tuple(problems))
+    return _build_axes(groups, columns, cases, samples) if is_complete else (), problems
 
 
 def _build_axes(

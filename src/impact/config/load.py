@@ -146,10 +146,10 @@ def build(draft: Draft, max_points: int = MAX_POINTS, purpose: Purpose = "sweep"
         values |= {name: tuple(column.tolist()) for name, column in drawn.items()}
     groups = document.sweep.zip if purpose == "sweep" else ()
     in_full = document.output.is_full
-    grid = build_grid(draft, values, groups, list(distributions), max_points, in_full=in_full)
-    draft = draft.with_problems(grid.problems)
+    axes, problems = build_grid(draft, values, groups, list(distributions), max_points, in_full=in_full)
+    draft = draft.with_problems(problems)
     if not draft.problems:
-        draft = draft.with_problems(_settings_problems(document, grid.axes, draft))
+        draft = draft.with_problems(_settings_problems(document, axes, draft))
     if not draft.problems and draft.measurements is not None:
         draft = draft.with_problems(
             measurements.count_problems(draft.measurements, fits, draft.models, draft.frictions)
@@ -162,11 +162,11 @@ def build(draft: Draft, max_points: int = MAX_POINTS, purpose: Purpose = "sweep"
         title=document.title,
         models=tuple(draft.models),
         scalars={
-            **grid.scalars,
+            **{name: value for name, value in values.items() if isinstance(value, float | str)},
             **{name: column[0] for name, column in measured.items()},
             **{name: value for name, value in defaults.items() if name not in values},
         },
-        axes=grid.axes,
+        axes=axes,
         materials={name: _build_material(table) for name, table in document.materials.items()},
         solver=document.solver,
         output=document.output,
@@ -264,7 +264,7 @@ def _valid_values(document: tables.Document, draft: Draft) -> dict[str, quantiti
         name: value
         for name, value in values.items()
         if not isinstance(value, Column)
-        and not (isinstance(value, Distribution) and isinstance(value.empirical, str))
+        and not (isinstance(value, Distribution) and isinstance(value.numbers[0], str))
     }
 
 

@@ -210,16 +210,13 @@ def read_as(value_type: Any) -> GetPydanticSchema:
     return GetPydanticSchema(lambda source, handler: handler.generate_schema(value_type))
 
 
-def _float_to_int(value: object) -> object:
-    """Convert a float without a fraction, such as 1e6."""
-    return int(value) if isinstance(value, float) and value.is_integer() else value
-
-
 def bounded_int(least: int, most: int | None = None) -> GetPydanticSchema:
     """Build the type of whole numbers in an interval."""
     interval = f"of at least {least:,}" if most is None else f"from {least:,} to {most:,}"
     bounds = Field(ge=least, le=most, strict=True)
-    return read_as(Annotated[int, bounds, BeforeValidator(_float_to_int), expected(f"a whole number {interval}")])
+    # a float may have no fraction, such as 1e6
+    whole = BeforeValidator(lambda x: int(x) if isinstance(x, float) and x.is_integer() else x)
+    return read_as(Annotated[int, bounds, whole, expected(f"a whole number {interval}")])
 
 
 SEPARATORS, DECIMALS = (",", ";", "\t"), (".", ",")
@@ -237,7 +234,10 @@ class Column(Table):
 
 
 class _OneForm(Table):
-    """A table that describes several numbers in one of several forms: exactly one of its fields is given."""
+    """A table that describes several numbers in one of several forms: exactly one of its fields is given.
+
+    The type of a quantity, see `numbers_type`, has the fields.
+    """
 
     model_config = ConfigDict(json_schema_extra=schema_simplifier(minProperties=1, maxProperties=1))
     FORMS: ClassVar[Mapping[str, str]]
@@ -259,6 +259,12 @@ class _OneForm(Table):
         """Name of the field that is set."""
         return next(name for name in self.FORMS if getattr(self, name) is not None)
 
+    @property
+    def numbers(self) -> tuple[Any, ...]:
+        """The numbers of that field, or the name of a file that cannot be read."""
+        value = getattr(self, self.kind)
+        return (value,) if isinstance(value, str) else tuple(value)
+
     def _error(self, message: str, *path: int) -> ValidationError:
         return located_errors([((self.kind, *path), message)])
 
@@ -268,9 +274,6 @@ class Range(_OneForm):
 
     FORMS = RANGE_FORMS
     EXPECTED = f"one of {', '.join(f'{name} = {form}' for name, form in RANGE_FORMS.items())}"
-    linspace: tuple[float, float, int] | None = None
-    geomspace: tuple[float, float, int] | None = None
-    arange: tuple[float, float, float] | None = None
 
     def _check_numbers(self) -> None:
         first, last, step_or_count = self.numbers
@@ -285,11 +288,6 @@ class Range(_OneForm):
         if self.size > MAX_AXIS_VALUES:
             size = f"{self.size:,}" if self.size <= MAX_PRINTED_COUNT else f"more than {MAX_PRINTED_COUNT:,}"
             raise self._error(f"got {size} values, expected at most {MAX_AXIS_VALUES:,} on an axis")
-
-    @property
-    def numbers(self) -> tuple[float, float, float]:
-        numbers: tuple[float, float, float] = getattr(self, self.kind)
-        return numbers
 
     @property
     def size(self) -> int:
@@ -352,26 +350,15 @@ class Distribution(_OneForm):
 
     FORMS = DISTRIBUTION_FORMS
     EXPECTED = "one distribution"
-    uniform: tuple[float, float] | None = None
-    normal: tuple[float, float] | None = None
-    lognormal: tuple[float, float] | None = None
-    triangular: tuple[float, float, float] | None = None
-    empirical: str | tuple[float, ...] | None = None
 
     def _check_numbers(self) -> None:
-        numbers = [number for number in self.parameters if isinstance(number, float)]
+        numbers = [number for number in self.numbers if isinstance(number, float)]
         is_ordered = numbers == sorted(numbers) and numbers[:1] < numbers[-1:]
         if self.kind in ("uniform", "triangular") and not is_ordered:
             got = " to ".join(f"{number:g}" for number in numbers)
             raise self._error(f"got {got}, expected {self.FORMS[self.kind]} in ascending order")
         if self.kind == "lognormal" and numbers[0] <= 0.0:
             raise self._error(f"got {numbers[0]:g}, expected a median > 0", 0)
-
-    @property
-    def parameters(self) -> tuple[float | str, ...]:
-        """The numbers of the distribution, or the name of a file that cannot be read."""
-        value = getattr(self, self.kind)
-        return (value,) if isinstance(value, str) else tuple(value)
 
 
 # the values of keys that may be axes
@@ -395,12 +382,7 @@ def value_form(value: object) -> str:
     return SCALAR
 
 
-def _name_form(value: object) -> str:
-    form = value_form(value)
-    return SCALAR if form in (RANGE, FIT, DISTRIBUTION) else form
-
-
-def _list_of(element: Any, description: str) -> Any:
+def list_of(element: Any, description: str) -> Any:
     """Build the type of a list of at least one element, which becomes a tuple."""
 
     def check_not_empty(value: list[object]) -> list[object]:
@@ -409,19 +391,6 @@ def _list_of(element: Any, description: str) -> Any:
         return value
 
     return Annotated[list[element], Field(min_length=1), BeforeValidator(check_not_empty), AfterValidator(tuple)]
-
-
-def name_or_names(description: str, choices_of: Callable[[ValidationInfo], Sequence[str]]) -> GetPydanticSchema:
-    """Build the type of a name, or a list of names, that are among some choices."""
-    choice = Annotated[str, known_name(description, choices_of)]
-    return read_as(
-        Annotated[
-            Annotated[choice, Tag(SCALAR)]
-            | Annotated[_list_of(choice, description), Tag(LIST)]
-            | Annotated[Column, Tag(COLUMN)],
-            Discriminator(_name_form),
-        ]
-    )
 
 
 @dataclass(frozen=True)
@@ -651,7 +620,7 @@ def numbers_type(quantity: Quantity) -> TypeAdapter[Any]:
         ),
     )
     file: Any = Annotated[str, expected(DISTRIBUTION_FORMS["empirical"]), Tag(SCALAR)]
-    values: Any = Annotated[_list_of(end, quantity.expected), Tag(LIST)]
+    values: Any = Annotated[list_of(end, quantity.expected), Tag(LIST)]
     either = Annotated[file | values, Discriminator(lambda value: SCALAR if isinstance(value, str) else LIST)]
     distributions = _fields(
         DISTRIBUTION_FORMS,
@@ -669,7 +638,7 @@ def numbers_type(quantity: Quantity) -> TypeAdapter[Any]:
     fit_type = create_model(f"Fit of {of_quantity}", __base__=FitRange, fit=(fit, ...))
     any_form: Any = Annotated[
         Annotated[number, Tag(SCALAR)]
-        | Annotated[_list_of(number, quantity.expected), Tag(LIST)]
+        | Annotated[list_of(number, quantity.expected), Tag(LIST)]
         | Annotated[range_type, Tag(RANGE)]
         | Annotated[Column, Tag(COLUMN)]
         | Annotated[fit_type, Tag(FIT)]

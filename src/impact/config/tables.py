@@ -35,11 +35,13 @@ from ..contact.variables import OUTPUTS
 from ..errors import did_you_mean
 from .quantities import (
     COLUMN,
+    LIST,
     MAX_AXIS_VALUES,
     MAX_PROBLEMS,
     MAX_UNIT_LENGTH,
     RANGE,
     SCALAR,
+    Column,
     ConfigProblem,
     DecimalKey,
     Names,
@@ -51,12 +53,13 @@ from .quantities import (
     bounded_int,
     expected,
     known_name,
+    list_of,
     located_errors,
     mismatch_error,
-    name_or_names,
     read_as,
     schema_simplifier,
     value_error,
+    value_form,
 )
 
 DEFAULT_TITLE = "Impact sweep"
@@ -82,8 +85,17 @@ LAWS_EXPECTED = {
 L = TypeVar("L", ForceModel, FrictionLaw)
 
 
-MATERIAL_NAME = name_or_names(
-    "a material of [materials]", lambda info: cast(ValidationContext, info.context).materials
+MATERIAL_EXPECTED = "a material of [materials]"
+MaterialName: Any = Annotated[
+    str, known_name(MATERIAL_EXPECTED, lambda info: cast(ValidationContext, info.context).materials)
+]
+MATERIAL_NAME = read_as(
+    Annotated[
+        Annotated[MaterialName, Tag(SCALAR)]
+        | Annotated[list_of(MaterialName, MATERIAL_EXPECTED), Tag(LIST)]
+        | Annotated[Column, Tag(COLUMN)],
+        Discriminator(lambda value: form if (form := value_form(value)) in (LIST, COLUMN) else SCALAR),
+    ]
 )
 ZipGroup = Annotated[
     list[Annotated[str, expected("a name")]], Field(min_length=2), expected("a group of at least two names")

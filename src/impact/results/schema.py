@@ -472,6 +472,6 @@ def provenance_attributes(plan: Plan) -> dict[str, object]:
         "materials": json.dumps(plan.material_record),
     }
     if config.design is not None:
-        distributions = {name: {drawn.kind: drawn.parameters} for name, drawn in config.distributions.items()}
+        distributions = {name: {drawn.kind: drawn.numbers} for name, drawn in config.distributions.items()}
         attributes["design"] = json.dumps(config.design.model_dump() | {"distributions": distributions})
     return attributes
