@@ -5,8 +5,7 @@ from .comparison.bless import bless as bless
 from .comparison.compare import compare as compare
 from .comparison.rerun import rerun as rerun
 from .comparison.verdict import Verdict as Verdict
-from .config.material_library import materials as materials
-from .config.starter import init as init
+from .config.library import init as init, materials as materials
 from .config.tables import schema as schema
 from .conformance.conform import conform as conform
 from .conformance.registry import Engines as Engines, conform_engines as conform_engines

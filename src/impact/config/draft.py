@@ -29,10 +29,9 @@ from .files import (
     to_plain_data,
 )
 from .input_names import InputName, input_values
+from .library import STARTER_CONFIG, library
 from .lines import MAX_PROBLEM_LINES, key_lines, path_text
-from .material_library import library
 from .quantities import VALUE_FORMS, ConfigProblem, KeyPath
-from .starter import STARTER_CONFIG
 from .tables import MATERIAL_KEYS, SWEEP_DEFAULTS, SWEEP_QUANTITIES, Loss, Noise, expand_laws
 
 # keys of [sweep] that arrange inputs

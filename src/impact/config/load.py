@@ -33,8 +33,8 @@ from .draft import (
 from .files import as_table, override_text, set_value
 from .grid import MAX_POINTS, Axis, build_grid, chunk_problems
 from .input_names import InputName, paths_with
+from .library import library
 from .lines import validation_problems
-from .material_library import library
 from .quantities import Column, ConfigProblem, Distribution, FitRange, KeyPath
 from .rules import check_rules, materials_of
 

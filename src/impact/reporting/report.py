@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from ..atomic import check_outputs, write_file
 from ..config.draft import Setting
 from ..config.input_names import InputName, is_input
-from ..config.material_library import library
+from ..config.library import library
 from ..config.tables import MATERIAL_QUANTITIES
 from ..contact.evidence import Evidence
 from ..contact.frictions import frictions
