@@ -50,21 +50,13 @@ NUMBER_WITH = {
     sign: re.compile(rf"[-+]?[0-9]*[{sign}][0-9]+(?:[eE][-+]?[0-9]+)?(?:\s*[^\s0-9.,].*)?") for sign in DECIMALS
 }
 THOUSANDS = re.compile(r"[-+]?[1-9][0-9]{0,2}(?:,[0-9]{3})+")
-# keys of a table that names a file of cases
-FILE_KEYS = {"file", "separator", "decimal"}
+# keys that say how a CSV file is written, and their values; what is empty or missing is recognised
+CSV_KEYS = {"separator": ("", *SEPARATORS), "decimal": ("", *DECIMALS)}
 # what cells without a value contain
 MISSING = ("", "na", "n/a", "nan", "none", "null", "<na>")
 
 # values in SI units or names of materials, and problems: the index of a cell and a message
 Cells = tuple[list[float | str], list[tuple[int, str]]]
-
-
-@dataclass(frozen=True)
-class CsvForm:
-    """How a CSV file is written; what is empty is recognised."""
-
-    separator: str = ""
-    decimal: str = ""
 
 
 @dataclass(frozen=True)
@@ -185,22 +177,23 @@ def _read_cell(
 def read_csv(
     path: Path,
     is_known: Callable[[str], bool],
-    *,
-    form: CsvForm = CsvForm(),
     wanted: Collection[str] | None = None,
+    *,
+    separator: str = "",
+    decimal: str = "",
 ) -> Columns:
     """Read the columns of a CSV file, whose first line has their names and their units.
 
-    Blank lines, and lines that begin with #, have no meaning. What the form leaves open is recognised. Unless
-    further names are `wanted`, some name has to be known. A ConfigError shows nothing of the content of a file in
-    which no name is.
+    Blank lines, and lines that begin with #, have no meaning. An empty separator or decimal sign is recognised.
+    Unless further names are `wanted`, some name has to be known. A ConfigError shows nothing of the content of a
+    file in which no name is.
     """
     text = io.StringIO(read_text(path, "CSV", MAX_CSV_BYTES), newline=None)
     numbered = [(n, line) for n, line in enumerate(text, 1) if line.strip() and not line.lstrip().startswith("#")]
     # a line that Excel understands
-    separator = re.fullmatch(r"sep=([,;\t])\s*", numbered[0][1]) if numbered else None
-    if separator is not None:
-        form, numbered = replace(form, separator=form.separator or separator[1]), numbered[1:]
+    named = re.fullmatch(r"sep=([,;\t])\s*", numbered[0][1]) if numbered else None
+    if named is not None:
+        separator, numbered = separator or named[1], numbered[1:]
     if len(numbered) < 2:
         got = "one line" if numbered else "none"
         raise ConfigError(f"{path}: got {got}, expected a line of names and at least one of values")
@@ -210,7 +203,7 @@ def read_csv(
         name, _ = split_header(header)
         return name in looked_for or header in looked_for or is_known(name)
 
-    mark = form.separator or _find_separator(path, numbered, is_looked_for)
+    mark = separator or _find_separator(path, numbered, is_looked_for)
     rows = _split(path, numbered, mark)
     (first, headers), *_ = rows.items()
     del rows[first]
@@ -235,7 +228,7 @@ def read_csv(
             label = name or f"column {position}"
             units[label], cells[label] = unit, list(column)
     columns = Columns(str(path), first, list(rows), units, cells, has_known)
-    return _with_decimal_points(columns, form.decimal, [name for name in units if is_looked_for(name)])
+    return _with_decimal_points(columns, decimal, [name for name in units if is_looked_for(name)])
 
 
 def _split(path: Path, numbered: Sequence[tuple[int, str]], separator: str) -> dict[int, list[str]]:
@@ -419,10 +412,8 @@ def columns_of_table(table: Any, source: str) -> Columns:
     return columns
 
 
-def read_csv_of(
-    draft: Draft, file: str, form: CsvForm = CsvForm(), wanted: Collection[str] | None = None
-) -> Columns:
-    """Read a CSV file that a config names."""
+def read_csv_of(draft: Draft, file: str, wanted: Collection[str] | None = None, **form: str) -> Columns:
+    """Read a CSV file that a config names; `form` has some of the CSV_KEYS."""
     if draft.folder is None:
         raise ConfigError(f"{file}: not read; a stored config contains values, not file names")
 
@@ -432,19 +423,12 @@ def read_csv_of(
             return True
         return name in OUTPUTS or name in LABORATORY
 
-    return read_csv(draft.folder / file, is_known, form=form, wanted=wanted)
+    return read_csv(draft.folder / file, is_known, wanted, **form)
 
 
-def csv_form(table: Mapping[Any, Any]) -> CsvForm:
-    """Read the keys `separator` and `decimal`; those that are wrong are reported with the others."""
-    separator, decimal = table.get("separator"), table.get("decimal")
-    return CsvForm(separator if separator in SEPARATORS else "", decimal if decimal in DECIMALS else "")
-
-
-def _has_csv_form(table: Mapping[Any, Any]) -> bool:
-    """Whether a table that names a file has valid keys alone; another one is left as it is, and reported."""
-    form = CsvForm(table.get("separator", ""), table.get("decimal", ""))
-    return table.keys() <= FILE_KEYS and form == csv_form(table)
+def csv_form(table: Mapping[Any, Any]) -> dict[str, str]:
+    """Read the CSV_KEYS of a table; values that are wrong are reported with the others."""
+    return {key: table[key] for key, choices in CSV_KEYS.items() if table.get(key) in choices}
 
 
 def read_files(draft: Draft) -> tuple[dict[KeyPath, object], list[ConfigError], list[str]]:
@@ -453,20 +437,19 @@ def read_files(draft: Draft) -> tuple[dict[KeyPath, object], list[ConfigError], 
     values: dict[KeyPath, object] = {}
     errors: list[ConfigError] = []
     notes: tuple[str, ...] = ()
-    cases, form = draft.table("sweep").get("cases"), CsvForm()
-    table = as_table(cases)
-    if isinstance(table.get("file"), str) and _has_csv_form(table):
-        cases, form = table["file"], csv_form(table)
-    if isinstance(cases, str):
-        try:
-            values["sweep", "cases"], notes = _read_cases(open_csv(cases, form), draft)
-        except ConfigError as error:
-            errors.append(error)
+    cases = draft.table("sweep").get("cases")
+    match {"file": cases} if isinstance(cases, str) else cases:
+        # a table with other keys or values is left as it is, and reported
+        case {"file": str(file), **others} if others == csv_form(others):
+            try:
+                values["sweep", "cases"], notes = _read_cases(open_csv(file, **csv_form(others)), draft)
+            except ConfigError as error:
+                errors.append(error)
     # the values of axes that vary together stand in the same rows
     zipped = {name for group in draft.zip_groups for name in group}
     for name, file, column, form in _file_columns(draft.data):
         try:
-            columns = open_csv(file, form, () if column is None else (column,))
+            columns = open_csv(file, () if column is None else (column,), **form)
             # the single column of a file that names none may have any name
             is_single = column is None and len(columns.units) == 1
             found, unit = columns.find(next(iter(columns.units)) if is_single else column or str(name))
@@ -513,14 +496,14 @@ def _read_cases(columns: Columns, draft: Draft) -> tuple[dict[str, list[float | 
     return values, columns.notes(count, unused)
 
 
-def _file_columns(data: Mapping[str, Any]) -> Iterator[tuple[InputName, str, str | None, CsvForm]]:
+def _file_columns(data: Mapping[str, Any]) -> Iterator[tuple[InputName, str, str | None, dict[str, str]]]:
     """Yield name, file, column and form of every `{ file = ..., column = ... }` and `{ empirical = file }`."""
     for name, reference in input_values(data):
         match reference:
-            case {"file": str(file), "column": str(column), **others} if _has_csv_form(others):
+            case {"file": str(file), "column": str(column), **others} if others == csv_form(others):
                 yield name, file, column, csv_form(others)
             case {"empirical": str(file), **others} if not others:
-                yield name, file, None, CsvForm()
+                yield name, file, None, {}
 
 
 def named_files(data: Mapping[str, Any]) -> list[str]:

@@ -376,8 +376,8 @@ def read_data_file(draft: Draft) -> tuple[dict[KeyPath, object], list[ConfigErro
         return {}, [], []
     headers = as_table(table.get("columns"))
     try:
-        columns = read_csv_of(draft, table["file"], csv_form(table), tuple(headers.values()) if headers else None)
-        columns = _mapped(columns, headers)
+        wanted = tuple(headers.values()) if headers else None
+        columns = _mapped(read_csv_of(draft, table["file"], wanted, **csv_form(table)), headers)
     except ConfigError as error:
         return {}, [error], []
     points, problems = _read_columns(columns, draft)

@@ -100,23 +100,18 @@ MATERIAL_NAME = read_as(
 ZipGroup = Annotated[
     list[Annotated[str, expected("a name")]], Field(min_length=2), expected("a group of at least two names")
 ]
-# lists of values by name
-ListsByName = Annotated[
-    dict[str, Annotated[list[float | str], Field(min_length=1), expected("a list of values")]], Field(min_length=1)
-]
-CELL_EXPECTED = "a number, a text, or nothing where a value is missing"
-# of measurements, in which values may be missing; or headers of a file by name
-CellsByName = Annotated[
-    dict[
-        str,
-        Annotated[
-            list[Annotated[Any, read_as(float | str | None), expected(CELL_EXPECTED)]],
-            Field(min_length=1),
-            expected("a list of values"),
-        ],
-    ],
-    Field(min_length=1),
-]
+
+
+def _lists_by_name(value: Any) -> Any:
+    """Build the type of lists of values by name."""
+    values: Any = Annotated[list[value], Field(min_length=1), expected("a list of values")]
+    return Annotated[dict[str, values], Field(min_length=1)]
+
+
+# those of measurements, in which values may be missing; or headers of a file by name
+CellsByName: Any = _lists_by_name(
+    Annotated[Any, read_as(float | str | None), expected("a number, a text, or nothing where a value is missing")]
+)
 HeadersByName = Annotated[dict[str, Annotated[str, expected("a header of the file")]], Field(min_length=1)]
 DATA_COLUMNS_EXPECTED = (
     "a table of lists by name, such as { v1 = [1.0, 2.0], e_out = [0.8, 0.7] }, or of headers of a file, "
@@ -124,14 +119,10 @@ DATA_COLUMNS_EXPECTED = (
 )
 
 
-def _columns_form(value: object) -> str:
-    return SCALAR if isinstance(value, dict) and str in map(type, value.values()) else RANGE
-
-
 DataColumns = Annotated[
     Annotated[CellsByName, expected(DATA_COLUMNS_EXPECTED), Tag(RANGE)]
     | Annotated[HeadersByName, expected(DATA_COLUMNS_EXPECTED), Tag(SCALAR)],
-    Discriminator(_columns_form),
+    Discriminator(lambda value: SCALAR if isinstance(value, dict) and str in map(type, value.values()) else RANGE),
 ]
 CASES_EXPECTED = "the name of a CSV file, or a table of lists by config name, such as { v1 = [1.0, 2.0] }"
 
@@ -150,9 +141,10 @@ def _cases_form(value: object) -> str:
     return COLUMN if isinstance(value.get("file"), str) else RANGE
 
 
+CaseLists: Any = _lists_by_name(float | str)
 CasesTable = Annotated[
     Annotated[str, expected(CASES_EXPECTED), Tag(SCALAR)]
-    | Annotated[ListsByName, expected(CASES_EXPECTED), Tag(RANGE)]
+    | Annotated[CaseLists, expected(CASES_EXPECTED), Tag(RANGE)]
     | Annotated[CasesFile, Tag(COLUMN)],
     Discriminator(_cases_form),
 ]
