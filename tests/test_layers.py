@@ -40,7 +40,7 @@ CLI_IMPORTS = {
     "completion": {"config", "conformance", "contact", "engine", "exporters", "plots"},
     # formats of a verdict, the picture of its differences, and functions whose keywords are deprecated for users
     "compare": {"comparison.formats", "comparison.bless", "comparison.rerun", "plots"},
-    "sensitivity": {"uncertainty.sensitivity"},
+    "sweep": {"uncertainty.sensitivity"},
     # the executors, which have no public function
     "execution": {"engine", "results.sweep"},
     # a value in TOML

@@ -46,7 +46,7 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
     "conform": ("codes", "Judge what an engine delivers.", "pymunk -o page.html"),
     "calibrate": ("inverse", "Fit laws to measurements.", "fit.toml -o fit.h5 --best best.toml"),
     "sensitivity": (
-        "sensitivity",
+        "sweep",
         "Find which uncertain input matters.",
         "uncertain.toml --of peak_force -o study.h5",
     ),
