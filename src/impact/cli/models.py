@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from functools import partial
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,7 +11,7 @@ import typer
 import impact
 
 from ..display import Table, dump, print_blocks, show
-from ..errors import UsageError, did_you_mean
+from ..errors import UsageError, require_known
 from . import exits, options
 from .completion import complete_family, complete_model
 
@@ -20,9 +19,8 @@ if TYPE_CHECKING:
     from ..contact.model import ForceModel
     from ..engine.law_catalogue import Frictions, Models
 
-# units of the properties of a material in a table
-DISPLAY_UNITS = {"E": "GPa", "nu": "-", "rho": "kg/m3", "yield_strength": "MPa"}
-SI_PER_UNIT = {"GPa": 1e9, "MPa": 1e6}
+# units of the properties of a material in a table, and their sizes in SI
+DISPLAY_UNITS = {"E": ("GPa", 1e9), "nu": ("-", 1.0), "rho": ("kg/m3", 1.0), "yield_strength": ("MPa", 1e6)}
 
 
 def models(
@@ -102,23 +100,22 @@ def materials(
 ) -> None:
     """List common materials, which need no table in a config: E, nu, rho, yield strength, source."""
     catalogue = impact.materials()
-    if name is not None and name not in catalogue:
-        raise UsageError(f'no material "{name}"; {did_you_mean(name, list(catalogue))}')
+    require_known([] if name is None else [name], catalogue, "no material")
     shown = catalogue if name is None else {name: catalogue[name]}
     if as_json:
         print(dump(shown))
         return
     rows = [
-        (key, *map(partial(_display_value, record), DISPLAY_UNITS), record["about"], record["source"])
+        (
+            key,
+            *(float(record[p]) / size if p in record else "–" for p, (_, size) in DISPLAY_UNITS.items()),
+            record["about"],
+            record["source"],
+        )
         for key, record in shown.items()
     ]
-    headings = ("material", *(f"{key} [{unit}]" for key, unit in DISPLAY_UNITS.items()), "what", "source")
+    headings = ("material", *(f"{key} [{unit}]" for key, (unit, _) in DISPLAY_UNITS.items()), "what", "source")
     print_blocks([Table(rows, headings, text=(0, -2, -1))])
-
-
-def _display_value(record: Mapping[str, float | str], name: str) -> float | str:
-    """Convert a property to its unit in the table."""
-    return float(record[name]) / SI_PER_UNIT.get(DISPLAY_UNITS[name], 1.0) if name in record else "–"
 
 
 def cite(
