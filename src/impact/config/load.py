@@ -19,7 +19,6 @@ from ..contact.variables import OUTPUTS, default_variables
 from ..errors import MissingFileError
 from . import measurements, quantities, tables
 from .columns import expand_cases, named_files, read_files, without_replaced_inputs
-from .design import design_problems, draw_columns, unit_samples
 from .draft import (
     Draft,
     Measurements,
@@ -31,7 +30,7 @@ from .draft import (
     settings_of,
 )
 from .files import as_table, override_text, set_value
-from .grid import MAX_POINTS, Axis, build_grid, chunk_problems
+from .grid import MAX_POINTS, Axis, build_grid, chunk_problems, design_problems, draw_columns, unit_samples
 from .input_names import InputName, paths_with
 from .library import library
 from .lines import validation_problems

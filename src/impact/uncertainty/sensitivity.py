@@ -11,8 +11,7 @@ import xarray as xr
 
 from ..array_types import Array
 from ..atomic import check_outputs
-from ..config.design import draw_columns, unit_samples
-from ..config.grid import MAX_POINTS, SAMPLE
+from ..config.grid import MAX_POINTS, SAMPLE, draw_columns, unit_samples
 from ..config.input_names import InputName
 from ..config.lines import path_text
 from ..config.load import Config
