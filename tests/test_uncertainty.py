@@ -409,6 +409,10 @@ def test_material_properties_and_parameters_of_models_may_be_uncertain() -> None
         ("sweep.v1.gauss=[1, 2]", "sweep.v1.gauss: unknown key"),
         ("sweep.v1.empirical=[]", "sweep.v1.empirical: got an empty list, expected a list of at least one"),
         ("sweep.v1.empirical=no.csv", "no.csv: cannot be read"),
+        (
+            "sweep.v1.empirical=5",
+            "sweep.v1.empirical: got 5, expected the name of a CSV file, or a list of numbers",
+        ),
         ("sweep.m1.normal=[1.0, 1.0]", "sweep.m1: got 10 of 64 samples such as"),
         ('sweep.zip=[["v1", "e"]]', 'got "v1", an uncertain input; those vary together already'),
         (

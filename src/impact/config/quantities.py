@@ -621,7 +621,7 @@ def numbers_type(quantity: Quantity) -> TypeAdapter[Any]:
     )
     file: Any = Annotated[str, expected(DISTRIBUTION_FORMS["empirical"]), Tag(SCALAR)]
     values: Any = Annotated[list_of(end, quantity.expected), Tag(LIST)]
-    either = Annotated[file | values, Discriminator(lambda value: SCALAR if isinstance(value, str) else LIST)]
+    either = Annotated[file | values, Discriminator(lambda value: LIST if isinstance(value, list) else SCALAR)]
     distributions = _fields(
         DISTRIBUTION_FORMS,
         uniform=(end, end),
