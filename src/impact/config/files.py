@@ -137,24 +137,18 @@ def to_plain_data(value: Any, path: KeyPath = ()) -> tuple[Any, list[ConfigProbl
         return value, []
     if len(path) >= MAX_DEPTH:
         return None, [(path, f"nested too deeply, expected at most {MAX_DEPTH} levels")]
+    is_table = isinstance(value, Mapping)
+    if not is_table and all(type(element) is float for element in value):
+        return list(value), []
     problems: list[ConfigProblem] = []
-    if isinstance(value, list | tuple):
-        if all(type(element) is float for element in value):
-            return list(value), []
-        elements: list[object] = []
-        for index, element in enumerate(value):
-            plain_element, element_problems = to_plain_data(element, (*path, index))
-            elements.append(plain_element)
-            problems += element_problems
-        return elements, problems
-    table: dict[str, object] = {}
-    for key, element in value.items():
-        if not isinstance(key, str) or not _is_storable(key):
+    plain: dict[Any, object] = {}
+    for key, element in value.items() if isinstance(value, Mapping) else enumerate(value):
+        if is_table and not (isinstance(key, str) and _is_storable(key)):
             problems.append((path, f"got the key {as_text(key)}, expected text without NUL and lone surrogates"))
         else:
-            table[key], element_problems = to_plain_data(element, (*path, key))
-            problems += element_problems
-    return table, problems
+            plain[key], of_element = to_plain_data(element, (*path, key))
+            problems += of_element
+    return plain if is_table else list(plain.values()), problems
 
 
 def _from_library(value: Any) -> object:
