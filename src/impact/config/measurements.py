@@ -253,11 +253,8 @@ def _with_derived(points: _Points, rows: Sequence[int], g: float) -> tuple[_Poin
     problems = list(_derived_problems(values, derived, kept, rows))
     if problems:
         return points, problems
-    columns = [_Column("input", "v1", SWEEP_QUANTITIES["v1"], tuple(derived["v1"]))]
-    if "e_out" in derived:
-        columns.append(_Column("output", "e_out", MEASURED_OUTPUTS["e_out"], tuple(derived["e_out"])))
-    if f"{SIGMA}_e_out" in derived:
-        columns.append(_Column("sigma", "e_out", _deviation("e_out"), tuple(derived[f"{SIGMA}_e_out"])))
+    kinds = {header: _column_of(header, ["e_out"], {}) for header in derived}
+    columns = [replace(column, values=tuple(derived[header])) for header, column in kinds.items() if column]
     columns += [
         replace(column, values=tuple(column.values[i] for i in kept))
         for column in points.columns
