@@ -185,9 +185,9 @@ def _warm_up() -> None:
 
     trajectories.RANGE_TRAJECTORIES = BLOCK_TRAJECTORIES
     trajectories.trajectory_ranges.__defaults__ = (BLOCK_TRAJECTORIES,)
-    from impact.results import factored, slabs
+    from impact.results import layouts, slabs
 
-    slabs.slabs.__defaults__, factored.SLAB_ROWS = (SLAB_POINTS,), BLOCK_TRAJECTORIES
+    slabs.slabs.__defaults__, layouts.SLAB_ROWS = (SLAB_POINTS,), BLOCK_TRAJECTORIES
     import impact.cli.sweep
 
     with tempfile.TemporaryDirectory() as folder:

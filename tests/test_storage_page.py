@@ -19,7 +19,7 @@ from impact.config.grid import MAX_AXES, MAX_CHUNK_POINTS, MAX_COUNTED_POINTS, M
 from impact.config.quantities import MAX_AXIS_VALUES
 from impact.engine.plan import MAX_FULL_POINTS
 from impact.plots.slices import MAX_DRAWN
-from impact.results.factored import N_WITNESSES, WITNESS_TOLERANCE
+from impact.results.layouts import N_WITNESSES, WITNESS_TOLERANCE
 from impact.results.netcdf import MAX_LABEL_BYTES
 from impact.results.ranking import MAX_RANKED_POINTS
 from impact.results.slabs import MAX_SUMMARY_POINTS

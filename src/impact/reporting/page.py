@@ -31,7 +31,7 @@ from ..formatting import argument, with_year
 from ..plots.explore import axes_of, axis_label, shown_values
 from ..plots.slices import conditions_of, parameter_text, scalars_of, unit_of, units_of
 from ..plots.style import is_geometric, model_styles
-from ..results.factored import read_inputs
+from ..results.layouts import read_inputs
 from ..results.selection import law_positions
 from ..results.trajectory_table import TrajectoryTable, table_of_result
 from ..results.xarray_backend import open_result, result_of

@@ -25,7 +25,7 @@ from ..engine.run import Run
 from ..engine.trajectories import RANGE_TRAJECTORIES, TrajectoryMap, keys_of
 from ..errors import warn
 from ..formatting import law_name
-from .layouts import LAYOUTS
+from .layouts import file_template
 from .schema import dataset_template, stored_variables
 from .sweep import read_plan
 from .trajectory_table import expanded_slabs, table_of_ranges
@@ -202,7 +202,7 @@ def estimate(
         plan.points,
         plan.trajectories,
         tuple(_model_counts(plan, trajectory_map) for trajectory_map in plan.maps),
-        LAYOUTS[plan.layout].template(dataset_template(plan), plan, table).nbytes,
+        file_template(dataset_template(plan), plan, table).nbytes,
         work_folder_bytes,
         each * plan.trajectories / jobs + writing_seconds,
         plan.solver.core,

@@ -1,27 +1,79 @@
-"""The layouts of a file: full, with all values, and factored, with trajectories that values are computed from."""
+"""The layouts of a file: full, with all values, and factored, with trajectories that values are computed from.
+
+A factored file has axes, trajectories and laws, for any number of points. Some points, the witnesses, are stored
+in full. When a file is opened they are computed again: if they differ, the file was written by a version that
+computes other numbers, and is refused.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from typing import NamedTuple
+import itertools
+import json
+import math
+import operator
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
 
+import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
+from .._version import __version__
+from ..array_types import Array
+from ..config.grid import Axis
+from ..config.input_names import is_input
+from ..contact.materials import Material
+from ..contact.model import Law, Parameter, StoredLaw
+from ..contact.records import CollisionResult, Record
+from ..contact.slip_motion import FrictionKind
+from ..contact.status import FRICTION_STATUSES, STATUSES, Status
+from ..contact.tangential import TangentialResult
+from ..contact.variables import OUTPUTS, Variable
+from ..engine.build_impacts import has_stiffness_rule, input_at
+from ..engine.inputs import Column, Inputs, index_of
 from ..engine.plan import Plan
-from . import factored
+from ..engine.trajectories import TrajectoryMap
+from ..errors import ResultError, UsageError
+from ..formatting import number, safe_text
+from .attributes import LawRecord, PairRecord, SummaryRecord, read_attribute
 from .netcdf import RegionValues, stored_array
-from .schema import stored_variables
+from .schema import SLIP_INPUTS, attributes_of, count_points, derived_names, scale_of, stored_variables
 from .summary import Summary, add_slab, summarize_table, summary_record
-from .trajectory_table import ExpandedSlab, TrajectoryTable, expanded_slabs, lazy_dataset
+from .trajectory_table import (
+    MAX_STIFFNESS_VALUES,
+    ExpandedSlab,
+    TrajectoryRows,
+    TrajectoryTable,
+    expand,
+    expanded_slabs,
+    lazy_dataset,
+    whole_stiffness,
+)
 from .validation import FACTORED_ATTRIBUTES, TABLE_VARIABLES, is_quantity
 
 # a factored result of more points has their summary in its file: a reader would take long to compute it
 NO_SUMMARY_POINTS = 2**20
 
+N_WITNESSES = 1_000
+# tolerance of a witness, relative to the scale that `compare` uses for its variable
+WITNESS_TOLERANCE = 1e-12
+SLAB_ROWS = 2**16
+# by the bits of a status, whether it is one
+IS_STATUS = {
+    CollisionResult: np.isin(np.arange(2**8), STATUSES),
+    TangentialResult: np.isin(np.arange(2**8), FRICTION_STATUSES),
+}
+# what the variables of each type of trajectories begin with, which is also the name of their dimension
+PREFIXES: Mapping[type[Record], str] = {CollisionResult: "trajectory", TangentialResult: "tangential"}
+# by whether they are of pairs, the dimension of witnesses and the variable of their places
+WITNESSES = {False: ("witness", "witness_index"), True: ("pair_witness", "witness_pair_index")}
+
+# reads some values of a variable of the table, by its name; and the parts of some lengths that it consists of
+ReadVariable = Callable[[str, slice | NDArray[np.intp]], NDArray[Any]]
+ReadParts = Callable[[str, Sequence[int]], Iterator[NDArray[Any]]]
 # replaces some values of a slab
 FillSlab = Callable[[ExpandedSlab], None]
-# called with the numbers of stored and of failed points
-OnSlab = Callable[[int, int], None]
 
 
 class Contents(NamedTuple):
@@ -33,59 +85,31 @@ class Contents(NamedTuple):
     summary: Summary
 
 
-class FullLayout:
-    """A file of all values of all points."""
-
-    def check(self, plan: Plan) -> None:
-        """Raise a UsageError for a plan whose result cannot be stored, before integration."""
-
-    def template(self, result: xr.Dataset, plan: Plan, table: TrajectoryTable) -> xr.Dataset:
-        """Build the dataset of the file, with placeholder values, from that of the result."""
-        return result
-
-    def contents(
-        self, result: xr.Dataset, plan: Plan, table: TrajectoryTable, on_slab: OnSlab, fill: FillSlab | None
-    ) -> Contents:
-        """Compute what the file holds, from the trajectory table and the values that `fill` replaces."""
-        summary, chunks = Summary(), plan.config.output.chunks
-        lengths = [chunks.get(axis.name, axis.size) for axis in plan.config.axes] if chunks else []
-
-        def values() -> Iterator[RegionValues]:
-            for slab in expanded_slabs(table, stored_variables(plan), lengths):
-                if fill:
-                    fill(slab)
-                for name, array in slab.values.items():
-                    yield name, slab.region_in(result[name].dims), array
-                add_slab(summary, table, slab)
-                on_slab(summary.points, summary.failed)
-
-        return Contents(result, result, values(), summary)
-
-    def read(self, variables: Mapping[str, xr.Variable], attributes: Mapping[str, object]) -> xr.Dataset:
-        """Make a dataset of the variables and attributes of a file; a ResultError if they do not fit together.
-
-        Its values are read or computed when they are indexed.
-        """
-        coordinates = _load_coordinates(variables)
-        values = {name: variable for name, variable in variables.items() if name not in coordinates}
-        return xr.Dataset(values, coordinates, attributes)
+def check_layout(plan: Plan) -> None:
+    """Raise a UsageError for a plan whose result cannot be stored, before integration."""
+    for law in plan.models if plan.layout == "factored" else ():
+        stiffness_to_store(plan.inputs, law)
 
 
-class FactoredLayout:
-    """A file of a trajectory table, and of some points in full by which it is checked; see `FullLayout`."""
+def file_template(result: xr.Dataset, plan: Plan, table: TrajectoryTable) -> xr.Dataset:
+    """Build the dataset of the file, with placeholder values, from that of the result."""
+    return table_template(result, table, stored_variables(plan)) if plan.layout == "factored" else result
 
-    def check(self, plan: Plan) -> None:
-        for law in plan.models:
-            factored.stiffness_to_store(plan.inputs, law)
 
-    def template(self, result: xr.Dataset, plan: Plan, table: TrajectoryTable) -> xr.Dataset:
-        return factored.table_template(result, table, stored_variables(plan))
+def file_contents(
+    result: xr.Dataset,
+    plan: Plan,
+    table: TrajectoryTable,
+    on_slab: Callable[[int, int], None],
+    fill: FillSlab | None,
+) -> Contents:
+    """Compute what the file holds, from the trajectory table and the values that `fill` replaces in a full one.
 
-    def contents(
-        self, result: xr.Dataset, plan: Plan, table: TrajectoryTable, on_slab: OnSlab, fill: FillSlab | None
-    ) -> Contents:
-        variables, summary = stored_variables(plan), Summary()
-        template = self.template(result, plan, table)
+    `on_slab` is called with the numbers of stored and of failed points.
+    """
+    variables, summary, chunks = stored_variables(plan), Summary(), plan.config.output.chunks
+    template, is_factored = file_template(result, plan, table), plan.layout == "factored"
+    if is_factored:
         result = lazy_dataset(result, table, variables)
         if plan.stored_points > NO_SUMMARY_POINTS:
             summary, extremes = summarize_table(result, table)
@@ -95,35 +119,401 @@ class FactoredLayout:
             for slab in expanded_slabs(table, variables):
                 add_slab(summary, table, slab)
 
-        def values() -> Iterator[RegionValues]:
-            for stored in factored.table_values(table, variables):
-                yield stored
-                on_slab(0, summary.failed)
+    def values_of_points() -> Iterator[RegionValues]:
+        lengths = [chunks.get(axis.name, axis.size) for axis in plan.config.axes] if chunks else []
+        for slab in expanded_slabs(table, variables, lengths):
+            if fill:
+                fill(slab)
+            for name, array in slab.values.items():
+                yield name, slab.region_in(result[name].dims), array
+            add_slab(summary, table, slab)
+            on_slab(summary.points, summary.failed)
 
-        return Contents(result, template, values(), summary)
+    def values_of_table() -> Iterator[RegionValues]:
+        for stored in table_values(table, variables):
+            yield stored
+            on_slab(0, summary.failed)
 
-    def read(self, variables: Mapping[str, xr.Variable], attributes: Mapping[str, object]) -> xr.Dataset:
-        stored = {name: variable for name, variable in variables.items() if name in TABLE_VARIABLES}
-        witnesses = {name: variable.load() for name, variable in stored.items() if name.startswith("witness_")}
-        dataset = xr.Dataset(witnesses, _load_coordinates(variables), attributes)
-        # without xarray's indexing, which takes longer than to read a few values
-        arrays = {name: stored_array(variable) for name, variable in stored.items() if name not in witnesses}
-        sizes = {name: array.shape[0] for name, array in arrays.items()}
-        table = factored.stored_table(dataset, sizes, lambda name, positions: arrays[name].read((positions,)))
-        quantities = factored.witness_variables(dataset)
-        factored.check_witnesses(table, quantities, dataset)
-        template = dataset.drop_vars(witnesses).drop_attrs(deep=False)
-        described = {name: value for name, value in attributes.items() if name not in FACTORED_ATTRIBUTES}
-        return lazy_dataset(template.assign_attrs(described), table, quantities)
+    return Contents(result, template, values_of_table() if is_factored else values_of_points(), summary)
 
 
-def _load_coordinates(variables: Mapping[str, xr.Variable]) -> dict[str, xr.Variable]:
-    """Load the coordinates of a file."""
-    return {
+def read_layout(variables: Mapping[str, xr.Variable], attributes: Mapping[str, object]) -> tuple[str, xr.Dataset]:
+    """Make a dataset of the variables and attributes of a file, and name its layout.
+
+    Its values are read or computed when they are indexed. A ResultError if they do not fit together.
+    """
+    coordinates = {
         name: variable.load()
         for name, variable in variables.items()
         if name not in TABLE_VARIABLES and not is_quantity(name, tuple(map(str, variable.dims)))
     }
+    if "laws" not in attributes:
+        values = {name: variable for name, variable in variables.items() if name not in coordinates}
+        return "full", xr.Dataset(values, coordinates, attributes)
+    stored = {name: variable for name, variable in variables.items() if name in TABLE_VARIABLES}
+    witnesses = {name: variable.load() for name, variable in stored.items() if name.startswith("witness_")}
+    dataset = xr.Dataset(witnesses, coordinates, attributes)
+    # without xarray's indexing, which takes longer than to read a few values
+    arrays = {name: stored_array(variable) for name, variable in stored.items() if name not in witnesses}
+    sizes = {name: array.shape[0] for name, array in arrays.items()}
+    table = stored_table(dataset, sizes, lambda name, positions: arrays[name].read((positions,)))
+    quantities = witness_variables(dataset)
+    check_witnesses(table, quantities, dataset)
+    template = dataset.drop_vars(witnesses).drop_attrs(deep=False)
+    described = {name: value for name, value in attributes.items() if name not in FACTORED_ATTRIBUTES}
+    return "factored", lazy_dataset(template.assign_attrs(described), table, quantities)
 
 
-LAYOUTS: Mapping[str, FullLayout | FactoredLayout] = {"full": FullLayout(), "factored": FactoredLayout()}
+def stiffness_to_store(inputs: Inputs, law: Law) -> tuple[tuple[int, ...], Array] | None:
+    """Evaluate K [N/m^n] by a law's own rule, or return None; raise a UsageError for too many values."""
+    if not has_stiffness_rule(inputs, law):
+        return None
+    axes, K = whole_stiffness(inputs, law)
+    if K is None:
+        raise UsageError(
+            f"output.layout: {law.key} has a rule of K that takes more than {MAX_STIFFNESS_VALUES:,} values, "
+            'the limit of the factored layout; set output.layout = "full"'
+        )
+    return axes, K
+
+
+def table_template(
+    result_template: xr.Dataset, table: TrajectoryTable, variables: Sequence[Variable]
+) -> xr.Dataset:
+    """Build the dataset of a factored file, with placeholder values, from the coordinates of the result."""
+    names = [axis.name for axis in table.inputs.axes]
+    laws, stiffness = {}, [stiffness_to_store(table.inputs, law) for law in table.laws]
+    for law, trajectory_map, rule in zip(table.laws, table.maps, stiffness, strict=False):
+        record = LawRecord(
+            exponent=law.exponent,
+            parameters=[parameter.name for parameter in law.parameters],
+            domain=dict(law.domain),
+            asks_for_e="e" in law.quantities,
+            is_permanent=law.is_permanent,
+            axes=[names[axis] for axis in trajectory_map.axes],
+            trajectories=trajectory_map.count,
+            is_shared=trajectory_map.is_shared,
+            stiffness_axes=None if rule is None else [names[axis] for axis in rule[0]],
+        )
+        laws[law.key] = vars(record)
+    pairs = [
+        vars(PairRecord([names[axis] for axis in pair.axes], pair.count, pair.is_shared))
+        for pair in table.maps[len(table.laws) :]
+    ]
+    cells = sum(trajectory_map.cells for trajectory_map in table.maps if trajectory_map.is_shared)
+
+    def placeholder(dim: str, size: int, dtype: Any, attributes: Mapping[str, object] | str) -> tuple[Any, ...]:
+        described = {"long_name": attributes} if isinstance(attributes, str) else attributes
+        return dim, np.broadcast_to(np.zeros((), dtype), size), described
+
+    stored = {}
+    for record_type, prefix in PREFIXES.items():
+        if rows := sum(
+            trajectory_map.count for trajectory_map in table.maps if trajectory_map.record is record_type
+        ):
+            for name, array in vars(record_type.blank(1)).items():
+                stored[f"{prefix}_{name}"] = placeholder(prefix, rows, array.dtype, f"{name} of a trajectory")
+    if cells:
+        stored["trajectory_of_cell"] = placeholder("cell", cells, "i4", "number of the trajectory of a cell")
+    if values := sum(rule[1].size for rule in stiffness if rule is not None):
+        stored["law_stiffness"] = placeholder("stiffness_value", values, "f8", "K by the rules of the laws")
+    for of_friction, indices, chosen in _witnesses(table, variables):
+        dim, index_name = WITNESSES[of_friction]
+        stored[index_name] = placeholder(dim, indices.size, "i8", "place in C order of (model, axes)")
+        for variable in chosen:
+            stored[f"witness_{variable.name}"] = placeholder(
+                dim, indices.size, variable.dtype, attributes_of(variable)
+            )
+    attributes = {**result_template.attrs, "axes": json.dumps(names), "laws": json.dumps(laws)}
+    if pairs:
+        attributes |= {"frictions": json.dumps(table.frictions), "pairs": json.dumps(pairs)}
+    template = xr.Dataset(stored, result_template.coords, attributes)
+    # readers of netCDF take coordinates that no variable names for variables
+    others = [str(name) for name in result_template.coords if name not in result_template.dims]
+    return template.assign_attrs(coordinates=" ".join(others))
+
+
+def table_values(table: TrajectoryTable, variables: Sequence[Variable]) -> Iterator[RegionValues]:
+    """Yield the values of a factored file, a few at a time: name of the variable, region and values."""
+    starts = dict.fromkeys(PREFIXES, 0)
+    for law, trajectory_map in enumerate(table.maps):
+        start, prefix = starts[trajectory_map.record], PREFIXES[trajectory_map.record]
+        for first in range(0, trajectory_map.count, SLAB_ROWS):
+            rows = np.arange(first, min(first + SLAB_ROWS, trajectory_map.count))
+            for name, array in vars(table.rows.take(law, rows)).items():
+                yield f"{prefix}_{name}", (slice(start + first, start + first + rows.size),), array
+        starts[trajectory_map.record] += trajectory_map.count
+    cells = [trajectory_map.of_cell for trajectory_map in table.maps if trajectory_map.of_cell is not None]
+    rules = (stiffness_to_store(table.inputs, law) for law in table.laws)
+    stiffness = [rule[1].reshape(-1) for rule in rules if rule is not None]
+    stored: dict[str, Sequence[NDArray[Any]]] = {"trajectory_of_cell": cells, "law_stiffness": stiffness}
+    for name, arrays in stored.items():
+        for region, array in zip(_consecutive([array.size for array in arrays]), arrays, strict=True):
+            yield name, (region,), array
+    for of_friction, indices, chosen in _witnesses(table, variables):
+        yield WITNESSES[of_friction][1], (slice(0, indices.size),), indices
+        for name, values in witness_values(table, chosen, indices).items():
+            yield f"witness_{name}", (slice(0, indices.size),), values
+
+
+def _witnesses(
+    table: TrajectoryTable, variables: Sequence[Variable]
+) -> Iterator[tuple[bool, NDArray[np.int64], list[Variable]]]:
+    """Choose witnesses of the models, and of the pairs if there are some: their places, and their variables."""
+    for of_friction in (False, True):
+        if numbers := table.numbers(of_friction):
+            indices = witness_indices(len(numbers) * table.inputs.cells)
+            yield of_friction, indices, [variable for variable in variables if variable.of_friction == of_friction]
+
+
+def _consecutive(sizes: Sequence[int]) -> list[slice]:
+    """Place parts of some sizes one after another.
+
+    >>> _consecutive([2, 3])
+    [slice(0, 2, None), slice(2, 5, None)]
+    """
+    return [slice(stop - size, stop) for size, stop in zip(sizes, itertools.accumulate(sizes), strict=True)]
+
+
+def witness_indices(points: int) -> NDArray[np.int64]:
+    """Indices of witnesses, spread over all points by the golden section, with the first and the last point.
+
+    >>> witness_indices(3).tolist()
+    [0, 1, 2]
+    """
+    if points <= N_WITNESSES:
+        return np.arange(points)
+    step = int(points * 0.6180339887498949)
+    # without a common factor all indices differ
+    while math.gcd(step, points) > 1:
+        step += 1
+    return np.array(sorted({points - 1, *(number * step % points for number in range(N_WITNESSES - 1))}), np.int64)
+
+
+def witness_values(
+    table: TrajectoryTable, variables: Sequence[Variable], indices: NDArray[np.int64]
+) -> dict[str, NDArray[Any]]:
+    """Compute the values of some points of models, or of pairs, by name; arrays of shape (len(indices),)."""
+    models, cells = np.divmod(indices, table.inputs.cells)
+    numbers = table.numbers(any(variable.of_friction for variable in variables))
+    values_by_name = {variable.name: np.empty(indices.size, variable.dtype) for variable in variables}
+    for model in np.unique(models).tolist():
+        rows = np.flatnonzero(models == model)
+        index = index_of(cells[rows], table.inputs.shape)
+        _, values = expand(table, numbers[model], index, list(values_by_name))
+        for name, array in values_by_name.items():
+            array[rows] = np.broadcast_to(values[name], rows.shape)
+    return values_by_name
+
+
+def stored_table(dataset: xr.Dataset, sizes: Mapping[str, int], read: ReadVariable) -> TrajectoryTable:
+    """Read the trajectory table of a factored file; its rows are read when they are needed."""
+    laws: dict[str, LawRecord] = read_attribute(dataset.attrs, "laws", required=True)
+    if list(laws) != [str(key) for key in dataset["model"].values]:
+        raise ResultError("is not a readable result (laws: not those of its models)")
+    inputs = read_inputs(dataset, _stored_axis_names(dataset))
+
+    def parts(name: str, lengths: Sequence[int]) -> Iterator[NDArray[Any]]:
+        if sizes.get(name, 0) != sum(lengths):
+            raise ValueError
+        return (read(name, part) for part in _consecutive(lengths))
+
+    pairs: list[PairRecord] = read_attribute(dataset.attrs, "pairs")
+    frictions: dict[str, FrictionKind] = read_attribute(dataset.attrs, "frictions")
+    keys = [str(key) for key in dataset["friction"].values] if "friction" in dataset else []
+    if len(pairs) != len(laws) * len(frictions) or list(frictions) != keys:
+        raise ResultError("is not a readable result (pairs: not those of its models and friction laws)")
+    try:
+        maps = _stored_maps(inputs, [*laws.values(), *pairs], len(laws), parts)
+        inputs = replace(inputs, stiffness=_read_stiffness(inputs, laws, parts))
+        rows: list[slice] = []
+        for record_type, prefix in PREFIXES.items():
+            of_type = [trajectory_map.count for trajectory_map in maps if trajectory_map.record is record_type]
+            if of_type:
+                rows += _consecutive(of_type)
+                if {sizes[f"{prefix}_{name}"] for name in record_type.columns()} != {sum(of_type)}:
+                    raise ValueError
+                _check_trajectory_statuses(record_type, sum(of_type), read)
+    except (KeyError, TypeError, ValueError, IndexError, OverflowError):
+        raise ResultError("is not a readable result (its laws do not fit its table)") from None
+
+    def read_rows(law: int, part: slice | NDArray[np.intp]) -> Record:
+        start, record_type = rows[law].start, maps[law].record
+        chosen = slice(start + part.start, start + part.stop) if isinstance(part, slice) else start + part
+        prefix = PREFIXES[record_type]
+        return record_type(**{name: read(f"{prefix}_{name}", chosen) for name in record_type.columns()})
+
+    trajectory_rows = TrajectoryRows(maps, lambda law, *ends: read_rows(law, slice(*ends)), pick=read_rows)
+    summary = read_attribute(dataset.attrs, "summary") or None
+    if summary is not None:
+        _check_summary(summary, dataset, inputs.shape)
+    stored_laws = tuple(_stored_law(key, law) for key, law in laws.items())
+    return TrajectoryTable(inputs, stored_laws, tuple(maps), trajectory_rows, summary, frictions)
+
+
+def _axis_numbers(inputs: Inputs, names: Sequence[str]) -> tuple[int, ...]:
+    """Find the numbers of axes; raise a KeyError for an unknown one, a ValueError for a repeated one."""
+    numbers = {axis.name: number for number, axis in enumerate(inputs.axes)}
+    if len({*names}) < len(names):
+        raise ValueError
+    return tuple(numbers[name] for name in names)
+
+
+def _stored_maps(
+    inputs: Inputs, laws: Sequence[LawRecord | PairRecord], models: int, parts: ReadParts
+) -> list[TrajectoryMap]:
+    """Read the trajectory of each cell, of each model and pair; raise a ValueError for one that does not exist."""
+    maps = []
+    for position, law in enumerate(laws):
+        axes = _axis_numbers(inputs, law.axes)
+        record = CollisionResult if position < models else TangentialResult
+        maps.append(TrajectoryMap(position, axes, tuple(inputs.shape[axis] for axis in axes), record=record))
+    shared = [model for model, law in enumerate(laws) if law.is_shared]
+    cells = parts("trajectory_of_cell", [maps[model].cells for model in shared])
+    for model, of_cell in zip(shared, cells, strict=True):
+        count = laws[model].trajectories
+        if of_cell.dtype.kind != "i" or of_cell.min() < 0 or of_cell.max() >= count:
+            raise ValueError
+        # the first cell of a trajectory is not needed to read it
+        maps[model] = replace(maps[model], first=np.broadcast_to(np.intp(0), count), of_cell=of_cell)
+    return maps
+
+
+def _read_stiffness(inputs: Inputs, laws: Mapping[str, LawRecord], parts: ReadParts) -> dict[str, Column]:
+    """Read K of each law with a rule for it, over the axes that it depends on; see `Inputs`."""
+    axes = {
+        f"{key}.K": _axis_numbers(inputs, law.stiffness_axes)
+        for key, law in laws.items()
+        if law.stiffness_axes is not None
+    }
+    shapes = [tuple(inputs.shape[axis] for axis in numbers) for numbers in axes.values()]
+    values = parts("law_stiffness", [math.prod(shape) for shape in shapes])
+    return {
+        name: Column(numbers, np.reshape(K, shape))
+        for (name, numbers), shape, K in zip(axes.items(), shapes, values, strict=True)
+    }
+
+
+def _check_summary(summary: SummaryRecord, dataset: xr.Dataset, shape: tuple[int, ...]) -> None:
+    """Refuse a summary of other statuses, models or points than the result has."""
+    statuses = {*summary.status, *(status for status, _, _ in summary.failed_at)}
+    models = {
+        *(key for _, key, _ in summary.failed_at),
+        *(key for worst in summary.worst.values() for key in worst),
+    }
+    indices = [index for _, _, index in summary.failed_at]
+    points = sum(summary.status.values()) + summary.not_evaluated
+    if (
+        not statuses <= {status.name.lower() for status in Status}
+        or not models <= {*dataset["model"].values.tolist()}
+        or any(len(index) != len(shape) or any(map(operator.ge, index, shape)) for index in indices)
+        or ("witness_status" in dataset and points != count_points(dataset.coords.to_dataset()))
+    ):
+        raise ResultError("is not a readable result (summary: not that of its points)")
+
+
+def _check_trajectory_statuses(record: type[Record], rows: int, read: ReadVariable) -> None:
+    """Refuse unknown statuses, since the computed ones would be unknown as well."""
+    for first in range(0, rows, SLAB_ROWS):
+        values = read(f"{PREFIXES[record]}_status", slice(first, min(first + SLAB_ROWS, rows)))
+        if values.dtype != np.int8 or not IS_STATUS[record][values.view(np.uint8)].all():
+            raise ValueError
+
+
+def _stored_law(key: str, law: LawRecord) -> StoredLaw:
+    """Build a law without formulas from its record in a file."""
+    parameters = tuple(Parameter(name, "1", "") for name in law.parameters)
+    quantities = frozenset({"e"} if law.asks_for_e else ())
+    return StoredLaw(key, law.exponent, parameters, law.domain, quantities, law.is_permanent)
+
+
+def read_inputs(dataset: xr.Dataset, axis_names: Sequence[str]) -> Inputs:
+    """Read the inputs of a sweep along some axes from the coordinates of its result."""
+    derived = derived_names(dataset.coords)
+    scalars: dict[str, Any] = {}
+    axes: dict[str, dict[str, Any]] = {name: {} for name in axis_names}
+    for name, variable in dataset.coords.items():
+        name = str(name)
+        if not is_input(name) or name in derived:
+            continue
+        if variable.ndim == 0:
+            scalars[name] = variable.values.item()
+        elif variable.dims[0] in axes and variable.ndim == 1:
+            axes[str(variable.dims[0])][name] = tuple(variable.values.tolist())
+        else:
+            raise ResultError(f"is not a readable result ({safe_text(name, 40)}: does not lie along one axis)")
+    try:
+        stored = read_attribute(dataset.attrs, "materials", required=True)
+        materials = {}
+        for name, properties in stored.items():
+            # properties that are axes have no value
+            fixed = {key: value for key, value in properties.items() if value is not None}
+            materials[name] = Material(**{"E": np.nan, "nu": np.nan, **fixed})
+    except (TypeError, ValueError):
+        raise ResultError("is not a readable result (materials: not JSON of the expected type)") from None
+    # an axis that is not numbered has the name of its first column
+    ordered = (
+        Axis({name: columns[name], **columns}) if name in columns else Axis(columns, numbered=name)
+        for name, columns in axes.items()
+        if columns
+    )
+    return Inputs(scalars, tuple(ordered), materials)
+
+
+def _stored_axis_names(dataset: xr.Dataset) -> list[str]:
+    """Read the names of the axes of the grid of a factored file, in their order."""
+    names: list[str] = read_attribute(dataset.attrs, "axes", required=True)
+    along = [name for name in names if name in dataset.coords and dataset.coords[name].dims == (name,)]
+    if along != names or len({*names}) < len(names):
+        raise ResultError("is not a readable result (axes: not those of its grid)")
+    return names
+
+
+def check_witnesses(table: TrajectoryTable, variables: Sequence[Variable], stored: xr.Dataset) -> None:
+    """Refuse a file whose witnesses, stored with their index, expand to other numbers; name both versions."""
+    for of_friction, expected, chosen in _witnesses(table, variables):
+        indices = np.asarray(stored[WITNESSES[of_friction][1]].values, np.int64)
+        if not np.array_equal(indices, expected):
+            raise ResultError("is not a readable result (its witnesses are not at the expected positions)")
+        _check_witnesses_at(table, chosen, indices, stored)
+
+
+def _check_witnesses_at(
+    table: TrajectoryTable, variables: Sequence[Variable], indices: NDArray[np.int64], stored: xr.Dataset
+) -> None:
+    """Refuse stored values at some points, of models or of pairs, that expand to other numbers."""
+    expanded = witness_values(table, variables, indices)
+    cells = indices % table.inputs.cells
+    index = index_of(cells, table.inputs.shape)
+    names = {"v1", "v2", "m1", "m2"}.union({*SLIP_INPUTS}.intersection(table.inputs.names()))
+    if any(variable.of_friction for variable in variables):
+        names |= {"R1", "R2"}
+    inputs = {name: input_at(table.inputs, name, index) for name in names}
+    for variable in variables:
+        expected, got = stored[f"witness_{variable.name}"].values, expanded[variable.name]
+        columns = {**inputs, variable.name: expected}
+        has_peak = "witness_peak_indentation" in stored
+        if has_peak:
+            columns["peak_indentation"] = stored["witness_peak_indentation"].values
+        with np.errstate(all="ignore"):
+            scale = np.broadcast_to(scale_of(variable, columns.__getitem__, has_peak=has_peak), expected.shape)
+            rounding = float(np.finfo(expected.dtype).eps) if expected.dtype.kind == "f" else 0.0
+            allowed = np.maximum(WITNESS_TOLERANCE, 2.0 * rounding) * np.abs(scale)
+            same = (got == expected) | (np.isnan(got) & np.isnan(expected)) | (np.abs(got - expected) <= allowed)
+        if not same.all():
+            worst = int(np.argmin(same))
+            version = safe_text(str(stored.attrs.get("impact_version", "unknown")), 40)
+            raise ResultError(
+                f"its witnesses have other values: {variable.name} is {number(got[worst], 12)}, the file has "
+                f"{number(expected[worst], 12)}; it was written by impact {version}, this is {__version__}: sweep "
+                "its config again, or expand it with that version (impact expand)"
+            )
+
+
+def witness_variables(stored: xr.Dataset) -> tuple[Variable, ...]:
+    """List the variables of a file's witnesses, with their dtypes in the file."""
+    return tuple(
+        replace(variable, dtype=stored[f"witness_{name}"].dtype.str[1:])
+        for name, variable in OUTPUTS.items()
+        if f"witness_{name}" in stored
+    )

@@ -15,7 +15,7 @@ from ..engine.inputs import Inputs
 from ..engine.trajectories import axes_of_arrays, probe_index
 from ..errors import ModelError, ResultError
 from ..formatting import number, prefixed, quantity, safe_text
-from .factored import read_inputs
+from .layouts import read_inputs
 from .schema import parts_of_laws
 from .slabs import MAX_SUMMARY_POINTS, is_computed, over_varying_dims, slabs
 from .summary import MAX_SMALL_INDENTATION, Summary

@@ -31,7 +31,7 @@ from ..engine.run import DEFAULT_RUN, ProgressCallback, ProgressCounter, Run, ig
 from ..engine.trajectories import RANGE_TRAJECTORIES, TrajectoryRange
 from ..errors import ResultError, StoreError, UnfinishedError, UsageError, warn
 from ..formatting import argument
-from .layouts import LAYOUTS, FillSlab
+from .layouts import FillSlab, check_layout, file_contents
 from .netcdf import MAX_LABEL_BYTES, encode_text, is_text
 from .outcome import SweepOutcome
 from .plausibility import input_notes, result_notes, with_depths
@@ -358,7 +358,7 @@ def reload_range(work_folder: checkpoint.WorkFolder, trajectory_range: Trajector
 def check_storable(plan: Plan) -> None:
     """Refuse a plan whose labels are too long or whose laws cannot be factored, before integration."""
     check_labels(plan)
-    LAYOUTS[plan.layout].check(plan)
+    check_layout(plan)
 
 
 def check_labels(plan: Plan) -> None:
@@ -420,7 +420,7 @@ def store_result(
         run.on_progress(replace(progress, points=points, failed=max(failed, progress.failed)))
         run.check_stop()
 
-    contents = LAYOUTS[plan.layout].contents(result, plan, table, on_slab, extension.fill)
+    contents = file_contents(result, plan, table, on_slab, extension.fill)
     with atomic_write(output, overwrite=run.overwrite or extension.replaces, part=part) as sink:
         seal = write_sealed(sink, contents.template, contents.values, plan.config.output)
         check_readable(sink, output)

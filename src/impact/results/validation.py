@@ -34,7 +34,7 @@ from .slabs import is_computed, slabs
 TEXT_COORDINATES = frozenset(
     {"model", "friction", *MODEL_METADATA, *MATERIAL_KEYS, *CALIBRATION_TEXTS, "input"} - {"year"}
 ).union(STUDY_COORDINATES["board"])
-# the trajectory table of a factored file, see `impact.results.factored`
+# the trajectory table of a factored file, see `impact.results.layouts`
 TABLE_VARIABLES = frozenset(
     {
         *(f"trajectory_{name}" for name in CollisionResult.columns()),

@@ -21,7 +21,7 @@ from ..errors import ResultError, UnfinishedError, UsageError, warn
 from ..formatting import argument, safe_text, type_of
 from .hdf5_structure import byte_reader, check_root
 from .kinds import kind_of, require_result, require_sweep
-from .layouts import LAYOUTS
+from .layouts import read_layout
 from .netcdf import RegionValues, encode_attribute, read_variables, write_dataset
 from .schema import MODEL_METADATA
 from .seal import check_seal, is_result, write_seal
@@ -139,8 +139,7 @@ def open_result(path: str | Path) -> xr.Dataset:
             # opened by its path: a signal that arrives while h5py calls a Python stream is lost
             file = on_error.enter_context(h5py.File(path, "r", driver="sec2"))
             variables, attributes, unknown = read_variables(file, read)
-        layout = "factored" if "laws" in attributes else "full"
-        dataset = LAYOUTS[layout].read(variables, attributes)
+        layout, dataset = read_layout(variables, attributes)
         if violation := schema_violation(dataset):
             raise ResultError(f"is not a readable result ({violation})")
         on_error.pop_all()
