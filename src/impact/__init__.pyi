@@ -49,13 +49,14 @@ from .progress_display import progress_bar as progress_bar
 from .reporting.page import page as page
 from .reporting.report import report as report
 from .results.board import Board as Board
+from .results.calibration import Fits as Fits
 from .results.citations import Citations as Citations, cite as cite
-from .results.describe import Fits as Fits, Studies as Studies, describe as describe
 from .results.estimate import Estimate as Estimate, estimate as estimate
 from .results.extend import extend as extend, extend_to_file as extend_to_file
-from .results.info import Info as Info, info as info
+from .results.info import Info as Info, describe as describe, info as info
 from .results.outcome import SweepOutcome as SweepOutcome
 from .results.ranking import Ranking as Ranking, recommend as recommend
+from .results.sensitivity import Studies as Studies
 from .results.shards import ShardProgress as ShardProgress, merge as merge, sweep_shard as sweep_shard
 from .results.single_impact import Impact as Impact, run as run
 from .results.sweep import sweep as sweep, sweep_to_file as sweep_to_file

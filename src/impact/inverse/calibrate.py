@@ -36,8 +36,7 @@ from ..engine.plugins import Plugins, read_plugins
 from ..engine.trajectories import PlanLaw, model_of
 from ..errors import UsageError, warn
 from ..formatting import argument, law_keys
-from ..results.calibration import calibration_template, fitted_config, position_of_law
-from ..results.describe import describe
+from ..results.calibration import Fits, calibration_template, fitted_config, position_of_law
 from ..results.schema import FIT_STATUSES
 from ..results.xarray_backend import save
 from .batched_solvers import VectorFunction
@@ -124,7 +123,7 @@ def calibrate(
     warn(*config.notes, *Plan(config).pair_notes(f"{name}: frictions"))
     result = calibrate_config(config, plugin_set.of(config.models), jobs)
     if output is not None and Path(output).suffix.lower() in TABLE_SUFFIXES:
-        write_table(describe(result), Path(output), TableForm(), overwrite=overwrite)
+        write_table(Fits(result), Path(output), TableForm(), overwrite=overwrite)
     elif output is not None:
         save(result, output, overwrite=overwrite)
     if best is not None:

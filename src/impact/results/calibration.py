@@ -1,10 +1,10 @@
-"""The dataset of a calibration: parameters of laws, how well they fit, and the measurements."""
+"""The dataset of a calibration, and what it says: parameters of laws, how well they fit, and the measurements."""
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -19,6 +19,7 @@ from ..config.quantities import KeyPath
 from ..config.tables import DEFAULT_TITLE
 from ..contact.models import original_key
 from ..contact.variables import OUTPUTS
+from ..display import Block, Displayed, Table
 from ..engine.plan import Plan
 from ..engine.plugins import Plugins
 from ..engine.trajectories import PlanLaw, keys_of, model_of
@@ -32,6 +33,8 @@ REJECTED_P = 1e-3
 OFFSET_P = 1e-2
 # residuals that are named
 NAMED_RESIDUALS = 3
+# numbers of a law in JSON
+CRITERIA = ("chi2_reduced", "p_value", "excess", "aicc", "weight", "loo")
 FIT_HEADINGS = ("law", "parameter", "estimate", "95 %", "chi2/dof", "p", "AICc", "weight", "loo", "status")
 
 
@@ -189,6 +192,53 @@ def describe_data(dataset: xr.Dataset) -> str:
     laws, points = dataset.sizes["model"], dataset.sizes["point"]
     plural = "" if laws == 1 else "s"
     return f"{laws} law{plural}, {points} measured values, noise {dataset.attrs['noise']}; the best law first"
+
+
+@dataclass(frozen=True)
+class Fits(Displayed):
+    """The fits of a calibration, the best law first."""
+
+    dataset: xr.Dataset
+
+    def as_dict(self) -> dict[str, Any]:
+        """The laws with their parameters by config path, and the largest residuals."""
+        residuals = [asdict(residual) for residual in largest_residuals(self.dataset)]
+        return {"models": list(self._models()), "largest_residuals": residuals}
+
+    def _models(self) -> Iterator[dict[str, Any]]:
+        paths = json.loads(self.dataset.attrs["fit_paths"])
+        for rank, key in enumerate(map(str, self.dataset["model"].values), 1):
+            law = self.dataset.sel(model=key)
+            parameters = {}
+            for position, path in enumerate(paths):
+                parameter = law.isel(parameter=position)
+                if int(parameter["identifiable"]) >= 0:
+                    numbers = {name: float(parameter[name]) for name in ("estimate", "lower", "upper")}
+                    parameters[path] = {**numbers, "identifiable": bool(parameter["identifiable"])}
+            yield {
+                "model": key,
+                "rank": rank,
+                "status": fit_status(law),
+                "parameters": parameters,
+                "determined": [group for group in str(law["determined"].item()).split("; ") if group],
+                **{name: float(law.get(name, math.nan)) for name in CRITERIA},
+            }
+
+    def records(self) -> Sequence[Mapping[str, Any]]:
+        """A row for each parameter of each law."""
+        return [
+            {"model": law["model"], "parameter": path, **numbers, "status": law["status"]}
+            | {name: law[name] for name in CRITERIA}
+            for law in self._models()
+            for path, numbers in law["parameters"].items()
+        ]
+
+    def sections(self, width: int) -> Iterator[Block]:
+        """A row for each law and parameter, and what to know besides."""
+        yield describe_data(self.dataset)
+        yield ""
+        yield Table(fit_rows(self.dataset), FIT_HEADINGS, text=(0, 1, -1))
+        yield from fit_notes(self.dataset)
 
 
 def calibration_template(

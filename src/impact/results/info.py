@@ -1,4 +1,4 @@
-"""The contents of a result or a time history, as plain data and as text."""
+"""The contents of a result or a time history, and what a study or a law says, as plain data and as text."""
 
 from __future__ import annotations
 
@@ -10,16 +10,22 @@ import numpy as np
 import xarray as xr
 
 from ..config.input_names import InputName
+from ..contact.friction import FrictionLaw
+from ..contact.model import ForceModel
 from ..display import PIPE_WIDTH, Block, Displayed, Table
+from ..engine.law_catalogue import FrictionDescription, ModelDescription
+from ..errors import UsageError
 from ..formatting import label, number
 from .attributes import read_attribute
-from .describe import describe
+from .board import Board
+from .calibration import Fits
 from .kinds import STUDIES, kind_of
 from .outcome import error_table
 from .schema import MODEL_METADATA, count_points, exponents_of, plain_unit
+from .sensitivity import Studies
 from .slabs import is_large
 from .summary import Extremes, Summary, counts_by_name, extremes_of, summarize
-from .xarray_backend import open_result
+from .xarray_backend import open_result, result_of
 
 # attributes that are shown if they are set
 SHOWN_ATTRIBUTES = (
@@ -176,3 +182,40 @@ def _count_points(dataset: xr.Dataset) -> int:
     counted = {"calibration": "measured", "sensitivity study": "mean", "board": "check_status"}
     kind = kind_of(dataset)
     return int(dataset[counted[kind]].size) if kind in counted else count_points(dataset)
+
+
+def describe(
+    item: xr.Dataset | str | Path | ForceModel | FrictionLaw,
+) -> Fits | Studies | Board | ModelDescription | FrictionDescription:
+    """Describe a calibration, a sensitivity study, a board or a law, as its command prints it and a notebook does.
+
+    Returns
+    -------
+    Fits, Studies, Board, ModelDescription or FrictionDescription : with `records`, `as_dict` and `to_dataframe`
+
+    Raises
+    ------
+    UsageError : the dataset is another result
+
+    >>> import impact
+    >>> study = impact.sensitivity({
+    ...     "models": "hertz",
+    ...     "sweep": {"v1": {"uniform": [0.8, 1.2]}, "m1": 1.0, "m2": 1.0, "K": {"uniform": [5e5, 1.5e6]}},
+    ...     "design": {"n": 1024},
+    ... }, of="peak_force")
+    >>> impact.describe(study).to_dataframe()[["input", "first", "total"]].round(2).values.tolist()
+    [['sweep.v1', 0.56, 0.57], ['sweep.K', 0.43, 0.44]]
+    """
+    if isinstance(item, ForceModel):
+        return ModelDescription(item)
+    if isinstance(item, FrictionLaw):
+        return FrictionDescription(item)
+    result = result_of(item)
+    match kind_of(result):
+        case "calibration":
+            return Fits(result)
+        case "sensitivity study":
+            return Studies(result)
+        case "board":
+            return Board(result)
+    raise UsageError("expected the result of a calibration, of a sensitivity study, or a board")

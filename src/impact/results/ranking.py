@@ -15,18 +15,18 @@ from numpy.typing import NDArray
 
 from ..array_types import Mask
 from ..config.files import read_number
-from ..config.input_names import InputName, is_foreign, with_words
+from ..config.input_names import InputName, with_words
 from ..config.quantities import Quantity
 from ..config.tables import TOLERANCE
 from ..contact.status import FIRST_FAILURE, FrictionStatus, Status
 from ..contact.units import names_in
-from ..contact.variables import LAW_DIMS, OUTPUTS
+from ..contact.variables import OUTPUTS
 from ..display import Block, Displayed, Table, html_of
 from ..errors import UsageError, did_you_mean
 from ..formatting import argument, law_name, percentage, prefixed, safe_text
 from .kinds import require_sweep
 from .replay_command import describe_point
-from .schema import columns_along, plain_unit
+from .schema import columns_along, plain_unit, squeezed_laws
 from .selection import as_keys, require_outputs, select, select_laws
 from .slabs import Slab, distinct_points, is_computed, over_varying_dims, slabs, varying_dims
 from .xarray_backend import result_of
@@ -363,13 +363,7 @@ def rank_laws(
     """Rank the laws of a result; refuse one that lacks a target, or has too many points to rank or none."""
     _check_rankable(dataset, criterion)
     selected = select_laws(select(dataset[list(criterion.names)], sel or {}), models, frictions)
-    dims = [dim for dim in LAW_DIMS if dim in selected.dims]
-    parts = []
-    for place in np.ndindex(*(selected.sizes[dim] for dim in dims)):
-        part = selected.isel(dict(zip(dims, place, strict=True)))
-        # without the axes of other laws' parameters
-        foreign = [dim for dim in part.dims if is_foreign(columns_along(part, dim), *_keys(part))]
-        parts.append(part.isel(dict.fromkeys(foreign, 0)))
+    parts = list(squeezed_laws(selected, selected.dims))
     evaluated = [
         _reduce_dims(part, criterion)[0] for part in parts if is_computed(part.variables[criterion.names[0]])
     ]

@@ -436,6 +436,12 @@ def parts_of_laws(dataset: xr.Dataset, dims: Iterable[Hashable]) -> Iterator[tup
         yield place, dataset.isel(selection)
 
 
+def squeezed_laws(dataset: xr.Dataset, dims: Iterable[Hashable]) -> Iterator[xr.Dataset]:
+    """Select each of `places_of_laws`, without the axes of the parameters of other laws."""
+    for _, selection in places_of_laws(dataset, dims):
+        yield dataset.isel({dim: 0 if isinstance(part, slice) else part for dim, part in selection.items()})
+
+
 def count_points(dataset: xr.Dataset) -> int:
     """Count the points of a result: cells for a model, without repetitions along parameters of other laws."""
     sizes = [part.sizes for _, part in parts_of_laws(dataset, {"model"} & {*dataset.dims})]

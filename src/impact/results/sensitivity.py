@@ -1,21 +1,24 @@
-"""The dataset of a sensitivity study: indices of the uncertain inputs, and the distribution of an output."""
+"""The dataset of a sensitivity study, and what it says: indices of inputs, and the distribution of an output."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from ..config.grid import SAMPLE
-from ..config.input_names import InputName, is_foreign
+from ..config.input_names import InputName
 from ..contact.units import names_in, with_numbers
-from ..contact.variables import OUTPUTS
+from ..contact.variables import LAW_DIMS, OUTPUTS
+from ..display import Block, Displayed, Table
 from ..engine.plan import Plan
 from ..formatting import NO_BREAK, decimals, number, safe_text, scaled_unit
 from .attributes import read_attribute
-from .schema import SENSITIVITY, columns_along, plan_coordinates, provenance_attributes, template
+from .replay_command import describe_point
+from .schema import SENSITIVITY, plan_coordinates, provenance_attributes, squeezed_laws, template
 
 # probabilities of the quantiles
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
@@ -23,6 +26,8 @@ QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 MIN_SAMPLES = 64
 # indices from the first half of the samples
 HALF = ("first_half", "total_half")
+# numbers of an uncertain input in JSON
+INDICES = ("first", "first_lower", "first_upper", "total", "total_lower", "total_upper", *HALF)
 
 
 def sensitivity_template(plan: Plan, of: str, others: Sequence[str]) -> xr.Dataset:
@@ -74,14 +79,11 @@ def describe_design(dataset: xr.Dataset) -> str:
 def iterate_studies(dataset: xr.Dataset) -> Iterator[tuple[dict[str, float | str], xr.Dataset]]:
     """Yield the model and the point of each study, and the study; once along parameters of other laws."""
     dims = list(map(str, dataset["mean"].dims))
-    columns = {dim: columns_along(dataset, dim) for dim in dims}
-    for index in np.ndindex(*(dataset.sizes[dim] for dim in dims)):
-        study = dataset.isel(dict(zip(dims, index, strict=True)))
-        point = {dim: study[dim].item() for dim in dims}
-        keys = str(study["model"].item()), str(point.get("friction", ""))
-        foreign = [position for position, dim in enumerate(dims) if is_foreign(columns[dim], *keys)]
-        if not any(index[position] for position in foreign):
-            yield {dim: point[dim] for position, dim in enumerate(dims) if position not in foreign}, study
+    for law in squeezed_laws(dataset, dims):
+        axes = [dim for dim in dims if dim in law.dims]
+        for index in np.ndindex(*(law.sizes[dim] for dim in axes)):
+            study = law.isel(dict(zip(axes, index, strict=True)))
+            yield {dim: study[dim].item() for dim in dims if dim in LAW_DIMS or dim in axes}, study
 
 
 INDEX_HEADINGS = ("input", "first-order", "95 %", "total", "95 %", "first-order, n/2", "total, n/2")
@@ -129,3 +131,53 @@ def describe_study(study: xr.Dataset) -> str:
     if read_attribute(study.attrs, "design")["n"] < MIN_SAMPLES:
         text += f"; the intervals need at least {MIN_SAMPLES} samples"
     return text
+
+
+@dataclass(frozen=True)
+class Studies(Displayed):
+    """The sensitivity of an output: a study for each model and each point of the other axes."""
+
+    dataset: xr.Dataset
+
+    def as_dict(self) -> dict[str, Any]:
+        """The studies with the distribution of the output and the indices of each uncertain input."""
+        return {"studies": list(self._studies())}
+
+    def _studies(self) -> Iterator[dict[str, Any]]:
+        design = read_attribute(self.dataset.attrs, "design")
+        for point, study in iterate_studies(self.dataset):
+            probabilities = [f"{probability:g}" for probability in study["quantile"].values]
+            rows = (study.isel(input=position) for position in range(study.sizes["input"]))
+            yield {
+                **{dim: point.pop(dim) for dim in ("model", "friction") if dim in point},
+                "at": point,
+                "of": self.dataset.attrs["of"],
+                **{name: design[name] for name in ("n", "method", "seed")},
+                "failed": int(study["failed"]),
+                "mean": float(study["mean"]),
+                "sd": float(study["sd"]),
+                "quantiles": dict(zip(probabilities, map(float, study["quantiles"].values), strict=True)),
+                "indices": [
+                    {"input": str(row["input"].item())} | {name: float(row[name]) for name in INDICES}
+                    for row in rows
+                ],
+            }
+
+    def records(self) -> Sequence[Mapping[str, Any]]:
+        """A row for each uncertain input of each study."""
+        return [
+            {dim: study[dim] for dim in ("model", "friction") if dim in study}
+            | {**study["at"], "of": study["of"], **indices}
+            for study in self._studies()
+            for indices in study["indices"]
+        ]
+
+    def sections(self, width: int) -> Iterator[Block]:
+        """The design, and the distribution and a table of indices of each study."""
+        yield describe_design(self.dataset)
+        for point, study in iterate_studies(self.dataset):
+            yield ""
+            yield describe_point(point)
+            yield describe_study(study)
+            if study["total"].notnull().any():
+                yield Table(index_rows(study), INDEX_HEADINGS)
