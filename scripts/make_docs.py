@@ -18,8 +18,7 @@ from gallery import gallery_page, write_gallery
 from impact.contact.status import FrictionStatus, Status
 from impact.contact.variables import Variable
 from impact.plots.style import save_figure
-from impact.results.kinds import Kind
-from impact.results.schema import SCHEMA, SCHEMA_VERSION, udunits
+from impact.results.schema import SCHEMA, SCHEMA_VERSION, Kind, udunits
 from models_page import models_page
 from models_pictures import pictures
 from types_page import types_page

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import impact
-from impact.results.plausibility import result_notes
+from impact.results.summary import result_notes
 
 from .conftest import ROOT, Run
 

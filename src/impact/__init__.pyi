@@ -54,11 +54,11 @@ from .results.citations import Citations as Citations, cite as cite
 from .results.estimate import Estimate as Estimate, estimate as estimate
 from .results.extend import extend as extend, extend_to_file as extend_to_file
 from .results.info import Info as Info, describe as describe, info as info
-from .results.outcome import SweepOutcome as SweepOutcome
 from .results.ranking import Ranking as Ranking, recommend as recommend
 from .results.sensitivity import Studies as Studies
 from .results.shards import ShardProgress as ShardProgress, merge as merge, sweep_shard as sweep_shard
 from .results.single_impact import Impact as Impact, run as run
+from .results.summary import SweepOutcome as SweepOutcome
 from .results.sweep import sweep as sweep, sweep_to_file as sweep_to_file
 from .results.xarray_backend import expand as expand, load as load, save as save
 from .uncertainty.sensitivity import sensitivities as sensitivities, sensitivity as sensitivity

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from ..engine.executors import ExecutorSpec
     from ..engine.plan import Plan
-    from ..results.outcome import SweepOutcome
+    from ..results.summary import SweepOutcome
 
 
 @contextmanager

@@ -15,9 +15,8 @@ from ..contact.variables import LAW_DIMS, OUTPUTS
 from ..errors import UsageError
 from ..formatting import argument, number, safe_text
 from ..results.attributes import read_attribute
-from ..results.kinds import kind_of, require_sweep
 from ..results.replay_command import command_start
-from ..results.schema import MODEL_METADATA, SCHEMA, SCHEMA_VERSION, is_case
+from ..results.schema import MODEL_METADATA, SCHEMA, SCHEMA_VERSION, is_case, kind_of, require_sweep
 from ..results.xarray_backend import load
 from .align import MODEL_COORDINATES, Alignment, align_sweeps
 from .studies import align_boards, align_calibrations, fit_notes, version_notes

@@ -14,9 +14,9 @@ from ..contact.model import ForceModel
 from ..engine.plan import Plan
 from ..engine.plugins import Plugins, read_plugins
 from ..formatting import law_keys
-from ..results.kinds import kind_of, require_sweep
 from ..results.provenance import config_of_part, stored_config
 from ..results.replay_command import command_start
+from ..results.schema import kind_of, require_sweep
 from ..results.sweep import sweep_in_memory
 from ..results.xarray_backend import load
 from .compare import compare

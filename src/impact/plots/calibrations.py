@@ -13,7 +13,7 @@ from ..contact.variables import OUTPUTS
 from ..errors import UsageError
 from ..formatting import argument, decimals, law_name, safe_text
 from ..results.calibration import calibration_title, fit_status
-from ..results.kinds import kind_of
+from ..results.schema import kind_of
 from ..results.selection import chosen_laws
 from .curves import CurveData, Panel, curve_of, x_axis_fields
 from .data import Points

@@ -24,8 +24,8 @@ from ..engine.plan import Plan
 from ..engine.plugins import Plugins, read_plugins
 from ..errors import ImpactError, UsageError, did_you_mean, require_known
 from ..formatting import prefixed, safe_text
-from ..results.kinds import kind_of
 from ..results.provenance import changed_plugins, config_of_part, stored_config
+from ..results.schema import kind_of
 from ..results.selection import chosen_laws, in_si, select
 from ..results.sweep import sweep_in_memory
 from ..results.xarray_backend import result_of

@@ -178,9 +178,9 @@ def find_kind(name: str) -> Kind:
 
 
 def source_of(dataset: xr.Dataset) -> str:
-    """Find what a dataset holds: its kind, see `impact.results.kinds`, or "samples" of uncertain inputs."""
+    """Find what a dataset holds: its kind, see `impact.results.schema`, or "samples" of uncertain inputs."""
     from ..config.grid import SAMPLE
-    from ..results.kinds import kind_of
+    from ..results.schema import kind_of
 
     source = kind_of(dataset)
     return "samples" if source == "sweep" and SAMPLE in dataset.dims else source
@@ -188,7 +188,7 @@ def source_of(dataset: xr.Dataset) -> str:
 
 def default_kind(dataset: xr.Dataset) -> Kind:
     """Find the kind of picture that shows what a dataset is for."""
-    from ..results.kinds import kind_of
+    from ..results.schema import kind_of
 
     if kind_of(dataset) == "board":
         raise UsageError("plot: this is a board, which has no picture; impact report writes its page")

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from ..contact.variables import OUTPUTS
 from ..errors import UsageError
 from ..formatting import heading, law_name
-from ..results.kinds import kind_of
+from ..results.schema import kind_of
 from ..results.selection import select, select_laws
 from ..results.sensitivity import distribution_texts
 from .data import LegendEntries, PlotData, Points

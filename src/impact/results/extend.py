@@ -33,10 +33,10 @@ from ..engine.trajectories import ReusedPart, TrajectoryMap, TrajectoryRange, ke
 from ..errors import ResultError, UsageError
 from ..formatting import argument, safe_text
 from .attributes import read_attribute
-from .kinds import require_sweep
-from .outcome import SweepOutcome
 from .provenance import stored_config
+from .schema import require_sweep
 from .selection import IndexArray, match_labels
+from .summary import SweepOutcome
 from .sweep import Extension, sweep_into
 from .trajectory_table import ExpandedSlab, TrajectoryTable, table_of_result
 from .xarray_backend import load, open_result

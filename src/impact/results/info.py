@@ -19,12 +19,10 @@ from ..formatting import label, number
 from .attributes import read_attribute
 from .board import Board
 from .calibration import Fits
-from .kinds import STUDIES, kind_of
-from .outcome import error_table
-from .schema import MODEL_METADATA, count_points, exponents_of, plain_unit
+from .schema import MODEL_METADATA, STUDIES, count_points, exponents_of, kind_of, plain_unit
 from .sensitivity import Studies
 from .slabs import is_large
-from .summary import Extremes, Summary, counts_by_name, extremes_of, summarize
+from .summary import Extremes, Summary, error_table, extremes_of, summarize
 from .xarray_backend import open_result, result_of
 
 # attributes that are shown if they are set
@@ -107,8 +105,7 @@ def _describe(result: xr.Dataset, name: str = "") -> Info:
         "dimensions": {str(name): size for name, size in result.sizes.items()},
         "coordinates": [str(name) for name in result.coords],
         "variables": variables,
-        "status": counts_by_name(summary.counts),
-        **({"friction_status": counts_by_name(counts)} if (counts := summary.friction_counts) else {}),
+        **summary.by_status,
         "not_evaluated": summary.not_counted,
         "worst": summary.worst,
         "attributes": {

@@ -9,7 +9,6 @@ import numpy as np
 import xarray as xr
 
 from ..contact.materials import sphere_mass
-from ..contact.status import Status
 from ..engine.build_impacts import input_at, property_at, smaller_radius_at
 from ..engine.inputs import Inputs
 from ..engine.trajectories import axes_of_arrays, probe_index
@@ -65,19 +64,6 @@ def _mass_notes(inputs: Inputs, ball: str) -> Iterator[str]:
         yield (
             f"m{ball}: got {quantity(stated.flat[first], 'kg', 4)}, but a sphere of R{ball} = {size} and {rho} "
             f"has {quantity(expected.flat[first], 'kg', 4)}; without m{ball} the mass follows"
-        )
-
-
-def result_notes(summary: Summary) -> Iterator[str]:
-    """Yield a sentence for each implausible property of a sweep's outcome."""
-    if summary.points and not summary.not_counted and summary.counts.keys() == {Status.NO_IMPACT}:
-        yield f"none of {summary.points:,} points is an impact: v1 <= v2, the balls do not approach"
-    if summary.deep:
-        many = f"{summary.deep:,} of {summary.points:,} points"
-        limit = f"{MAX_SMALL_INDENTATION:.0%} of the smaller radius"
-        yield (
-            f"peak indentation above {limit} at {many}, at most {summary.deepest:.0%}; Hertz theory assumes small "
-            "indentation"
         )
 
 

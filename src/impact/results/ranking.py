@@ -24,9 +24,8 @@ from ..contact.variables import OUTPUTS
 from ..display import Block, Displayed, Table, html_of
 from ..errors import UsageError, did_you_mean
 from ..formatting import argument, law_name, percentage, prefixed, safe_text
-from .kinds import require_sweep
 from .replay_command import describe_point
-from .schema import columns_along, plain_unit, squeezed_laws
+from .schema import columns_along, plain_unit, require_sweep, squeezed_laws
 from .selection import as_keys, require_outputs, select, select_laws
 from .slabs import Slab, distinct_points, is_computed, over_varying_dims, slabs, varying_dims
 from .xarray_backend import result_of

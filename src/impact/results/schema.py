@@ -1,4 +1,4 @@
-"""The SCHEMA of each kind of result: its variables, coordinates and attributes."""
+"""The kinds of results, and the SCHEMA of each: its variables, coordinates and attributes."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Seq
 from dataclasses import replace
 from functools import partial
 from importlib.metadata import version
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
@@ -26,8 +26,13 @@ from ..contact.materials import effective_mass
 from ..contact.variables import AXES, HISTORY, LAW_DIMS, OUTPUTS, Variable, by_name, default_variables
 from ..engine.build_impacts import input_at
 from ..engine.plan import Plan
+from ..errors import UsageError
 from ..formatting import number
-from .kinds import Kind
+
+Kind = Literal["sweep", "history", "calibration", "sensitivity study", "board"]
+
+# kinds of results that are neither a sweep nor a single impact
+STUDIES: tuple[Kind, ...] = ("calibration", "sensitivity study", "board")
 
 SCHEMA_VERSION = 2
 # longer lists of models with another exponent are abbreviated
@@ -161,6 +166,30 @@ RECORDED_PACKAGES = ("numpy", "h5py", "h5netcdf", "xarray")
 
 # the accuracy of outputs relative to their scale, and the default tolerance of comparisons, over the solver's rtol
 DEFAULT_RTOL_FACTOR = 10.0
+
+
+def kind_of(dataset: xr.Dataset) -> Kind:
+    """Find the kind of a dataset by its dimensions."""
+    if "t" in dataset.dims:
+        return "history"
+    if "parameter" in dataset.dims:
+        return "calibration"
+    if "check" in dataset.dims:
+        return "board"
+    return "sensitivity study" if "input" in dataset.dims else "sweep"
+
+
+def require_result(dataset: xr.Dataset) -> None:
+    """Raise a UsageError for a dataset of another program, which has no laws."""
+    if kind_of(dataset) == "sweep" and "model" not in dataset.coords:
+        raise UsageError("this dataset is not a result of impact: it has no coordinate model")
+
+
+def require_sweep(dataset: xr.Dataset, command: str) -> None:
+    """Raise a UsageError where a command takes the result of a sweep, and got that of another command."""
+    kind = kind_of(dataset)
+    if kind in STUDIES:
+        raise UsageError(f"{command}: this is a {kind}, expected the result of a sweep")
 
 
 def scale_of(variable: Variable, read: Callable[[str], NDArray[Any]], *, has_peak: bool) -> NDArray[np.float64]:

@@ -32,9 +32,9 @@ from ..engine.run import ProgressCallback, ProgressCounter, Run, ignore, never, 
 from ..engine.trajectories import TrajectoryRange
 from ..errors import ResultError, StoreError, UnfinishedError, UsageError, warn
 from ..formatting import argument
-from .outcome import SweepOutcome
 from .provenance import stored_config
 from .schema import dataset_template
+from .summary import SweepOutcome
 from .sweep import check_storable, complete_ranges, read_plan, reload_range, store_result
 from .trajectory_table import table_of_ranges
 

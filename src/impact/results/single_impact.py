@@ -46,10 +46,19 @@ from ..engine.plugins import Plugins, read_plugins
 from ..errors import ConfigError, UsageError, did_you_mean, warn
 from ..formatting import argument, law_keys, law_name, number, prefixed, safe_text
 from .calibration import fitted_config, position_of_law
-from .kinds import kind_of, require_result, require_sweep
 from .plausibility import depth_notes, input_notes
 from .provenance import changed_plugins, stored_config, stored_draft, unknown_plugins
-from .schema import DEFAULT_RTOL_FACTOR, SCHEMA_VERSION, attributes_of, is_case, plain_unit, scale_of
+from .schema import (
+    DEFAULT_RTOL_FACTOR,
+    SCHEMA_VERSION,
+    attributes_of,
+    is_case,
+    kind_of,
+    plain_unit,
+    require_result,
+    require_sweep,
+    scale_of,
+)
 from .seal import is_result
 from .selection import chosen_laws
 from .xarray_backend import open_result

@@ -1,11 +1,12 @@
-"""Summarize a result of any size: counts by status, largest errors, first failures, extremes."""
+"""What a sweep wrote, and the summary of a result of any size: counts by status, largest errors, failures."""
 
 from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -13,7 +14,10 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ..contact.status import FIRST_FAILURE, FrictionStatus, Status
+from ..display import Block, Displayed, Table, Wrapped
+from ..formatting import label, number
 from .attributes import SummaryRecord
+from .replay_command import command_start, inputs_at, replay_command
 from .schema import parts_of_laws, places_of_laws
 from .slabs import MAX_SUMMARY_POINTS, distinct_points, is_computed, slabs
 from .trajectory_table import ExpandedSlab, TrajectoryTable, computed_array, expand, table_of_result
@@ -76,6 +80,12 @@ class Summary:
         }
 
     @property
+    def by_status(self) -> dict[str, dict[str, int]]:
+        """The counts by the names of the statuses, in JSON; those of pairs if there are some."""
+        counts: dict[str, Mapping[Any, int]] = {"status": self.counts, "friction_status": self.friction_counts}
+        return {name: counts_by_name(of) for name, of in counts.items() if of or name == "status"}
+
+    @property
     def first_failed(self) -> list[tuple[str, FrictionStatus, tuple[int, ...], tuple[int, ...]]]:
         """List the first failed points of models, else of pairs: status variable, status, law and index."""
         if not self.failed_at:
@@ -124,9 +134,9 @@ class Summary:
     ) -> None:
         """Count points by their status, and list the first that failed."""
         times = np.bincount(array.reshape(-1))
-        for number in np.flatnonzero(times).tolist():
-            status = statuses(number)
-            counts[status] = counts.get(status, 0) + weight * int(times[number])
+        for code in np.flatnonzero(times).tolist():
+            status = statuses(code)
+            counts[status] = counts.get(status, 0) + weight * int(times[code])
         n_more = self.max_failed_at - len(failed_at)
         if n_more > 0 and times[FIRST_FAILURE:].any():
             failed = (array >= FIRST_FAILURE) & (array != FrictionStatus.NOT_COMBINABLE)
@@ -242,11 +252,11 @@ def summarize_table(dataset: xr.Dataset, table: TrajectoryTable) -> tuple[Summar
             elif name == "status":
                 summary.points += weight * variable.size
                 summary.not_counted += weight * variable.size
-    for (number, shape), (weight, names) in sorted(groups.items(), key=lambda item: item[0]):
+    for (position, shape), (weight, names) in sorted(groups.items(), key=lambda item: item[0]):
         for slab in slabs(dict(enumerate(shape))):
             region = tuple(slab.values())
             size = tuple(part.stop - part.start for part in region)
-            for_names = expand(table, number, table.inputs.index(region), names)[1]
+            for_names = expand(table, position, table.inputs.index(region), names)[1]
             values = {}
             for name, array in for_names.items():
                 typed = np.asarray(array, dataset[name].dtype)
@@ -254,7 +264,7 @@ def summarize_table(dataset: xr.Dataset, table: TrajectoryTable) -> tuple[Summar
                 so_far = extremes[name]
                 extremes[name] = so_far and so_far.add(values[name], weight)
             start = [part.start for part in region]
-            summary.add(values, table.keys(number)[0], table.place(number), start, weight)
+            summary.add(values, table.keys(position)[0], table.place(position), start, weight)
     return summary, extremes
 
 
@@ -300,3 +310,103 @@ def counts_text(counts: Mapping[Any, int]) -> str:
 def counts_by_name(counts: Mapping[Any, int]) -> dict[str, int]:
     """Count by the names of the statuses, in their order."""
     return {status.name.lower(): counts[status] for status in sorted(counts)}
+
+
+def result_notes(summary: Summary) -> Iterator[str]:
+    """Yield a sentence for each implausible property of a sweep's outcome."""
+    if summary.points and not summary.not_counted and summary.counts.keys() == {Status.NO_IMPACT}:
+        yield f"none of {summary.points:,} points is an impact: v1 <= v2, the balls do not approach"
+    if summary.deep:
+        many = f"{summary.deep:,} of {summary.points:,} points"
+        limit = f"{MAX_SMALL_INDENTATION:.0%} of the smaller radius"
+        yield (
+            f"peak indentation above {limit} at {many}, at most {summary.deepest:.0%}; Hertz theory assumes small "
+            "indentation"
+        )
+
+
+@dataclass(frozen=True)
+class SweepOutcome(Displayed):
+    """The result of a sweep, which may be larger than memory, and its summary.
+
+    Parameters
+    ----------
+    dataset : its coordinates and attributes; the values of its variables may be placeholders
+    summary : of its points
+    trajectories : number of different trajectories; None if unknown
+    is_new : whether the file was written now; False if it held this sweep already
+    integrated : how many trajectories were integrated now; None if not counted
+    repeated_blocks : number of blocks that several shards have
+    extended_layout : layout of the result that was extended; only "factored" stores trajectories to reuse
+    output : the file
+    """
+
+    dataset: xr.Dataset
+    summary: Summary
+    trajectories: int | None = None
+    is_new: bool = True
+    integrated: int | None = None
+    repeated_blocks: int = 0
+    extended_layout: str | None = None
+    output: Path | None = None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Points, counts by status, and the first failed points with the command that repeats each."""
+        return {
+            "output": str(self.output),
+            "points": self.summary.points,
+            "models": self.dataset.sizes["model"],
+            "trajectories": self.trajectories,
+            **self.summary.by_status,
+            "failed": self.summary.failed,
+            "first_failed": self.records(),
+            "layout": self.dataset.encoding.get("layout"),
+            "seal": self.dataset.encoding.get("seal"),
+        }
+
+    def records(self) -> Sequence[Mapping[str, Any]]:
+        """The first failed points of models, else of pairs."""
+        command = command_start(str(self.output), self.dataset)
+        records = []
+        for name, status, place, index in self.summary.first_failed:
+            at = inputs_at(self.dataset[name], (*place, *index))
+            replay = replay_command(command, at) if command else None
+            records.append({"status": status.name.lower(), "at": at, "replay": replay})
+        return records
+
+    def sections(self, width: int) -> Iterator[Block]:
+        """The largest errors, the counts, the first failed points and what is implausible."""
+        summary = self.summary
+        if summary.worst:
+            yield error_table(summary.worst)
+        distinct = "" if self.trajectories is None else f" from {self.trajectories:,} trajectories"
+        yield Wrapped(f"{self.output}: {summary.points:,} points{distinct} ({counts_text(summary.counts)})")
+        if summary.friction_counts:
+            yield Wrapped(f"with each friction law: {counts_text(summary.friction_counts)}")
+        failures = self.records()
+        for failure in failures:
+            inputs = ", ".join(f"{name}={label(value)}" for name, value in failure["at"].items())
+            yield Wrapped(f"failed: {inputs}: {FrictionStatus[failure['status'].upper()].meaning}")
+            if failure["replay"]:
+                yield f"  {failure['replay']}"
+        more = summary.failed - len(failures)
+        if more > 0:
+            yield f"and {more:,} more"
+        yield from (f"note: {note}" for note in result_notes(summary))
+
+    @property
+    def failed_line(self) -> str:
+        """The number of failed points by status."""
+        counts, failed = self.summary.counts, self.summary.failed
+        failures = {
+            s: count for s, count in counts.items() if s >= FIRST_FAILURE
+        } or self.summary.friction_failures
+        return f"{self.output}: {failed:,} of {self.summary.points:,} points failed ({counts_text(failures)})"
+
+
+def error_table(worst: Mapping[str, Mapping[str, float]]) -> Table:
+    """Tabulate the largest errors by variable and model."""
+    names = [name for name in ERROR_HEADINGS if name in worst]
+    models = dict.fromkeys(model for name in names for model in worst[name])
+    rows = [[model, *(number(worst[name].get(model, float("nan")), 3) for name in names)] for model in models]
+    return Table(rows, ("model", *(ERROR_HEADINGS[name] for name in names)))

@@ -33,10 +33,9 @@ from ..errors import ResultError, StoreError, UnfinishedError, UsageError, warn
 from ..formatting import argument
 from .layouts import FillSlab, check_layout, file_contents
 from .netcdf import MAX_LABEL_BYTES, encode_text, is_text
-from .outcome import SweepOutcome
-from .plausibility import input_notes, result_notes, with_depths
+from .plausibility import input_notes, with_depths
 from .schema import dataset_template, plan_coordinates, stored_variables
-from .summary import summarize
+from .summary import SweepOutcome, result_notes, summarize
 from .trajectory_table import TrajectoryTable, in_memory, lazy_dataset, table_of_ranges
 from .validation import is_name
 from .xarray_backend import MAX_LOADED_BYTES, check_readable, load, open_result, write_sealed

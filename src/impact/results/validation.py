@@ -19,7 +19,6 @@ from ..contact.variables import AXES, LAW_DIMS, OUTPUTS
 from ..errors import ResultError
 from ..formatting import safe_text
 from .attributes import ATTRIBUTE_TYPES, read_attribute
-from .kinds import Kind, kind_of
 from .schema import (
     BOARD,
     CALIBRATION,
@@ -27,7 +26,9 @@ from .schema import (
     MODEL_METADATA,
     SCHEMA,
     STUDY_COORDINATES,
+    Kind,
     is_case,
+    kind_of,
 )
 from .slabs import is_computed, slabs
 

@@ -20,10 +20,9 @@ from ..contact.variables import OUTPUTS
 from ..errors import ResultError, UnfinishedError, UsageError, warn
 from ..formatting import argument, safe_text, type_of
 from .hdf5_structure import byte_reader, check_root
-from .kinds import kind_of, require_result, require_sweep
 from .layouts import read_layout
 from .netcdf import RegionValues, encode_attribute, read_variables, write_dataset
-from .schema import MODEL_METADATA
+from .schema import MODEL_METADATA, kind_of, require_result, require_sweep
 from .seal import check_seal, is_result, write_seal
 from .selection import select, select_laws
 from .slabs import slabs
