@@ -429,13 +429,13 @@ def _is_along_one(law_data: xr.Dataset, name: str) -> bool:
     return name in law_data.variables and law_data.variables[name].ndim == 1
 
 
-def _reduce_dims(law_data: xr.Dataset, criterion: Criterion) -> tuple[xr.Dataset, int]:
-    """Keep the axes along which the ranked variables or e vary; return also the weight of each point."""
+def _reduce_dims(law_data: xr.Dataset, criterion: Criterion, *more: Hashable) -> tuple[xr.Dataset, int]:
+    """Keep the axes along which ranked variables or e vary, and `more`; return also the weight of each point."""
     if _is_along_one(law_data, criterion.along):
         dims = law_data.variables[criterion.along].dims
     else:
         dims = varying_dims(law_data, "e") if criterion.target is None else ()
-    return over_varying_dims(law_data, criterion.names, *dims)
+    return over_varying_dims(law_data, criterion.names, *more, *dims)
 
 
 @dataclass(frozen=True)
@@ -451,30 +451,31 @@ class _JudgedSlab:
     within: Mask
 
 
-def _judge_slab(
-    evaluated: xr.Dataset, slab: Slab, sizes: Mapping[Hashable, int], tol: float, criterion: Criterion
-) -> _JudgedSlab:
-    values, status = (_read_slab(evaluated.variables[name], slab, sizes) for name in criterion.names)
-    values = np.asarray(values, float)
-    if criterion.target is None:
-        target = _read_slab(evaluated.variables["e"], slab, sizes)
-        output, distance, has_target = target + values, np.abs(values), ~np.isnan(target)
-    else:
-        # an answer without this output, such as beta without a slip, has no target
-        output, distance = values, np.abs(values - criterion.target)
-        has_target = ~(np.isnan(values) & np.isin(status, (FrictionStatus.OK, FrictionStatus.SLOW_LIMIT)))
-    judged = has_target & (status != Status.NO_IMPACT)
-    failed = judged & (status >= FIRST_FAILURE)
-    evaluable = judged & ~failed & ~np.isnan(distance)
-    return _JudgedSlab(output, distance, judged, failed, evaluable, evaluable & (distance <= tol))
+def _judged_slabs(
+    evaluated: xr.Dataset, sizes: Mapping[Hashable, int], tol: float, criterion: Criterion
+) -> Iterator[tuple[Slab, _JudgedSlab]]:
+    """Judge all points, slab by slab, with the dimensions in the order of `sizes`."""
+    for slab in slabs(sizes):
+        values, status = (_read_slab(evaluated.variables[name], slab, sizes) for name in criterion.names)
+        values = np.asarray(values, float)
+        if criterion.target is None:
+            target = _read_slab(evaluated.variables["e"], slab, sizes)
+            output, distance, has_target = target + values, np.abs(values), ~np.isnan(target)
+        else:
+            # an answer without this output, such as beta without a slip, has no target
+            output, distance = values, np.abs(values - criterion.target)
+            has_target = ~(np.isnan(values) & np.isin(status, (FrictionStatus.OK, FrictionStatus.SLOW_LIMIT)))
+        judged = has_target & (status != Status.NO_IMPACT)
+        failed = judged & (status >= FIRST_FAILURE)
+        evaluable = judged & ~failed & ~np.isnan(distance)
+        yield slab, _JudgedSlab(output, distance, judged, failed, evaluable, evaluable & (distance <= tol))
 
 
 def _best_parameters(
     law_data: xr.Dataset, parameter_dims: Sequence[Hashable], tol: float, criterion: Criterion
 ) -> dict[Hashable, int]:
     """Find the index on each axis of a law's own parameters at which it ranks best over all other axes."""
-    of_e = varying_dims(law_data, "e") if criterion.target is None else ()
-    evaluated, _ = over_varying_dims(law_data, criterion.names, *parameter_dims, *of_e)
+    evaluated, _ = _reduce_dims(law_data, criterion, *parameter_dims)
     shape = tuple(evaluated.sizes[dim] for dim in parameter_dims)
     if math.prod(shape) > MAX_PARAMETER_COMBINATIONS:
         law = law_name(*_keys(law_data))
@@ -487,8 +488,7 @@ def _best_parameters(
     sizes = {dim: evaluated.sizes[dim] for dim in (*parameter_dims, *other_dims)}
     points, within, errors = np.zeros(shape, int), np.zeros(shape, int), np.full(shape, np.nan)
     others = tuple(range(len(parameter_dims), len(sizes)))
-    for slab in slabs(sizes):
-        part = _judge_slab(evaluated, slab, sizes, tol, criterion)
+    for slab, part in _judged_slabs(evaluated, sizes, tol, criterion):
         parameter_slab = tuple(slab[dim] for dim in parameter_dims)
         points[parameter_slab] += part.judged.sum(axis=others)
         within[parameter_slab] += part.within.sum(axis=others)
@@ -521,17 +521,18 @@ def _rank_law(law_data: xr.Dataset, tol: float, criterion: Criterion) -> Ranked:
     sizes = {dim: evaluated.sizes[dim] for dim in evaluated.variables[variable].dims}
     along_one = _is_along_one(law_data, along)
     served_input = evaluated.variables[along] if along_one else xr.Variable((), 0.0)
-    # for each value of an input along one axis: whether any point counts, and whether any is not within tol
-    requested, missed = np.zeros(served_input.shape, bool), np.zeros(served_input.shape, bool)
-    points = evaluable_points = within_points = failed_points = 0
+    # for each value of an input along one axis: how many points count, and how many are within tol
+    judged, within = np.zeros(served_input.shape, int), np.zeros(served_input.shape, int)
+    others = tuple(axis for axis, dim in enumerate(sizes) if dim not in served_input.dims)
+    evaluable_points = failed_points = 0
     total, max_error, e_out = Fraction(), math.nan, math.nan
     worst: dict[Hashable, int] | None = None
-    for slab in slabs(sizes):
-        part = _judge_slab(evaluated, slab, sizes, tol, criterion)
+    for slab, part in _judged_slabs(evaluated, sizes, tol, criterion):
         distance, evaluable = part.distance, part.evaluable
-        points += weight * int(part.judged.sum())
+        positions = tuple(slab[dim] for dim in served_input.dims)
+        judged[positions] += part.judged.sum(axis=others)
+        within[positions] += part.within.sum(axis=others)
         evaluable_points += weight * int(evaluable.sum())
-        within_points += weight * int(part.within.sum())
         failed_points += weight * int(part.failed.sum())
         if evaluable.any():
             total += weight * _exact_sum(distance[evaluable & np.isfinite(distance)].tolist())
@@ -540,11 +541,6 @@ def _rank_law(law_data: xr.Dataset, tol: float, criterion: Criterion) -> Ranked:
                 max_error = float(distance[index])
                 e_out = float(part.output[index])
                 worst = {dim: slab[dim].start + int(position) for dim, position in zip(sizes, index, strict=True)}
-        if along_one:
-            others = tuple(axis for axis, dim in enumerate(sizes) if dim not in served_input.dims)
-            positions = slab[served_input.dims[0]]
-            requested[positions] |= np.logical_or.reduce(part.judged, axis=others)
-            missed[positions] |= np.logical_or.reduce(part.judged & ~part.within, axis=others)
     at: dict[str, float | str] = {}
     mean_error = math.nan
     if worst is not None:
@@ -561,13 +557,13 @@ def _rank_law(law_data: xr.Dataset, tol: float, criterion: Criterion) -> Ranked:
         InputName.parse(name).config_key: plain_unit(str(law_data.variables[name].attrs.get("units", "1")))
         for name in chosen
     }
-    served = _served_ranges(served_input.values, requested, missed) if along_one else None
+    served = _served_ranges(served_input.values, judged > 0, within < judged) if along_one else None
     model, friction = _keys(law_data)
     return Ranked(
         model,
         parameters,
-        points,
-        within_points,
+        weight * int(judged.sum()),
+        weight * int(within.sum()),
         failed_points,
         mean_error,
         max_error,
