@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -56,7 +56,7 @@ def align_sweeps(new: xr.Dataset, baseline: xr.Dataset, *, subset: bool) -> Alig
     """Align two results of sweeps by their coordinates; values of variables are not read."""
     new, baseline = _drop_foreign_axes(new, baseline), _drop_foreign_axes(baseline, new)
     a, b = _comparable_coordinates(new, baseline), _comparable_coordinates(baseline, new)
-    faults = _missing_inputs(a, b)
+    faults = [*_missing_inputs(a, b)]
     positions: dict[str, tuple[IndexArray, IndexArray]] = {}
     for axis in map(str, dict.fromkeys((*b.dims, *baseline.dims, *a.dims, *new.dims))):
         columns = _label_columns(a, axis), _label_columns(b, axis)
@@ -155,25 +155,21 @@ def _axes_of_both(name: str, result: xr.Dataset, other: xr.Dataset) -> tuple[str
     return (*reversed(of_variable), *map(str, result.variables[name].dims))
 
 
-def _missing_inputs(new: xr.Dataset, baseline: xr.Dataset) -> list[Difference]:
+def _missing_inputs(new: xr.Dataset, baseline: xr.Dataset) -> Iterator[Difference]:
     """List the inputs that only one result has."""
-    faults = []
     for name in sorted(str(name) for name in new.coords.keys() ^ baseline.coords.keys()):
         if is_input(name):
             side = "NEW" if name in new.coords else "BASELINE"
-            faults.append(Difference("physics config", name, f"{safe_text(name)} is given in {side} only"))
-    return faults
+            yield Difference("physics config", name, f"{safe_text(name)} is given in {side} only")
 
 
-def _changed_scalars(new: xr.Dataset, baseline: xr.Dataset, kind: DifferenceKind) -> list[Difference]:
+def _changed_scalars(new: xr.Dataset, baseline: xr.Dataset, kind: DifferenceKind) -> Iterator[Difference]:
     """List the inputs with one value in each result that differ."""
-    faults = []
     for name in sorted(str(name) for name in new.coords.keys() & baseline.coords.keys() if is_input(name)):
         a, b = new[name], baseline[name]
         if a.ndim == b.ndim == 0 and not _labels_agree(a.values, b.values):
             text = f"{safe_text(name)} is {_format_value(a.values)}, in BASELINE {_format_value(b.values)}"
-            faults.append(Difference(kind, name, text))
-    return faults
+            yield Difference(kind, name, text)
 
 
 def _label_columns(dataset: xr.Dataset, axis: str) -> list[str]:
@@ -208,17 +204,15 @@ def _unmatched_labels(
     return [Difference("labels", axis, f"{safe_text(axis)}: {'; '.join(texts)}")] if texts else []
 
 
-def _changed_columns(new: xr.Dataset, baseline: xr.Dataset) -> list[Difference]:
+def _changed_columns(new: xr.Dataset, baseline: xr.Dataset) -> Iterator[Difference]:
     """List the coordinates along several axes or models that differ: e from alpha, the exponent."""
-    faults = []
     for name in sorted(str(name) for name in new.coords.keys() & baseline.coords.keys()):
         if name == "exponent" or (is_input(name) and baseline[name].ndim):
             a, b = new[name], baseline[name]
             # e = 1 - alpha v0 has the absolute rounding error of 1
             rounding = LABEL_RTOL if name == "e" else 0.0
             if set(a.dims) != set(b.dims) or not _labels_agree(a.transpose(*b.dims).values, b.values, rounding):
-                faults.append(_changed_values(name, a, b))
-    return faults
+                yield _changed_values(name, a, b)
 
 
 def _changed_values(name: str, new: xr.DataArray, baseline: xr.DataArray) -> Difference:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -85,7 +85,7 @@ def compare(
         align = align_calibrations if kind == "calibration" else align_boards
         aligned = align(a, b, subset=subset)
         faults = [*aligned.faults]
-        notes = _attribute_notes(a.attrs, b.attrs, {"rtol": None, "impact_version": None})
+        notes = [*_attribute_notes(a.attrs, b.attrs, {"rtol": None, "impact_version": None})]
         notes += fit_notes(a, b) if kind == "calibration" else version_notes(a, b)
     else:
         for dataset, name in zip((a, b), names, strict=True):
@@ -95,7 +95,7 @@ def compare(
         tolerances = effective_tolerances(tol, b.attrs)
         aligned = align_sweeps(a, b, subset=subset)
         faults = [*aligned.faults, *_material_faults(a, b), *_unit_faults(a, b)]
-        notes = _sweep_notes(a, b, aligned)
+        notes = [*_sweep_notes(a, b, aligned)]
         notes += [safe_text(f"not judged: {', '.join(unknown)}")] if unknown else []
         if any(fault.kind == "labels" for fault in faults) and not subset:
             notes.append(f"{argument('subset', True)} compares only what both results contain")
@@ -190,43 +190,38 @@ def _missing_variables(new: xr.Dataset, baseline: xr.Dataset) -> list[Difference
     ]
 
 
-def _unit_faults(new: xr.Dataset, baseline: xr.Dataset) -> list[Difference]:
+def _unit_faults(new: xr.Dataset, baseline: xr.Dataset) -> Iterator[Difference]:
     """List the variables whose units differ."""
-    faults = []
     for name in [str(name) for name in baseline.variables if name in new.variables]:
         a, b = (dataset.variables[name].attrs.get("units") for dataset in (new, baseline))
         if not _attributes_equal(a, b):
             text = f"{name} is in {a}, in BASELINE in {b}"
-            faults.append(Difference("units", name, safe_text(text)))
-    return faults
+            yield Difference("units", name, safe_text(text))
 
 
-def _sweep_notes(new: xr.Dataset, baseline: xr.Dataset, aligned: Alignment) -> list[str]:
+def _sweep_notes(new: xr.Dataset, baseline: xr.Dataset, aligned: Alignment) -> Iterator[str]:
     """List what may explain differences between values: solver, versions, and metadata of models."""
     # results of the continuous law have no attribute `integrator`
     defaults = {"rtol": None, "max_steps": None, "integrator": EXACT, "impact_version": None}
-    notes = _attribute_notes(new.attrs, baseline.attrs, defaults)
+    yield from _attribute_notes(new.attrs, baseline.attrs, defaults)
     a, b = (read_attribute(dataset.attrs, "packages") for dataset in (new, baseline))
-    notes += _attribute_notes(a, b, dict.fromkeys(sorted({*a, *b})))
+    yield from _attribute_notes(a, b, dict.fromkeys(sorted({*a, *b})))
     a, b = (read_attribute(dataset.attrs, "plugins") for dataset in (new, baseline))
     # records of files and hashes say nothing to a reader
-    notes += [
-        f"the code of {safe_text(key, 60)} changed" for key in sorted(a.keys() & b.keys()) if a[key] != b[key]
-    ]
-    notes += _attribute_notes(a, b, dict.fromkeys(sorted(a.keys() ^ b.keys())))
-    return notes + _model_metadata_notes(aligned.new, aligned.baseline)
+    changed = (key for key in sorted(a.keys() & b.keys()) if a[key] != b[key])
+    yield from (f"the code of {safe_text(key, 60)} changed" for key in changed)
+    yield from _attribute_notes(a, b, dict.fromkeys(sorted(a.keys() ^ b.keys())))
+    yield from _model_metadata_notes(aligned.new, aligned.baseline)
 
 
 def _attribute_notes(
     new: Mapping[Any, Any], baseline: Mapping[Any, Any], defaults: Mapping[str, object]
-) -> list[str]:
+) -> Iterator[str]:
     """List the attributes that differ, of some with their defaults."""
-    notes = []
     for name, default in defaults.items():
         a, b = (attributes.get(name, default) for attributes in (new, baseline))
         if not _attributes_equal(a, b):
-            notes.append(safe_text(f"{name} is {a}, in BASELINE {b}", 400))
-    return notes
+            yield safe_text(f"{name} is {a}, in BASELINE {b}", 400)
 
 
 def _attributes_equal(a: Any, b: Any) -> bool:
@@ -234,13 +229,11 @@ def _attributes_equal(a: Any, b: Any) -> bool:
     return bool(np.array_equal(a, b))
 
 
-def _model_metadata_notes(new: xr.Dataset, baseline: xr.Dataset) -> list[str]:
+def _model_metadata_notes(new: xr.Dataset, baseline: xr.Dataset) -> Iterator[str]:
     """List the metadata of models that differ."""
-    notes = []
     for name in MODEL_METADATA:
         if name in new.coords and name in baseline.coords:
             columns = (np.ravel(column) for column in (baseline["model"], new[name], baseline[name]))
             for key, a, b in zip(*columns, strict=True):
                 if a != b:
-                    notes.append(safe_text(f"the {name} of {key} reads {a}, in BASELINE {b}", 600))
-    return notes
+                    yield safe_text(f"the {name} of {key} reads {a}, in BASELINE {b}", 600)

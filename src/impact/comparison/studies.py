@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -62,18 +62,14 @@ def align_boards(new: xr.Dataset, baseline: xr.Dataset, *, subset: bool) -> Alig
     return _align(new, baseline, scales, faults)
 
 
-def version_notes(new: xr.Dataset, baseline: xr.Dataset) -> list[str]:
+def version_notes(new: xr.Dataset, baseline: xr.Dataset) -> Iterator[str]:
     """Name the engines whose version or kind differs."""
-    notes = []
     for engine in common_labels(new, baseline, "engine"):
         for name in ("engine_version", "engine_kind"):
             a, b = (str(dataset[name].sel(engine=engine).item()) for dataset in (new, baseline))
             if a != b:
                 word = name.removeprefix("engine_")
-                notes.append(
-                    safe_text(f"the {word} of {engine} is {a or 'unknown'}, in BASELINE {b or 'unknown'}")
-                )
-    return notes
+                yield safe_text(f"the {word} of {engine} is {a or 'unknown'}, in BASELINE {b or 'unknown'}")
 
 
 def _align(
@@ -150,11 +146,9 @@ def _scale(name: str, baseline: xr.Dataset) -> Array:
     return np.asarray(scale.where(np.isfinite(scale)).broadcast_like(values).transpose(*values.dims), float)
 
 
-def fit_notes(new: xr.Dataset, baseline: xr.Dataset) -> list[str]:
+def fit_notes(new: xr.Dataset, baseline: xr.Dataset) -> Iterator[str]:
     """Name the laws whose fits ended with another status."""
-    notes = []
     for key in common_labels(new, baseline, "model"):
         a, b = (fit_status(dataset.sel(model=key)) for dataset in (new, baseline))
         if a != b:
-            notes.append(f"the fit of {key} is {a}, in BASELINE {b}")
-    return notes
+            yield f"the fit of {key} is {a}, in BASELINE {b}"

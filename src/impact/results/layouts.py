@@ -471,43 +471,33 @@ def _stored_axis_names(dataset: xr.Dataset) -> list[str]:
 
 def check_witnesses(table: TrajectoryTable, variables: Sequence[Variable], stored: xr.Dataset) -> None:
     """Refuse a file whose witnesses, stored with their index, expand to other numbers; name both versions."""
-    for of_friction, expected, chosen in _witnesses(table, variables):
-        indices = np.asarray(stored[WITNESSES[of_friction][1]].values, np.int64)
-        if not np.array_equal(indices, expected):
+    for of_friction, indices, chosen in _witnesses(table, variables):
+        if not np.array_equal(stored[WITNESSES[of_friction][1]].values.astype(np.int64), indices):
             raise ResultError("is not a readable result (its witnesses are not at the expected positions)")
-        _check_witnesses_at(table, chosen, indices, stored)
-
-
-def _check_witnesses_at(
-    table: TrajectoryTable, variables: Sequence[Variable], indices: NDArray[np.int64], stored: xr.Dataset
-) -> None:
-    """Refuse stored values at some points, of models or of pairs, that expand to other numbers."""
-    expanded = witness_values(table, variables, indices)
-    cells = indices % table.inputs.cells
-    index = index_of(cells, table.inputs.shape)
-    names = {"v1", "v2", "m1", "m2"}.union({*SLIP_INPUTS}.intersection(table.inputs.names()))
-    if any(variable.of_friction for variable in variables):
-        names |= {"R1", "R2"}
-    inputs = {name: input_at(table.inputs, name, index) for name in names}
-    for variable in variables:
-        expected, got = stored[f"witness_{variable.name}"].values, expanded[variable.name]
-        columns = {**inputs, variable.name: expected}
+        expanded = witness_values(table, chosen, indices)
+        index = index_of(indices % table.inputs.cells, table.inputs.shape)
+        names = {"v1", "v2", "m1", "m2"}.union({*SLIP_INPUTS}.intersection(table.inputs.names()))
+        names |= {"R1", "R2"} if of_friction else set()
+        inputs = {name: input_at(table.inputs, name, index) for name in names}
         has_peak = "witness_peak_indentation" in stored
         if has_peak:
-            columns["peak_indentation"] = stored["witness_peak_indentation"].values
-        with np.errstate(all="ignore"):
-            scale = np.broadcast_to(scale_of(variable, columns.__getitem__, has_peak=has_peak), expected.shape)
-            rounding = float(np.finfo(expected.dtype).eps) if expected.dtype.kind == "f" else 0.0
-            allowed = np.maximum(WITNESS_TOLERANCE, 2.0 * rounding) * np.abs(scale)
-            same = (got == expected) | (np.isnan(got) & np.isnan(expected)) | (np.abs(got - expected) <= allowed)
-        if not same.all():
-            worst = int(np.argmin(same))
-            version = safe_text(str(stored.attrs.get("impact_version", "unknown")), 40)
-            raise ResultError(
-                f"its witnesses have other values: {variable.name} is {number(got[worst], 12)}, the file has "
-                f"{number(expected[worst], 12)}; it was written by impact {version}, this is {__version__}: sweep "
-                "its config again, or expand it with that version (impact expand)"
-            )
+            inputs["peak_indentation"] = stored["witness_peak_indentation"].values
+        for variable in chosen:
+            expected, got = stored[f"witness_{variable.name}"].values, expanded[variable.name]
+            columns = {**inputs, variable.name: expected}
+            with np.errstate(all="ignore"):
+                scale = np.abs(scale_of(variable, columns.__getitem__, has_peak=has_peak))
+                rounding = float(np.finfo(expected.dtype).eps) if expected.dtype.kind == "f" else 0.0
+                allowed = np.maximum(WITNESS_TOLERANCE, 2.0 * rounding) * np.broadcast_to(scale, expected.shape)
+                same = (got == expected) | (np.isnan(got) & np.isnan(expected)) | (abs(got - expected) <= allowed)
+            if not same.all():
+                worst = int(np.argmin(same))
+                version = safe_text(str(stored.attrs.get("impact_version", "unknown")), 40)
+                raise ResultError(
+                    f"its witnesses have other values: {variable.name} is {number(got[worst], 12)}, the file has "
+                    f"{number(expected[worst], 12)}; it was written by impact {version}, this is {__version__}: "
+                    "sweep its config again, or expand it with that version (impact expand)"
+                )
 
 
 def witness_variables(stored: xr.Dataset) -> tuple[Variable, ...]:

@@ -47,9 +47,8 @@ def sensitivity_template(plan: Plan, of: str, others: Sequence[str]) -> xr.Datas
     return xr.Dataset(template(variables, coords.sizes, others), coords, provenance_attributes(plan) | {"of": of})
 
 
-def distribution_texts(dataset: xr.Dataset) -> list[str]:
+def distribution_texts(dataset: xr.Dataset) -> Iterator[str]:
     """Write the uncertain inputs of a result with their distributions, each in one line without a break."""
-    texts = []
     for name, distribution in read_attribute(dataset.attrs, "design").get("distributions", {}).items():
         ((kind, numbers),) = distribution.items()
         parsed = InputName.parse(name)
@@ -63,8 +62,7 @@ def distribution_texts(dataset: xr.Dataset) -> list[str]:
         shown = ", ".join(number(value / of) for value, of in zip(numbers, sizes, strict=False))
         shown += ", …" if len(numbers) > len(sizes) else ""
         text = f"{name} = {kind}({shown}){'' if unit == '1' else unit if unit == '°' else f' {unit}'}"
-        texts.append(safe_text(text, 80).replace(" ", NO_BREAK))
-    return texts
+        yield safe_text(text, 80).replace(" ", NO_BREAK)
 
 
 def describe_design(dataset: xr.Dataset) -> str:

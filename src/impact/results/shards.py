@@ -311,21 +311,19 @@ def _locate_ranges(
 
 def _missing_shards(
     output: Path, missing: Sequence[TrajectoryRange], records: Mapping[Path, _ShardRecord]
-) -> list[str]:
+) -> Iterator[str]:
     """List the shards that are missing or unfinished, each with the command that completes it."""
     first_record = next(iter(records.values()))
     folders = {record.shard: folder for folder, record in records.items()}
     n_shards = first_record.shard.of
     counts = Counter(trajectory_range.number % n_shards + 1 for trajectory_range in missing)
-    lines = []
     for number in sorted(counts)[:MAX_LISTED_SHARDS]:
         shard = Shard(number, n_shards)
         again = shlex.join([*first_record.command, "--shard", str(shard)])
         lacks = f"lacks {counts[number]:,} block{'' if counts[number] == 1 else 's'}"
         if shard in folders:
-            lines.append(f"{folders[shard]}: shard {shard} {lacks}; {again} finishes it")
+            yield f"{folders[shard]}: shard {shard} {lacks}; {again} finishes it"
         else:
-            lines.append(f"{output}: shard {shard} is missing; {again} computes it")
+            yield f"{output}: shard {shard} is missing; {again} computes it"
     if len(counts) > MAX_LISTED_SHARDS:
-        lines.append(f"and {len(counts) - MAX_LISTED_SHARDS:,} more shards")
-    return lines
+        yield f"and {len(counts) - MAX_LISTED_SHARDS:,} more shards"
