@@ -28,7 +28,6 @@ from impact.atomic import atomic_write, write_file
 from impact.engine.executors import choose_executor
 from impact.engine.run import Run as SweepRun
 from impact.errors import ResultError, StoreError, UnfinishedError, UsageError
-from impact.results import sweep as sweep_module
 from impact.results.seal import write_seal
 from impact.results.sweep import read_plan, sweep_into
 from impact.results.xarray_backend import open_result
@@ -248,7 +247,7 @@ def test_a_sweep_whose_file_cannot_be_read_back_leaves_no_file(
     def refuse(*arguments: object) -> None:
         raise StoreError("cannot be read")
 
-    monkeypatch.setattr(sweep_module, "check_readable", refuse)
+    monkeypatch.setattr("impact.results.xarray_backend.check_readable", refuse)
     with pytest.raises(StoreError, match="cannot be read"):
         sweep_into(tmp_path / "out.h5", read_plan(ROOT / "configs" / "figure6.toml", ["sweep.e=0.5"]))
     assert not (tmp_path / "out.h5").exists()

@@ -12,7 +12,7 @@ import xarray as xr
 from ..config.grid import MAX_POINTS
 from ..contact.model import ForceModel
 from ..engine.plan import Plan
-from ..engine.plugins import Plugins, read_plugins
+from ..engine.plugins import read_plugins
 from ..formatting import law_keys
 from ..results.provenance import config_of_part, stored_config
 from ..results.replay_command import command_start
@@ -61,36 +61,33 @@ def rerun(
     ...     print(impact.rerun(f"{folder}/stored.h5"))
     equal: 19 variables, 5,353 values, none differs
     """
-    stored = load(result)
+    stored, name = load(result), str(result)
     plugin_set = read_plugins(plugins)
     # laws by key, because "all" may include new ones; a calibration has pairs, MODEL with FRICTION, along `model`
     keys = [law_keys(key) for key in stored["model"].values.tolist()] if "model" in stored.dims else [[]]
     laws = zip(("models", "frictions"), map(dict.fromkeys, zip(*keys, strict=True)), strict=False)
-    changes = [f"{name}={json.dumps(list(table))}" for name, table in laws]
-    changes += [f"solver.{name}={stored.attrs.get(name)}" for name in ("rtol", "max_steps")]
+    changes = [f"{key}={json.dumps(list(table))}" for key, table in laws]
+    changes += [f"solver.{key}={stored.attrs.get(key)}" for key in ("rtol", "max_steps")]
     if kind_of(stored) == "calibration":
-        new = _repeat_calibration(stored, changes, plugin_set, str(result))
-        return replace(compare(new, stored, tol=tol, subset=subset), new="the rerun", baseline=str(result))
+        # its modules import scipy.optimize, which is slow to import
+        from ..inverse.calibrate import calibrate_config
+
+        config = stored_config(
+            stored.attrs, changes, plugin_set, name, allow_changed_plugins=True, purpose="calibrate"
+        )
+        verdict = compare(calibrate_config(config, plugin_set.of(config.models)), stored, tol=tol, subset=subset)
+        return replace(verdict, new="the rerun", baseline=name)
     require_sweep(stored, "rerun")
     # any core gives the same result
     changes.append('solver.core="auto"')
-    config = stored_config(stored.attrs, changes, plugin_set, str(result), max_points, allow_changed_plugins=True)
+    config = stored_config(stored.attrs, changes, plugin_set, name, max_points, allow_changed_plugins=True)
     whole = Plan(config, plugin_set.of(config.models))
     plan = replace(whole, config=config_of_part(config, stored))
-    plan.check_count(max_points, str(result))
+    plan.check_count(max_points, name)
     verdict = compare((execute or sweep_in_memory)(plan), stored, tol=tol, subset=subset)
     if plan.points < whole.points:
         part = f"repeated {plan.points:,} of {whole.points:,} points of the config: the file holds no others"
         verdict = replace(verdict, notes=(part, *verdict.notes))
     files = [word for path in plugins if isinstance(path, str | Path) for word in ("--plugin", str(path))]
-    command = ("impact", "run", str(result), *files) if command_start(str(result), stored) else ()
-    return replace(verdict, new="the rerun", baseline=str(result), repeats=command)
-
-
-def _repeat_calibration(stored: xr.Dataset, changes: list[str], plugins: Plugins, name: str) -> xr.Dataset:
-    """Repeat a calibration with the models and the tolerances of the result."""
-    # its modules import scipy.optimize, which is slow to import
-    from ..inverse.calibrate import calibrate_config
-
-    config = stored_config(stored.attrs, changes, plugins, name, allow_changed_plugins=True, purpose="calibrate")
-    return calibrate_config(config, plugins.of(config.models))
+    command = ("impact", "run", name, *files) if command_start(name, stored) else ()
+    return replace(verdict, new="the rerun", baseline=name, repeats=command)

@@ -132,42 +132,30 @@ def extend_to_file(
     )
     check_outputs([target], plugins, overwrite=True)
     plugin_set = read_plugins(plugins)
-    with run.connected() as connected:
-        outcome = _extend_into(target, source, settings_of(overrides), plugin_set, connected)
-    run.check_stop(f"{target} is complete")
-    return outcome
-
-
-def _extend_into(
-    output: Path, source: Path, changes: Sequence[Setting], plugins: Plugins, run: Run
-) -> SweepOutcome:
-    """Write the extended result: that of a single sweep of its config.
-
-    A result of layout `full` holds values of points and no trajectories: those of all new points are integrated,
-    also where a point of the result had the same one.
-    """
-    name, before = str(source), open_result(source)
-    with before:
+    name, changes = str(source), settings_of(overrides)
+    with run.connected() as connected, open_result(source) as before:
         table = table_of_result(before)
         require_sweep(before, "extend")
-        config = stored_config(before.attrs, [], plugins, name, run.max_points)
-        old = Plan(config, plugins.of(config.models))
+        config = stored_config(before.attrs, [], plugin_set, name, max_points)
+        old = Plan(config, plugin_set.of(config.models))
         _check_whole(before, old, name)
-        config = _extended_config(before, old, changes, plugins, name, run.max_points)
+        config = _extended_config(before, old, changes, plugin_set, name, max_points)
         if before.attrs.get("core") in CORES:
             # the existing trajectories were integrated by this core
             config = replace(config, solver=replace(config.solver, core=str(before.attrs["core"])))
-        new = ExtendedPlan(config, plugins.of(config.models), old=old, table=table, name=name)
+        new = ExtendedPlan(config, plugin_set.of(config.models), old=old, table=table, name=name)
         _check_changes(old, new, name)
-        new.check_count(run.max_points, name)
+        new.check_count(max_points, name)
         _check_none_lost(new)
         seal = str(before.encoding["seal"])
         record = {"seal": seal, "set": [setting.override for setting in changes]}
         history = [*read_attribute(before.attrs, "extended", name), record]
-        # a full result has no trajectories, only the values of its points
+        # a full result has no trajectories, only the values of its points: those of all new points are integrated,
+        # also where a point of the result had the same one
         fill = partial(new.fill, before) if table is None and new.layout == "full" else None
-        extension = Extension(seal, json.dumps(history), fill, replaces=output == source)
-        outcome = sweep_into(output, new, run, extension)
+        extension = Extension(seal, json.dumps(history), fill, replaces=target == source)
+        outcome = sweep_into(target, new, connected, extension)
+    run.check_stop(f"{target} is complete")
     layout = "full" if table is None else "factored"
     return replace(outcome, integrated=sum(new.integrated.values()), extended_layout=layout)
 

@@ -311,7 +311,11 @@ def stored_table(dataset: xr.Dataset, sizes: Mapping[str, int], read: ReadVariab
     laws: dict[str, LawRecord] = read_attribute(dataset.attrs, "laws", required=True)
     if list(laws) != [str(key) for key in dataset["model"].values]:
         raise ResultError("is not a readable result (laws: not those of its models)")
-    inputs = read_inputs(dataset, _stored_axis_names(dataset))
+    names: list[str] = read_attribute(dataset.attrs, "axes", required=True)
+    along = [name for name in names if name in dataset.coords and dataset.coords[name].dims == (name,)]
+    if along != names or len({*names}) < len(names):
+        raise ResultError("is not a readable result (axes: not those of its grid)")
+    inputs = read_inputs(dataset, names)
 
     def parts(name: str, lengths: Sequence[int]) -> Iterator[NDArray[Any]]:
         if sizes.get(name, 0) != sum(lengths):
@@ -458,15 +462,6 @@ def read_inputs(dataset: xr.Dataset, axis_names: Sequence[str]) -> Inputs:
         if columns
     )
     return Inputs(scalars, tuple(ordered), materials)
-
-
-def _stored_axis_names(dataset: xr.Dataset) -> list[str]:
-    """Read the names of the axes of the grid of a factored file, in their order."""
-    names: list[str] = read_attribute(dataset.attrs, "axes", required=True)
-    along = [name for name in names if name in dataset.coords and dataset.coords[name].dims == (name,)]
-    if along != names or len({*names}) < len(names):
-        raise ResultError("is not a readable result (axes: not those of its grid)")
-    return names
 
 
 def check_witnesses(table: TrajectoryTable, variables: Sequence[Variable], stored: xr.Dataset) -> None:

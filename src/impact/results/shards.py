@@ -153,32 +153,24 @@ def sweep_shard(
     command = ["impact", "sweep", config, "-o", str(output)]
     command += [word for setting in settings_of(overrides) for word in ("--set", setting.override)]
     command += [word for path in plugins if isinstance(path, str | Path) for word in ("--plugin", str(path))]
-    with run.connected() as connected:
-        progress = _complete_shard(Path(output), plan, chosen, command, connected)
-    run.check_stop(f"{progress.folder} is complete")
-    return progress
-
-
-def _complete_shard(output: Path, plan: Plan, shard: Shard, command: Sequence[str], run: Run) -> ShardProgress:
-    """Integrate what the work folder of a shard does not have yet."""
     check_storable(plan)
-    ranges = [trajectory_range for trajectory_range in plan.ranges if shard.has(trajectory_range)]
-    counter = ProgressCounter.start(ranges, plan.points, run)
-    folder = shard.folder(output)
-    with open_work_folder(folder, plan, run) as work_folder:
-        attributes = dataset_template(plan).attrs
-        record = {
-            "shard": [shard.number, shard.of],
-            "command": list(command),
-            "core": plan.solver.core,
-            "attributes": {name: attributes[name] for name in RECORDED_ATTRIBUTES},
-        }
+    ranges = [trajectory_range for trajectory_range in plan.ranges if chosen.has(trajectory_range)]
+    folder, attributes = chosen.folder(Path(output)), dataset_template(plan).attrs
+    record = {
+        "shard": [chosen.number, chosen.of],
+        "command": command,
+        "core": plan.solver.core,
+        "attributes": {name: attributes[name] for name in RECORDED_ATTRIBUTES},
+    }
+    with run.connected() as connected, open_work_folder(folder, plan, connected) as work_folder:
+        counter = ProgressCounter.start(ranges, plan.points, connected)
         with atomic_write(folder / SHARD_FILE_NAME, overwrite=True) as sink:
             sink.write(json.dumps(record).encode())
         with report_kept_ranges(folder, counter, "the same command", lambda error: []):
-            complete_ranges(work_folder, plan, ranges, counter, run)
+            complete_ranges(work_folder, plan, ranges, counter, connected)
+    run.check_stop(f"{folder} is complete")
     progress = counter.progress
-    return ShardProgress(folder, len(ranges), len(plan.ranges), progress.trajectories, progress.failed, shard)
+    return ShardProgress(folder, len(ranges), len(plan.ranges), progress.trajectories, progress.failed, chosen)
 
 
 class _ShardRecord(BaseModel):

@@ -38,7 +38,7 @@ from .schema import dataset_template, plan_coordinates, stored_variables
 from .summary import SweepOutcome, result_notes, summarize
 from .trajectory_table import TrajectoryTable, in_memory, lazy_dataset, table_of_ranges
 from .validation import is_name
-from .xarray_backend import MAX_LOADED_BYTES, check_readable, load, open_result, write_sealed
+from .xarray_backend import MAX_LOADED_BYTES, load, open_result, write_sealed
 
 # approximate bytes of a result besides its values
 OVERHEAD_BYTES = 2**16
@@ -421,7 +421,6 @@ def store_result(
 
     contents = file_contents(result, plan, table, on_slab, extension.fill)
     with atomic_write(output, overwrite=run.overwrite or extension.replaces, part=part) as sink:
-        seal = write_sealed(sink, contents.template, contents.values, plan.config.output)
-        check_readable(sink, output)
+        seal = write_sealed(sink, output, contents.template, contents.values, plan.config.output)
     contents.result.encoding = {"source": str(output), "seal": seal, "layout": plan.layout}
     return SweepOutcome(contents.result, contents.summary, progress.of_trajectories, output=output)

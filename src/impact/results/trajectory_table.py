@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import os
+from collections import defaultdict
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
@@ -347,19 +348,19 @@ def max_indexed_bytes() -> int:
 def lazy_dataset(template: xr.Dataset, table: TrajectoryTable, variables: Sequence[Variable]) -> xr.Dataset:
     """Build a result, from its coordinates and attributes, whose variables are computed when they are read."""
     axes = [axis.name for axis in table.inputs.axes]
-    along: dict[str, dict[str, set[int]]] = {v.name: {law.key: set() for law in table.laws} for v in variables}
+    along = defaultdict[tuple[str, str], set[int]](set)
     for of_friction in (False, True):
         names = [variable.name for variable in variables if variable.of_friction == of_friction]
         for number in table.numbers(of_friction) if names else ():
             for name, varying in varies_along(table, number, names).items():
-                along[name][table.keys(number)[0]].update(varying)
+                along[name, table.keys(number)[0]].update(varying)
     computed = {}
     for variable in variables:
         dims = [*(dim for dim in variable.dims if dim != AXES), *axes]
         friction = [dim for dim in variable.dims if dim == "friction"]
         by_model = {
-            key: (*friction, *(axes[axis] for axis in sorted(varying)))
-            for key, varying in along[variable.name].items()
+            law.key: (*friction, *(axes[axis] for axis in sorted(along[variable.name, law.key])))
+            for law in table.laws
         }
         array = indexing.LazilyIndexedArray(ExpandedArray(table, variable))
         encoding = {VARIES_ALONG: by_model, ORIGINAL_DIMS: tuple(dims)}

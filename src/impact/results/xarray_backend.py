@@ -29,7 +29,6 @@ from .slabs import slabs
 from .trajectory_table import in_memory, table_of_result
 from .validation import schema_violation
 
-DEFAULT_OUTPUT = Output()
 # larger results are not loaded into memory
 MAX_LOADED_BYTES = 2**29
 # bytes of a file that are copied at a time
@@ -37,11 +36,13 @@ COPY_BUFFER_BYTES = 2**22
 
 
 def write_sealed(
-    sink: Sink, template: xr.Dataset, values: Iterable[RegionValues], output: Output = DEFAULT_OUTPUT
+    sink: Sink, path: Path, template: xr.Dataset, values: Iterable[RegionValues], output: Output
 ) -> str:
     """Write and seal a dataset of the coordinates and attributes of a template; return the seal."""
     write_dataset(sink, template, values, output)
-    return write_seal(sink)
+    seal = write_seal(sink)
+    check_readable(sink, path)
+    return seal
 
 
 def save(
@@ -94,8 +95,7 @@ def save(
                 yield str(name), tuple(slab.values()), variable.isel(slab).values
 
     with atomic_write(path, overwrite=overwrite) as sink:
-        write_sealed(sink, dataset, parts(), output or DEFAULT_OUTPUT)
-        check_readable(sink, path)
+        write_sealed(sink, path, dataset, parts(), output or Output())
 
 
 def save_with_attributes(source: Path, path: Path, attributes: Mapping[str, str]) -> None:
