@@ -25,9 +25,8 @@ from ..atomic import Sink
 from ..config.tables import Output
 from ..errors import ResultError
 from ..formatting import safe_text
-from .hdf5_structure import ReadBytes, check_object
 from .schema import SCHEMA_VERSION
-from .seal import USER_BLOCK_BYTES
+from .seal import USER_BLOCK_BYTES, ReadBytes, check_object
 from .trajectory_table import check_memory
 from .validation import TABLE_VARIABLES, is_name
 

@@ -19,11 +19,10 @@ from ..config.tables import Output
 from ..contact.variables import OUTPUTS
 from ..errors import ResultError, UnfinishedError, UsageError, warn
 from ..formatting import argument, safe_text, type_of
-from .hdf5_structure import byte_reader, check_root
 from .layouts import read_layout
 from .netcdf import RegionValues, encode_attribute, read_variables, write_dataset
 from .schema import MODEL_METADATA, kind_of, require_result, require_sweep
-from .seal import check_seal, is_result, write_seal
+from .seal import byte_reader, check_root, check_seal, is_result, write_seal
 from .selection import select, select_laws
 from .slabs import slabs
 from .trajectory_table import in_memory, table_of_result
