@@ -85,12 +85,6 @@ class Contents(NamedTuple):
     summary: Summary
 
 
-def check_layout(plan: Plan) -> None:
-    """Raise a UsageError for a plan whose result cannot be stored, before integration."""
-    for law in plan.models if plan.layout == "factored" else ():
-        stiffness_to_store(plan.inputs, law)
-
-
 def file_template(result: xr.Dataset, plan: Plan, table: TrajectoryTable) -> xr.Dataset:
     """Build the dataset of the file, with placeholder values, from that of the result."""
     return table_template(result, table, stored_variables(plan)) if plan.layout == "factored" else result

@@ -68,15 +68,12 @@ def write_dataset(sink: Sink, template: xr.Dataset, values: Iterable[RegionValue
             if name not in template.dims
         }
         for name, variable in template.coords.items():
+            values_of_file, dims, encoding = variable.values, variable.dims, {}
             if name in texts:
-                text = texts[name]
-                added = file.create_variable(
-                    str(name), (*variable.dims, f"string{text.shape[-1]}"), text.dtype, data=text
-                )
-                _set_attributes(added, {**variable.attrs, "_Encoding": "utf-8"})
-            else:
-                added = file.create_variable(str(name), variable.dims, variable.dtype, data=variable.values)
-                _set_attributes(added, variable.attrs)
+                values_of_file, encoding = texts[name], {"_Encoding": "utf-8"}
+                dims = (*dims, f"string{values_of_file.shape[-1]}")
+            added = file.create_variable(str(name), dims, values_of_file.dtype, data=values_of_file)
+            _set_attributes(added, {**variable.attrs, **encoding})
         for name, variable in template.data_vars.items():
             storage = _storage_options(variable, output)
             added = file.create_variable(str(name), variable.dims, variable.dtype, **storage)

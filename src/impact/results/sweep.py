@@ -31,7 +31,7 @@ from ..engine.run import DEFAULT_RUN, ProgressCallback, ProgressCounter, Run, ig
 from ..engine.trajectories import RANGE_TRAJECTORIES, TrajectoryRange
 from ..errors import ResultError, StoreError, UnfinishedError, UsageError, warn
 from ..formatting import argument
-from .layouts import FillSlab, check_layout, file_contents
+from .layouts import FillSlab, file_contents, stiffness_to_store
 from .netcdf import MAX_LABEL_BYTES, encode_text, is_text
 from .plausibility import input_notes, with_depths
 from .schema import dataset_template, plan_coordinates, stored_variables
@@ -357,7 +357,8 @@ def reload_range(work_folder: checkpoint.WorkFolder, trajectory_range: Trajector
 def check_storable(plan: Plan) -> None:
     """Refuse a plan whose labels are too long or whose laws cannot be factored, before integration."""
     check_labels(plan)
-    check_layout(plan)
+    for law in plan.models if plan.layout == "factored" else ():
+        stiffness_to_store(plan.inputs, law)
 
 
 def check_labels(plan: Plan) -> None:
