@@ -268,7 +268,7 @@ def _join_names(names: Sequence[str]) -> str:
 
 def align_calibrations(new: xr.Dataset, baseline: xr.Dataset, *, subset: bool) -> Alignment:
     """Align two calibrations by their laws, whose order does not matter."""
-    faults = _data_faults(new, baseline)
+    faults = [*_data_faults(new, baseline)]
     is_same_data = all(fault.kind != "labels" for fault in faults)
     common = common_labels(new, baseline, "model")
     for study, side in ((new, "NEW"), (baseline, "BASELINE")):
@@ -288,8 +288,7 @@ def align_boards(new: xr.Dataset, baseline: xr.Dataset, *, subset: bool) -> Alig
     faults = []
     suites = [dataset.attrs["suite"] for dataset in (new, baseline)]
     if suites[0] != suites[1]:
-        text = safe_text(f"suite is {suites[0]}, in BASELINE {suites[1]}")
-        faults.append(Difference("physics config", "suite", text))
+        faults.append(changed_config("suite", "suite is", *suites))
     common = {dim: common_labels(new, baseline, dim) for dim in ("engine", "check")}
     for dim in common:
         for study, side in ((new, "NEW"), (baseline, "BASELINE")):
@@ -333,26 +332,26 @@ def common_labels(new: xr.Dataset, baseline: xr.Dataset, dim: str) -> list[str]:
     return [label for label in map(str, baseline[dim].values) if label in new[dim].values]
 
 
-def _data_faults(new: xr.Dataset, baseline: xr.Dataset) -> list[Difference]:
+def changed_config(name: str, label: str, new: Any, baseline: Any) -> Difference:
+    """Describe an input or a setting that differs."""
+    return Difference("physics config", name, safe_text(f"{label} {new}, in BASELINE {baseline}"))
+
+
+def _data_faults(new: xr.Dataset, baseline: xr.Dataset) -> Iterator[Difference]:
     """List the differences between the measurements, the parameters, their bounds and the noise."""
-    faults: list[Difference] = []
-
-    def add(name: str, label: str, a: Any, b: Any) -> None:
-        faults.append(Difference("physics config", name, safe_text(f"{label} {a}, in BASELINE {b}")))
-
     bounds = [read_attribute(dataset.attrs, "fit_bounds") for dataset in (new, baseline)]
     if list(bounds[0]) != list(bounds[1]):
         got, expected = (safe_text(", ".join(table), 400) for table in bounds)
-        faults.append(Difference("labels", "parameter", f"parameter: {got}, in BASELINE {expected}"))
+        yield Difference("labels", "parameter", f"parameter: {got}, in BASELINE {expected}")
     else:
         for name in bounds[0]:
             if bounds[0][name] != bounds[1][name]:
-                add(name, f"bounds of {name}:", bounds[0][name], bounds[1][name])
+                yield changed_config(name, f"bounds of {name}:", bounds[0][name], bounds[1][name])
     # version 1.0 had no other loss
     for key, default in (("noise", None), ("loss", "linear")):
         a, b = (dataset.attrs.get(key, default) for dataset in (new, baseline))
         if a != b:
-            add(key, f"{key} is", a, b)
+            yield changed_config(key, f"{key} is", a, b)
     columns = [
         {str(name): v.values for name, v in dataset.coords.items() if v.dims == ("point",)}
         for dataset in (new, baseline)
@@ -361,12 +360,11 @@ def _data_faults(new: xr.Dataset, baseline: xr.Dataset) -> list[Difference]:
     for name in (*DATA_COORDINATES, *inputs):
         first, second = (column.get(name, np.array([])) for column in columns)
         if not np.array_equal(first, second, equal_nan=first.dtype.kind == second.dtype.kind == "f"):
-            faults.append(Difference("labels", name, f"{name}: the measured points differ"))
+            yield Difference("labels", name, f"{name}: the measured points differ")
     for name in map(str, baseline.coords.keys() & new.coords.keys()):
         scalars = new.coords[name], baseline.coords[name]
         if is_input(name) and scalars[0].ndim == scalars[1].ndim == 0 and scalars[0].item() != scalars[1].item():
-            add(name, f"{name} is", scalars[0].item(), scalars[1].item())
-    return faults
+            yield changed_config(name, f"{name} is", scalars[0].item(), scalars[1].item())
 
 
 def _scale(name: str, baseline: xr.Dataset) -> Array:

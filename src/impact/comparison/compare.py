@@ -39,6 +39,7 @@ from .align import (
     align_boards,
     align_calibrations,
     align_sweeps,
+    changed_config,
     fit_notes,
     version_notes,
 )
@@ -204,9 +205,8 @@ def _material_faults(new: xr.Dataset, baseline: xr.Dataset) -> list[Difference]:
             path = f"materials.{name}.{field}"
             # a property that one of them varies is a coordinate
             if a.get(field) != b.get(field) and not (path in new.coords or path in baseline.coords):
-                shown = [number(v, 12) for v in (a.get(field), b.get(field))]
-                text = f"{path} is {shown[0]}, in BASELINE {shown[1]}"
-                faults.append(Difference("physics config", path, safe_text(text)))
+                shown = (number(v, 12) for v in (a.get(field), b.get(field)))
+                faults.append(changed_config(path, f"{path} is", *shown))
     return sorted(faults, key=lambda fault: fault.name)
 
 
