@@ -448,6 +448,12 @@ def test_a_rerun_repeats_a_calibration_and_names_what_changed(cli: Run, tmp_path
         impact.compare(stored, ROOT / "tests" / "data" / "figure6.h5")
 
 
+def test_inputs_of_calibrations_that_differ_are_named_in_one_order() -> None:
+    stored = impact.load(ROOT / "tests" / "data" / "release_1_0_0" / "calibration.h5")
+    changed = stored.assign_coords({name: stored[name] + 1.0 for name in ("v2", "m2", "K", "v1", "m1")})
+    assert [fault.name for fault in impact.compare(changed, stored).faults] == ["K", "m1", "m2", "v1", "v2"]
+
+
 def test_laws_are_compared_by_name_whatever_their_rank(drops: xr.Dataset) -> None:
     assert impact.compare(drops.isel(model=[1, 0]), drops).equal
     nothing = impact.compare(drops.isel(model=[0]), drops.isel(model=[1]), subset=True)

@@ -361,7 +361,7 @@ def _data_faults(new: xr.Dataset, baseline: xr.Dataset) -> Iterator[Difference]:
         first, second = (column.get(name, np.array([])) for column in columns)
         if not np.array_equal(first, second, equal_nan=first.dtype.kind == second.dtype.kind == "f"):
             yield Difference("labels", name, f"{name}: the measured points differ")
-    for name in map(str, baseline.coords.keys() & new.coords.keys()):
+    for name in sorted(map(str, baseline.coords.keys() & new.coords.keys())):
         scalars = new.coords[name], baseline.coords[name]
         if is_input(name) and scalars[0].ndim == scalars[1].ndim == 0 and scalars[0].item() != scalars[1].item():
             yield changed_config(name, f"{name} is", scalars[0].item(), scalars[1].item())
