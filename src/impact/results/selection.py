@@ -125,16 +125,15 @@ def _matches_value(values: np.ndarray, value: float | str) -> Mask:
     """Mark the values that equal a value."""
     if values.dtype.kind not in NUMBER_DTYPE_KINDS:
         return np.asarray(values.astype(str) == str(value))
-    number = _as_number(value)
-    return np.asarray(np.isclose(values, np.nan if number is None else number, rtol=SELECTION_RTOL, atol=0.0))
+    return np.asarray(np.isclose(values, _as_number(value), rtol=SELECTION_RTOL, atol=0.0))
 
 
 def _nearest_values(coordinate: xr.DataArray, value: float | str) -> str:
     """List the values of an axis if they are few, the next ones to a number, or the first; angles in degrees."""
     name, values = coordinate.name, coordinate.values
     unit = "rad" if coordinate.attrs.get("units") == "rad" else "1"
-    number = _as_number(value) if values.dtype.kind in NUMBER_DTYPE_KINDS else None
-    if number is None or np.isnan(number) or values.size <= MAX_LISTED_VALUES:
+    number = _as_number(value) if values.dtype.kind in NUMBER_DTYPE_KINDS else np.nan
+    if np.isnan(number) or values.size <= MAX_LISTED_VALUES:
         shown = ", ".join(
             prefixed(InputName.parse(name).word(value), unit) for value in values[:MAX_LISTED_VALUES].tolist()
         )
@@ -145,11 +144,11 @@ def _nearest_values(coordinate: xr.DataArray, value: float | str) -> str:
     return f"the nearest are {' and '.join(prefixed(label, unit) for label in nearest.tolist())}"
 
 
-def _as_number(value: float | str) -> float | None:
+def _as_number(value: float | str) -> float:
     try:
         return float(value)
     except ValueError:
-        return None
+        return np.nan
 
 
 def match_labels(new: Sequence[Labels], baseline: Sequence[Labels]) -> tuple[IndexArray, IndexArray]:
