@@ -18,7 +18,7 @@ from ..results.selection import chosen_laws
 from .curves import CurveData, Panel, curve_of, x_axis_fields
 from .data import Points
 from .kinds import Choice, Kind
-from .labels import friction_text, model_label
+from .labels import NamedLaw, friction_text, model_label
 from .slices import conditions_of, scalars_of, units_of
 from .style import is_geometric
 
@@ -64,15 +64,15 @@ def _panels(data: xr.Dataset, name: str, varied: str, choice: Choice) -> tuple[P
     curves, residuals = [], []
     for index, key in enumerate(map(str, data["model"].values)):
         law = data.isel(model=index)
-        label = ", ".join(filter(None, (_law_label(law, choice), _remark(law))))
+        fitted = NamedLaw(", ".join(filter(None, (_law_label(law, choice), _remark(law)))), key)
         y = law["predicted"]
         band: list[xr.DataArray] = []
         if varied:
             ends = law.sel(output_name=name)
             y, *band = (ends[field] for field in ("curve", "curve_lower", "curve_upper"))
         has_band = all(np.isfinite(end).all() for end in band)
-        curves.append(curve_of(label, key, grid, y, name, band=band if has_band else ()))
-        residuals.append(curve_of(label, key, x, law["residual"] / _deviation(law), f"{name}_residual"))
+        curves.append(curve_of(fitted, grid, y, name, band=band if has_band else ()))
+        residuals.append(curve_of(fitted, x, law["residual"] / _deviation(law), f"{name}_residual"))
     axis = x_axis_fields(data[varied or "point"])
     axis["x_log"] = bool(varied) and _is_logarithmic(x, grid)
     values = Panel(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import zip_longest
 from typing import Any, Literal
@@ -20,9 +20,9 @@ from numpy.typing import ArrayLike
 
 from ..config.measurements import SIGMA
 from ..errors import UsageError
-from ..formatting import NO_BREAK, heading, law_name
-from .data import MEASURED, LegendEntries, PlotData, Points
-from .labels import LawPart, annotate_right_edge, label_axis, pretty_conditions, symbol, words_of
+from ..formatting import NO_BREAK, heading
+from .data import MEASURED, LegendEntries, PlotData, Points, stacked
+from .labels import LawPart, NamedLaw, annotate_right_edge, label_axis, pretty_conditions, symbol, words_of
 from .slices import unit_of
 from .style import FAINT, SOFT, is_geometric, model_styles, tint
 
@@ -34,12 +34,10 @@ PANEL_ASPECT, STACKED_PANEL_ASPECT = 0.56, 0.36
 BAND_SHADE, LABEL_DISTANCE = 0.22, 0.055
 
 
-@dataclass(frozen=True)
-class Curve:
+@dataclass(frozen=True, kw_only=True)
+class Curve(NamedLaw):
     """One curve in SI, of a model or a pair; the model of a reference is None."""
 
-    label: str
-    model: str | None
     x: tuple[float, ...]
     y: tuple[float, ...]
     end: str = ""  # text at the last point
@@ -48,12 +46,6 @@ class Curve:
     least: tuple[float, ...] = ()  # a band around the curve
     largest: tuple[float, ...] = ()
     is_guide: bool = False  # a thin line with its case at its end; in the legend if it has a label
-    friction: str = ""  # key of the friction law of a pair
-
-    @property
-    def law(self) -> str:
-        """The key of its model or pair; empty for a reference."""
-        return law_name(self.model or "", self.friction)
 
     def rows_of_values(self) -> Iterator[tuple[str, tuple[float, ...]]]:
         """Iterate over its values and the ends of its band, with a name for each end."""
@@ -131,7 +123,6 @@ class CurveData(PlotData):
     def long_table(self) -> pd.DataFrame:
         """Make a row for each point of a curve, and for each measured point."""
         parts: list[dict[str, Any]] = []
-        of_pairs = any(curve.friction for panel in self.panels for curve in panel.curves)
         for panel, points in zip_longest(self.panels, self.measured):
             axes = {
                 "x_axis": heading(f"{panel.x_label},", panel.x_name, panel.x_unit),
@@ -141,15 +132,13 @@ class CurveData(PlotData):
                 label = " ".join(filter(None, (curve.label, curve.end)))
                 for end, values in curve.rows_of_values():
                     name = ", ".join(filter(None, (label, curve.case, end)))
-                    laws = {"model": curve.model or "", **({"friction": curve.friction} if of_pairs else {})}
-                    parts.append({**axes, "curve": name, **laws, "x": curve.x, "y": values})
+                    parts.append({**axes, "curve": name, **curve.columns, "x": curve.x, "y": values})
             for column, values in (points.columns if points else {}).items():
                 if column != panel.x_name:
                     name = MEASURED if column == panel.y_name else f"{MEASURED}, {column}"
                     x = points.columns[panel.x_name]
-                    laws = dict.fromkeys(("model", "friction") if of_pairs else ("model",), "")
-                    parts.append({**axes, "curve": name, **laws, "x": x, "y": values})
-        return pd.concat(map(pd.DataFrame, parts), ignore_index=True)
+                    parts.append({**axes, "curve": name, **NamedLaw("").columns, "x": x, "y": values})
+        return stacked(parts)
 
     def wide_table(self) -> pd.DataFrame:
         """Make a column for each curve and for measured points; curves with the same x share it."""
@@ -213,29 +202,19 @@ class CurveData(PlotData):
 
 
 def curve_of(
-    label: str,
-    model: str | None,
-    x: ArrayLike,
-    y: ArrayLike,
-    variable: str,
-    end: str = "",
-    band: Sequence[ArrayLike] = (),
-    friction: str = "",
+    law: NamedLaw, x: ArrayLike, y: ArrayLike, variable: str, end: str = "", band: Sequence[ArrayLike] = ()
 ) -> Curve:
     """Make a curve of arrays of the shape of x, or of one y everywhere; a band is two arrays."""
-    shape = np.shape(x)
-    points, values, least, largest = (
-        tuple(np.broadcast_to(np.asarray(array, float), shape).tolist()) if array is not None else ()
-        for array in (x, y, *(band or (None, None)))
-    )
-    return Curve(label, model, points, values, end, variable, least=least, largest=largest, friction=friction)
+    arrays = (np.broadcast_to(np.asarray(array, float), np.shape(x)) for array in (x, y, *band))
+    points: dict[str, Any] = {
+        name: tuple(array.tolist()) for name, array in zip(("x", "y", "least", "largest"), arrays, strict=False)
+    }
+    return Curve(law.label, law.model, law.friction, end=end, variable=variable, **points)
 
 
-def law_curve(
-    law: LawPart, x: ArrayLike, y: ArrayLike, variable: str, end: str = "", band: Sequence[ArrayLike] = ()
-) -> Curve:
-    """Make a curve of a model or a pair, see `curve_of`."""
-    return curve_of(law.label, law.model, x, y, variable, end, band, law.friction)
+def law_curves(laws: Iterable[LawPart], x: ArrayLike, ends: Mapping[str, str]) -> list[Curve]:
+    """Make the curves of every law over x, of variables with the texts at their ends."""
+    return [curve_of(law, x, law.data[name], name, end) for law in laws for name, end in ends.items()]
 
 
 def x_axis_fields(coordinate: xr.DataArray) -> dict[str, Any]:

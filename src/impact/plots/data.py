@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import Field, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol, TypeAlias
@@ -63,6 +63,12 @@ class PlotData(Protocol):
 
     def draw(self, all_axes: Sequence[Axes], labels: Mapping[str, str], points: Points | None) -> LegendEntries:
         """Draw the panels, with labels that replace those of names; returns handles and names of the legend."""
+
+
+def stacked(parts: Iterable[Mapping[str, Any]]) -> pd.DataFrame:
+    """Make one table of the columns of parts, without that of friction laws where there are none."""
+    table = pd.concat(map(pd.DataFrame, parts), ignore_index=True)
+    return table if (table["friction"] != "").any() else table.drop(columns="friction")
 
 
 def encode_history(history: xr.Dataset) -> bytes:

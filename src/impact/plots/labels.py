@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass
 from functools import cache, partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -199,18 +200,30 @@ def parameters_of_laws(laws: Mapping[str, str], names: Mapping[str, str]) -> str
     )
 
 
-class LawPart(NamedTuple):
-    """What a result has for one model, or for one pair: its label, the keys of both laws, and the data."""
+@dataclass(frozen=True)
+class NamedLaw:
+    """A law of a picture: its label, and the keys of the model, None for a reference, and of the friction law."""
 
     label: str
-    model: str
-    friction: str
-    data: xr.Dataset
+    model: str | None = None
+    friction: str = ""
 
     @property
-    def key(self) -> str:
-        """Its name in a picture, see `impact.formatting.law_name`."""
-        return law_name(self.model, self.friction)
+    def law(self) -> str:
+        """The key of its model or pair, see `impact.formatting.law_name`; empty for a reference."""
+        return law_name(self.model or "", self.friction)
+
+    @property
+    def columns(self) -> dict[str, str]:
+        """Both keys, for a table."""
+        return {"model": self.model or "", "friction": self.friction}
+
+
+@dataclass(frozen=True, kw_only=True)
+class LawPart(NamedLaw):
+    """What a result has for one model, or for one pair."""
+
+    data: xr.Dataset
 
 
 def split_by_law(data: xr.Dataset, *, numbered: bool) -> Iterator[LawPart]:
@@ -221,14 +234,14 @@ def split_by_law(data: xr.Dataset, *, numbered: bool) -> Iterator[LawPart]:
         of_model = data.isel(model=index)
         key, label = str(of_model.variables["model"].values.item()), model_label(of_model, numbered=numbered)
         if "friction" not in data.dims:
-            yield LawPart(label, key, "", of_model)
+            yield LawPart(label, key, data=of_model)
             continue
         for pair in (of_model.isel(friction=friction) for friction in range(data.sizes["friction"])):
             friction_key = str(pair.variables["friction"].values.item())
             of_friction = friction_text(friction_key, scalars_of(pair, f"friction.{friction_key}."), units)
             # a single model is not named beside every friction law
             shown = law_name("" if data.sizes["model"] == 1 else label, of_friction)
-            yield LawPart(shown, key, friction_key, pair)
+            yield LawPart(shown, key, friction_key, data=pair)
 
 
 def with_model(conditions: str, data: xr.Dataset, *, numbered: bool) -> str:

@@ -23,12 +23,13 @@ from matplotlib.patheffects import withStroke
 
 from ..array_types import Array, Mask
 from ..errors import UsageError, did_you_mean
-from ..formatting import argument, heading, law_name, percentage, safe_text
+from ..formatting import argument, heading, percentage, safe_text
 from ..results.ranking import error_floor
-from .data import LegendEntries, PlotData, Points
+from .data import LegendEntries, PlotData, Points, stacked
 from .kinds import Choice, Kind
 from .labels import (
     REFERENCE,
+    NamedLaw,
     label_axis,
     legend_labels,
     number_axis,
@@ -62,22 +63,11 @@ MARGIN_WIDTH = 1.35
 MIN_ROW_HEIGHT, MAX_ROW_HEIGHT = 1.7, 3.2
 
 
-@dataclass(frozen=True)
-class Field:
-    """One panel: its title, the key of its model (None for the reference), and a value at each y and x.
+@dataclass(frozen=True, kw_only=True)
+class Field(NamedLaw):
+    """One panel, whose label is its title: a value at each y and x."""
 
-    `friction` is the key of the friction law of a pair.
-    """
-
-    label: str
-    model: str | None
     values: Plane
-    friction: str = ""
-
-    @property
-    def law(self) -> str:
-        """The key of its model or pair; empty for the reference."""
-        return law_name(self.model or "", self.friction)
 
 
 @dataclass(frozen=True)
@@ -135,18 +125,10 @@ class MapData(PlotData):
         if self.closest:
             closest["closest"] = [key or "" for key in np.transpose(np.array(self.closest, object)).ravel()]
             closest["abs_e_error"] = np.transpose(self.distance).ravel()
-        of_pairs = any(panel.friction for panel in self.panels)
-        parts = [
-            {
-                "model": panel.model or "",
-                **({"friction": panel.friction} if of_pairs else {}),
-                **points,
-                self.variable: np.transpose(panel.values).ravel(),
-                **closest,
-            }
+        return stacked(
+            {**panel.columns, **points, self.variable: np.transpose(panel.values).ravel(), **closest}
             for panel in self.panels
-        ]
-        return pd.concat(map(pd.DataFrame, parts), ignore_index=True)
+        )
 
     def wide_table(self) -> pd.DataFrame:
         """Make a row for each point, with a column for each model or pair."""
@@ -348,8 +330,8 @@ def _map_data(
     for letter, name in (("x", x), ("y", y)):
         if letter in choice.log and data[name].values[0] <= 0.0:
             raise UsageError(f"{argument('log', letter)}: {name} got values <= 0, expected values > 0")
-    names: list[tuple[str, str | None, str]] = [(law.label, law.model, law.friction) for law in laws[:max_panels]]
-    names = names or [(f"{REFERENCE} (6), (7)" if choice.equations else REFERENCE, None, "")]
+    reference = f"{REFERENCE} (6), (7)" if choice.equations else REFERENCE
+    shown: Sequence[NamedLaw] = laws[:max_panels] or [NamedLaw(reference)]
     heading_text = safe_text(str(dataset.attrs.get("title", "")), 140)
     x_label, y_label, label = (words_of(data[name].attrs, name) for name in (x, y, variable))
     x_unit, y_unit, unit = (unit_of(data[name]) for name in (x, y, variable))
@@ -370,11 +352,11 @@ def _map_data(
         # errors, and what has values of both signs, not by rounding alone
         signed=variable.endswith(("_error", "energy_residual")) or bool(-finite.min() > 1e-3 * finite.max() > 0.0),
         panels=tuple(
-            Field(label, model, _nested_tuples(part), friction)
-            for (label, model, friction), part in zip(names, values, strict=True)
+            Field(law.label, law.model, law.friction, values=_nested_tuples(part))
+            for law, part in zip(shown, values, strict=True)
         ),
         not_drawn=not_drawn,
-        left_out=tuple(law.key for law in laws[len(names) :]),
+        left_out=tuple(law.law for law in laws[len(shown) :]),
     )
 
 

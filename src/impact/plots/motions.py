@@ -14,9 +14,9 @@ from ..contact.models import catalogue
 from ..formatting import law_name, safe_text
 from ..results.attributes import read_attribute
 from ..results.schema import exponent_text
-from .curves import Curve, CurveData, Mark, Panel, curve_of, law_curve
+from .curves import Curve, CurveData, Mark, Panel, curve_of
 from .kinds import Choice, Kind
-from .labels import REFERENCE, LawPart, friction_text, law_text, words_of
+from .labels import REFERENCE, LawPart, NamedLaw, friction_text, law_text, words_of
 from .slices import choose_line, described_inputs, parameter_text, unit_of
 
 # a permanent indentation is marked above this fraction of the largest one
@@ -91,7 +91,7 @@ def _reference_curve(history: xr.Dataset, name: str, label: str) -> list[Curve]:
     start = float(history[name][0])
     total = (1.0 + float(e)) * mass * float(history["v"][0])
     end = start + (-1.0 if name == "v1" else 1.0) * total / float(inputs[f"m{name[1]}"])
-    return [curve_of(label, None, (0.0, total), (start, end), name, {"v1": "v₁", "v2": "v₂"}[name])]
+    return [curve_of(NamedLaw(label), (0.0, total), (start, end), name, {"v1": "v₁", "v2": "v₂"}[name])]
 
 
 def curves_over(
@@ -116,10 +116,10 @@ def curves_over(
         if friction:
             inputs = impact_inputs(history)
             names.append(friction_text(friction, inputs, _units_of(inputs)))
-        laws.append(LawPart(law_name(*names), str(history["model"].item()), friction, history))
+        laws.append(LawPart(law_name(*names), str(history["model"].item()), friction, data=history))
     panels = []
     for x, y, end in pairs:
-        curves = tuple(law_curve(law, law.data[x].values, law.data[y].values, y, end) for law in laws)
+        curves = tuple(curve_of(law, law.data[x].values, law.data[y].values, y, end) for law in laws)
         x_label, y_label = (words_of(first[name].attrs, name) for name in (x, y))
         x_unit, y_unit = (unit_of(first[name]) for name in (x, y))
         panels.append(Panel(x_label, y_label, curves, x_unit, y_unit, x_name=x, y_name=y))

@@ -16,9 +16,9 @@ from ..contact.variables import OUTPUTS
 from ..errors import UsageError
 from ..formatting import argument, number
 from ..results.selection import select
-from .curves import Curve, CurveData, Panel, curve_of, law_curve
+from .curves import Curve, CurveData, Panel, curve_of, law_curves
 from .kinds import Choice, Kind
-from .labels import LawPart, split_by_law
+from .labels import LawPart, NamedLaw, split_by_law
 from .motions import choose_point, curves_over
 from .restitution import complete, read_line
 from .slices import Line, numeric_axes
@@ -45,8 +45,7 @@ def beta_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
 def e_t_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     """Read the tangential restitution of the centres, with that of rigid balls that stick; see `beta_curves`."""
     line, pairs = _pairs_along(dataset, choice, "e_t")
-    sticking = _sticking_e_t(line.data)
-    guides = [_guide(line.coordinate, sticking, "sticks")] if np.isfinite(sticking) else []
+    guides = [_guide(line.coordinate, e_t, "sticks") for e_t in _sticking_e_t(line.data)]
     panel = _panel(line, pairs, "e_t", "Tangential restitution of the centres", guides)
     return complete(dataset, line, "Tangential restitution of the centres", [panel], choice)
 
@@ -69,7 +68,7 @@ def spin_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     line, pairs = _pairs_along(dataset, choice, *spins)
     turning = [name for name in spins if any(_varies(pair.data[name].values) for pair in pairs)] or [*spins[:1]]
     ends = dict(zip(SPINS, ("ω₁⁺", "ω₂⁺"), strict=True)) if len(turning) > 1 else {}
-    curves = [curve for name in turning for curve in _panel(line, pairs, name, "", end=ends.get(name, "")).curves]
+    curves = [c for name in turning for c in law_curves(pairs, line.coordinate, {name: ends.get(name, "")})]
     y_name = "omega_post" if ends else turning[0]
     panel = Panel("", "Spin after the impact", tuple(curves), y_unit=OUTPUTS[turning[0]].unit, y_name=y_name)
     return complete(dataset, line, "Spin after the impact", [panel], choice)
@@ -86,7 +85,7 @@ def psi_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     for pair, (before, after) in zip(pairs, slips, strict=True):
         order = np.argsort(before, kind="stable")
         order = order[np.abs(before[order]) <= most]
-        curves.append(law_curve(pair, before[order], after[order], "psi2"))
+        curves.append(curve_of(pair, before[order], after[order], "psi2"))
     if any((np.abs(before) > most).any() for before, _ in slips):
         beyond = f"slips beyond psi1 = {number(float(most), 3)}, {SHOWN_PSI} times the largest that is stopped"
         line = line._replace(not_drawn=(*line.not_drawn, beyond))
@@ -130,7 +129,7 @@ def _pairs_along(dataset: xr.Dataset, choice: Choice, *names: str) -> tuple[Line
         if any(np.isfinite(pair.data.variables[name].values).any() for name in names):
             pairs.append(pair)
         else:
-            not_drawn.append(f"{pair.key}: {_reason(pair.data)}")
+            not_drawn.append(f"{pair.law}: {_reason(pair.data)}")
     if not pairs:
         raise UsageError(f"no pair has a value of {' or '.join(names)} here: {not_drawn[0]}")
     if choice.frictions is None and len(pairs) > MAX_PAIRS:
@@ -153,16 +152,14 @@ def _reason(data: xr.Dataset) -> str:
     return "; ".join(failures) or "not defined"
 
 
-def _panel(
-    line: Line, pairs: Sequence[LawPart], name: str, y_label: str, guides: Sequence[Curve] = (), end: str = ""
-) -> Panel:
-    curves = [law_curve(pair, line.coordinate, pair.data[name], name, end) for pair in pairs]
+def _panel(line: Line, pairs: Sequence[LawPart], name: str, y_label: str, guides: Sequence[Curve] = ()) -> Panel:
+    curves = law_curves(pairs, line.coordinate, {name: ""})
     return Panel("", y_label, (*guides, *curves), y_unit=OUTPUTS[name].unit, y_name=name)
 
 
 def _guide(x: ArrayLike, y: ArrayLike, text: str) -> Curve:
     """Make a thin line with a text at its end; y is a number, or one at each x."""
-    return replace(curve_of("", None, x, y, ""), case=text, is_guide=True)
+    return replace(curve_of(NamedLaw(""), x, y, ""), case=text, is_guide=True)
 
 
 def _varies(values: Array) -> bool:
@@ -171,8 +168,8 @@ def _varies(values: Array) -> bool:
     return bool((finite != finite[:1]).any())
 
 
-def _sticking_e_t(data: xr.Dataset) -> float:
-    """Compute e_t = 1/(1 + q) of rigid balls whose contact points stick, 5/7 for solid spheres; else NaN.
+def _sticking_e_t(data: xr.Dataset) -> list[float]:
+    """Compute e_t = 1/(1 + q) of rigid balls whose contact points stick, 5/7 for solid spheres; else nothing.
 
     It holds without spins before the impact, for an inertia factor q that the balls, or a ball and a wall, have.
     """
@@ -182,7 +179,7 @@ def _sticking_e_t(data: xr.Dataset) -> float:
         for kind in ("omega", "inertia")
     )
     has_one = not spins.any() and np.unique(factors).size == 1
-    return 1.0 / (1.0 + float(factors[0])) if has_one else np.nan
+    return [1.0 / (1.0 + float(factors[0]))] if has_one else []
 
 
 def choose_pairs(dataset: xr.Dataset, keys: Sequence[str], needed: str = "beta") -> Choice | None:

@@ -11,9 +11,9 @@ import xarray as xr
 from ..errors import UsageError
 from ..formatting import argument, label as number_label, safe_text
 from ..results.selection import require_outputs
-from .curves import Curve, CurveData, Panel, curve_of, law_curve, x_axis_fields
+from .curves import Curve, CurveData, Panel, curve_of, law_curves, x_axis_fields
 from .kinds import Choice, Kind
-from .labels import REFERENCE, LawPart, split_by_law, with_model
+from .labels import REFERENCE, LawPart, NamedLaw, split_by_law, with_model
 from .slices import Line, choose_line, conditions_of, is_ordered, numeric_axes, read, take_line
 
 FIGURE_6 = "Final velocities comparison"
@@ -31,14 +31,13 @@ MAX_RESTITUTIONS = 8
 def velocity_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     """Read the post-impact velocities of every model and of the impulse-momentum solution, Figure 6."""
     line = read_line(dataset, choice, "v1_post", "v2_post", "v1_reference", "v2_reference")
-    reference = f"{REFERENCE} (6), (7)" if choice.equations else REFERENCE
-    balls = ((1, "v₁⁺"), (2, "v₂⁺"))
+    reference = NamedLaw(f"{REFERENCE} (6), (7)" if choice.equations else REFERENCE)
+    ends = {"v1_post": "v₁⁺", "v2_post": "v₂⁺"}
     references = [
-        curve_of(reference, None, line.coordinate, line.data[f"v{ball}_reference"], f"v{ball}_post", end)
-        for ball, end in balls
+        curve_of(reference, line.coordinate, line.data[name.replace("post", "reference")], name, end)
+        for name, end in ends.items()
     ]
-    curves = _law_curves(line, choice, {f"v{ball}_post": end for ball, end in balls})
-    all_curves = (*_without_empty(references), *curves)
+    all_curves = (*_without_empty(references), *_law_curves(line, choice, ends))
     panel = Panel("", "Velocity after the impact", all_curves, y_unit="m/s", y_name="v_post")
     return complete(dataset, line, FIGURE_6, [panel], choice)
 
@@ -46,9 +45,8 @@ def velocity_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
 def restitution_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     """Read the delivered restitution of every model and the requested one; see `velocity_curves`."""
     line = read_line(dataset, choice, "e_out")
-    requested = (
-        [curve_of("Requested", None, line.coordinate, line.data["e"], "e")] if "e" in line.data.coords else []
-    )
+    e = [line.data["e"]] if "e" in line.data.coords else []
+    requested = [curve_of(NamedLaw("Requested"), line.coordinate, values, "e") for values in e]
     curves = _law_curves(line, choice, {"e_out": ""})
     panel = Panel("", "Delivered restitution", (*_without_empty(requested), *curves), y_name="e_out")
     return complete(dataset, line, "Delivered restitution", [panel], choice)
@@ -86,7 +84,7 @@ def timestep_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     line = read_line(dataset, replace(choice, x=choice.x or along[0]), "e_out", keep=("phase", "e"))
     cases = _split_by_restitution(line)
     guides = [
-        replace(curve_of("Requested", None, line.coordinate, case["e"], "e"), case=name, is_guide=True)
+        replace(curve_of(NamedLaw("Requested"), line.coordinate, case["e"], "e"), case=name, is_guide=True)
         for name, case in cases
         if "e" in case.coords
     ]
@@ -105,13 +103,8 @@ def timestep_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     return complete(dataset, line, title, [panel], choice, x_log=line.x in STEP_AXES)
 
 
-def _law_curves(line: Line, choice: Choice, variables: Mapping[str, str]) -> list[Curve]:
-    """Make the curves of every law over a line, of variables with the texts at their ends."""
-    return [
-        law_curve(law, line.coordinate, law.data[name], name, end)
-        for law in split_by_law(line.data, numbered=choice.equations)
-        for name, end in variables.items()
-    ]
+def _law_curves(line: Line, choice: Choice, ends: Mapping[str, str]) -> list[Curve]:
+    return law_curves(split_by_law(line.data, numbered=choice.equations), line.coordinate, ends)
 
 
 def _split_by_restitution(line: Line) -> list[tuple[str, xr.Dataset]]:
@@ -134,7 +127,7 @@ def _curve_over_phase(law: LawPart, line: Line, values: xr.DataArray) -> Curve:
     (x_dim,) = line.data[line.x].dims
     by_phase = np.asarray(values.transpose(x_dim, ...).values, float).reshape(values.sizes[x_dim], -1)
     band = (by_phase.min(axis=1), by_phase.max(axis=1)) if by_phase.shape[1] > 1 else ()
-    return law_curve(law, line.coordinate, by_phase.mean(axis=1), "e_out", band=band)
+    return curve_of(law, line.coordinate, by_phase.mean(axis=1), "e_out", band=band)
 
 
 def _have_equal_values(curve: Curve, other: Curve) -> bool:

@@ -14,21 +14,13 @@ from matplotlib.figure import Figure
 
 from ..contact.variables import OUTPUTS
 from ..errors import UsageError
-from ..formatting import heading, law_name
+from ..formatting import heading
 from ..results.schema import kind_of
 from ..results.selection import select, select_laws
 from ..results.sensitivity import distribution_texts
-from .data import LegendEntries, PlotData, Points
+from .data import LegendEntries, PlotData, Points, stacked
 from .kinds import Choice, Kind
-from .labels import (
-    LawPart,
-    axis_text,
-    number_axis,
-    pretty_conditions,
-    split_by_law,
-    symbol,
-    with_model,
-)
+from .labels import NamedLaw, axis_text, number_axis, pretty_conditions, split_by_law, symbol, with_model
 from .slices import conditions_of
 from .style import tint
 
@@ -41,21 +33,13 @@ INPUT_INCHES, PANEL_INCHES = 0.34, 0.55
 MAX_PANELS = 8
 
 
-@dataclass(frozen=True)
-class BarPanel:
-    """The indices of one model or pair: its names, and by index the values and the ends of their intervals."""
+@dataclass(frozen=True, kw_only=True)
+class BarPanel(NamedLaw):
+    """The indices of one model or pair: by index the values and the ends of their intervals."""
 
-    label: str
-    model: str
-    friction: str  # key of the friction law of a pair
     values: Mapping[str, tuple[float, ...]]
     lower: Mapping[str, tuple[float, ...]]
     upper: Mapping[str, tuple[float, ...]]
-
-    @property
-    def law(self) -> str:
-        """Its name in the picture, see `impact.formatting.law_name`."""
-        return law_name(self.model, self.friction)
 
 
 @dataclass(frozen=True)
@@ -75,10 +59,9 @@ class BarData(PlotData):
 
     def long_table(self) -> pd.DataFrame:
         """Make a row for each bar."""
-        parts = [
+        return stacked(
             {
-                "model": panel.model,
-                **({"friction": panel.friction} if panel.friction else {}),
+                **panel.columns,
                 "input": self.inputs,
                 "index": index,
                 "value": panel.values[index],
@@ -87,8 +70,7 @@ class BarData(PlotData):
             }
             for panel in self.panels
             for index in BARS
-        ]
-        return pd.concat(map(pd.DataFrame, parts), ignore_index=True)
+        )
 
     def wide_table(self) -> pd.DataFrame:
         """Make a row for each input, with columns for each index of each model and the ends of its interval."""
@@ -147,11 +129,16 @@ def sensitivity_bars(dataset: xr.Dataset, choice: Choice) -> BarData:
                 reason = "samples failed"
             elif np.isnan(law.data["mean"]):
                 reason = "not combinable"
-            not_drawn.append(f"{law.key}, {reason}")
+            not_drawn.append(f"{law.law}, {reason}")
         elif len(panels) == MAX_PANELS:
-            not_drawn.append(f"{law.key}, beyond {MAX_PANELS} laws")
+            not_drawn.append(f"{law.law}, beyond {MAX_PANELS} laws")
         else:
-            panels.append(_bar_panel(law))
+            ends = {"values": "", "lower": "_lower", "upper": "_upper"}
+            indices = {
+                field: {name: tuple(law.data[f"{name}{end}"].values.tolist()) for name in BARS}
+                for field, end in ends.items()
+            }
+            panels.append(BarPanel(law.label, law.model, law.friction, **indices))
     if not panels:
         raise UsageError(f"nothing to draw: {'; '.join(not_drawn)}")
     inputs = tuple(str(name).removeprefix("sweep.").removeprefix("model.") for name in data["input"].values)
@@ -164,15 +151,6 @@ def sensitivity_bars(dataset: xr.Dataset, choice: Choice) -> BarData:
         tuple(panels),
         tuple(not_drawn),
     )
-
-
-def _bar_panel(law: LawPart) -> BarPanel:
-    """Read the indices of one model or pair and the ends of their intervals."""
-    values, lower, upper = (
-        {name: tuple(law.data[f"{name}{end}"].values.tolist()) for name in BARS}
-        for end in ("", "_lower", "_upper")
-    )
-    return BarPanel(law.label, law.model, law.friction, values, lower, upper)
 
 
 SENSITIVITY = Kind(

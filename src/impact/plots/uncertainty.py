@@ -14,9 +14,9 @@ from ..errors import UsageError
 from ..formatting import argument, safe_text
 from ..results.selection import select
 from ..results.sensitivity import distribution_texts
-from .curves import Curve, CurveData, Panel, curve_of, law_curve, x_axis_fields
+from .curves import Curve, CurveData, Panel, curve_of, x_axis_fields
 from .kinds import Choice, Kind
-from .labels import split_by_law, with_model, words_of
+from .labels import NamedLaw, split_by_law, with_model, words_of
 from .slices import choose_line, conditions_of, numeric_axes, read, take_line
 
 # ends of the band, and points of a distribution function that are drawn
@@ -47,13 +47,13 @@ def uncertainty_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
             count = min(samples.size, MAX_DRAWN_PROBABILITIES)
             share = (np.arange(count) + 0.5) / count
             quantiles = np.quantile(samples, share, method="hazen")
-            curves.append(law_curve(law, quantiles, share, name))
+            curves.append(curve_of(law, quantiles, share, name))
         else:
             # NaN where a sample has no result
             least, median, largest = np.quantile(samples, (BAND[0], 0.5, BAND[1]), axis=-1)
-            curves.append(law_curve(law, law.data[x], median, name, band=(least, largest)))
+            curves.append(curve_of(law, law.data[x], median, name, band=(least, largest)))
         failed = int(np.isnan(samples).sum())
-        not_drawn += (f"{law.key}, where {failed:,} samples have no result",) if failed else ()
+        not_drawn += (f"{law.law}, where {failed:,} samples have no result",) if failed else ()
     if not any(np.isfinite([curve.x, curve.y]).all(axis=0).any() for curve in curves):
         raise UsageError(f"nothing to draw: {'; '.join(not_drawn)}")
     if x is None:
@@ -69,7 +69,7 @@ def uncertainty_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
         # the requested restitution, unless it depends on the sample
         has_e = name == "e_out" and "e" in line.coords and SAMPLE not in line["e"].dims
         is_drawn = has_e and bool(np.isfinite(line["e"].values).all())
-        requested = [curve_of("Requested", None, line[x], line["e"], "e")] if is_drawn else []
+        requested = [curve_of(NamedLaw("Requested"), line[x], line["e"], "e")] if is_drawn else []
         panel = Panel(
             y_label=meaning,
             curves=(*requested, *curves),
