@@ -99,10 +99,7 @@ class Panel:
 class CurveData(PlotData):
     """The data of a picture of curves: panels below each other, and measured points that the result has."""
 
-    title: str
-    conditions: str
     panels: tuple[Panel, ...]
-    not_drawn: tuple[str, ...] = ()
     measured: tuple[Points, ...] = ()
 
     @property

@@ -42,15 +42,12 @@ class BarPanel(NamedLaw):
     upper: Mapping[str, tuple[float, ...]]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class BarData(PlotData):
     """The data of a picture of Sobol indices: a panel for each model or pair, with bars for each input."""
 
-    title: str
-    conditions: str
-    inputs: tuple[str, ...]
     panels: tuple[BarPanel, ...]
-    not_drawn: tuple[str, ...] = ()
+    inputs: tuple[str, ...]
 
     @property
     def names(self) -> set[str]:
@@ -147,9 +144,9 @@ def sensitivity_bars(dataset: xr.Dataset, choice: Choice) -> BarData:
     return BarData(
         f"Which uncertain input matters: {meaning}",
         with_model(", ".join(filter(None, conditions)), data, numbered=choice.equations),
-        inputs,
-        tuple(panels),
         tuple(not_drawn),
+        panels=tuple(panels),
+        inputs=inputs,
     )
 
 
