@@ -19,7 +19,7 @@ from .curves import CurveData, Panel, curve_of, x_axis_fields
 from .data import Points
 from .kinds import Choice, Kind
 from .labels import NamedLaw, friction_text, model_label
-from .slices import conditions_of, scalars_of, units_of
+from .slices import conditions_of, scalars_of
 from .style import is_geometric
 
 # laws that are drawn unless the user names them
@@ -102,7 +102,7 @@ def _law_label(law: xr.Dataset, choice: Choice) -> str:
     if "friction" not in law.coords:
         return label
     key = str(law["friction"].item())
-    return law_name(label, friction_text(key, scalars_of(law, f"friction.{key}."), units_of(law)))
+    return law_name(label, friction_text(key, scalars_of(law, f"friction.{key}.")))
 
 
 def _is_logarithmic(measured: Array, grid: Array) -> bool:

@@ -32,7 +32,7 @@ from ..formatting import (
     typographic,
     with_year,
 )
-from .slices import parameter_text, scalars_of, units_of
+from .slices import Inputs, parameter_text, scalars_of
 from .style import SOFT, tint
 
 GREEK = "alpha|beta|gamma|delta|epsilon|zeta|eta|theta|kappa|lambda|mu|nu|xi|rho|sigma|tau|phi|chi|psi|omega"
@@ -149,8 +149,8 @@ def model_label(model_data: xr.Dataset, *, numbered: bool = False) -> str:
     title, year, equation = (model_data[name].item() for name in ("title", "year", "equation"))
     inputs = scalars_of(model_data)
     if "exponent" in model_data.coords and model_data["exponent"].ndim == 0:
-        inputs["n"] = float(model_data["exponent"].item())
-    parameters = parameter_text(str(model_data["model"].item()), inputs, units_of(model_data))
+        inputs["n"] = float(model_data["exponent"].item()), "1"
+    parameters = parameter_text(str(model_data["model"].item()), inputs)
     return law_text(str(title), int(year), str(equation), parameters, numbered=numbered)
 
 
@@ -228,8 +228,6 @@ class LawPart(NamedLaw):
 
 def split_by_law(data: xr.Dataset, *, numbered: bool) -> Iterator[LawPart]:
     """Split a part of a result at its models, and at its friction laws where it has that dimension."""
-    # once for thousands of pairs
-    units = units_of(data) if "friction" in data.dims else {}
     for index in range(data.sizes["model"]):
         of_model = data.isel(model=index)
         key, label = str(of_model.variables["model"].values.item()), model_label(of_model, numbered=numbered)
@@ -238,7 +236,7 @@ def split_by_law(data: xr.Dataset, *, numbered: bool) -> Iterator[LawPart]:
             continue
         for pair in (of_model.isel(friction=friction) for friction in range(data.sizes["friction"])):
             friction_key = str(pair.variables["friction"].values.item())
-            of_friction = friction_text(friction_key, scalars_of(pair, f"friction.{friction_key}."), units)
+            of_friction = friction_text(friction_key, scalars_of(pair, f"friction.{friction_key}."))
             # a single model is not named beside every friction law
             shown = law_name("" if data.sizes["model"] == 1 else label, of_friction)
             yield LawPart(shown, key, friction_key, data=pair)
@@ -251,25 +249,26 @@ def with_model(conditions: str, data: xr.Dataset, *, numbered: bool) -> str:
     return ", ".join(filter(None, (model, conditions)))
 
 
-def friction_text(key: str, inputs: Mapping[str, object], units: Mapping[str, str]) -> str:
+def friction_text(key: str, inputs: Inputs) -> str:
     """Write the title of a friction law, with those of its parameters that differ from their defaults.
 
-    >>> inputs = {"friction.lammps-mindlin.xt": 0.5, "friction.lammps-mindlin.limit": 1.0}
-    >>> friction_text("lammps-mindlin", inputs, {}).replace(NO_BREAK, " ")
+    >>> inputs = {"friction.lammps-mindlin.xt": (0.5, "1"), "friction.lammps-mindlin.limit": (1.0, "1")}
+    >>> friction_text("lammps-mindlin", inputs).replace(NO_BREAK, " ")
     'LAMMPS mindlin, xt = 0.5, limit = positive'
     """
     law = frictions().get(key)
     if law is None:
         return safe_text(key, 80)
-    chosen: dict[str, object] = {}
+    chosen: dict[str, tuple[object, str]] = {}
     for parameter in law.parameters:
         name = f"friction.{key}.{parameter.name}"
         # a result has the position of a word, a time history the word
         words: dict[object, object] = dict(enumerate(parameter.choices))
-        value, default = (words.get(each, each) for each in (inputs.get(name), parameter.default))
+        stored, unit = inputs.get(name, (None, ""))
+        value, default = (words.get(each, each) for each in (stored, parameter.default))
         if value not in (None, default):
-            chosen[name] = value
-    return ", ".join(filter(None, (law.title, parameter_text(f"friction.{key}", chosen, units))))
+            chosen[name] = value, unit
+    return ", ".join(filter(None, (law.title, parameter_text(f"friction.{key}", chosen))))
 
 
 def annotate_right_edge(axes: Axes, text: str, y: float, dx: float, dy: float = 0.0, **style: Any) -> None:

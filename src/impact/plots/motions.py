@@ -17,7 +17,7 @@ from ..results.schema import exponent_text
 from .curves import Curve, CurveData, Mark, Panel, curve_of
 from .kinds import Choice, Kind
 from .labels import REFERENCE, LawPart, NamedLaw, friction_text, law_text, words_of
-from .slices import choose_line, described_inputs, parameter_text, unit_of
+from .slices import Inputs, choose_line, described_inputs, parameter_text, unit_of
 
 # a permanent indentation is marked above this fraction of the largest one
 MIN_MARKED_INDENTATION = 0.02
@@ -114,8 +114,7 @@ def curves_over(
         names = [] if is_single else [_model_label(history, choice.equations)]
         friction = str(history["friction"].item()) if of_friction else ""
         if friction:
-            inputs = impact_inputs(history)
-            names.append(friction_text(friction, inputs, _units_of(inputs)))
+            names.append(friction_text(friction, _with_units(history)))
         laws.append(LawPart(law_name(*names), str(history["model"].item()), friction, data=history))
     panels = []
     for x, y, end in pairs:
@@ -138,8 +137,7 @@ def _with_impulse(history: xr.Dataset) -> xr.Dataset:
 def _model_label(history: xr.Dataset, numbered: bool) -> str:
     """Write the name of a law, which may be a plug-in that is not installed."""
     key = str(history["model"].item())
-    inputs = impact_inputs(history)
-    model, parameters = catalogue().get(key), parameter_text(key, inputs, _units_of(inputs))
+    model, parameters = catalogue().get(key), parameter_text(key, _with_units(history))
     if model is None:
         return ", ".join(filter(None, (safe_text(key, 80), parameters)))
     return law_text(model.title, model.year, model.equation, parameters, numbered=numbered)
@@ -160,15 +158,14 @@ def _effective_mass(inputs: Mapping[str, float | str]) -> float:
 
 
 def _conditions_text(histories: Sequence[xr.Dataset]) -> str:
-    inputs = impact_inputs(histories[0])
     by_model = {str(history["model"].item()): impact_inputs(history).get("n") for history in histories}
     exponents = {key: n for key, n in by_model.items() if isinstance(n, float)}
     text = exponent_text(exponents) if len(exponents) == len(by_model) else None
-    return described_inputs(inputs, _units_of(inputs), text)
+    return described_inputs(_with_units(histories[0]), text)
 
 
-def _units_of(inputs: Mapping[str, object]) -> dict[str, str]:
-    return {name: InputName.parse(name).unit for name in inputs}
+def _with_units(history: xr.Dataset) -> Inputs:
+    return {name: (value, InputName.parse(name).unit) for name, value in impact_inputs(history).items()}
 
 
 def choose_point(dataset: xr.Dataset, keys: Sequence[str]) -> Choice | None:

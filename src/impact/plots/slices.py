@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 import xarray as xr
@@ -21,6 +21,8 @@ from .kinds import Choice
 
 # values in a picture, which are held as Python objects
 MAX_DRAWN = 2**24
+# values of inputs by name, each with its unit
+Inputs: TypeAlias = Mapping[str, tuple[object, str]]
 # values that go without saying: no spin, no tangential velocity, the inertia of solid spheres
 UNSAID = {**OBLIQUE_DEFAULTS, "u1": 0.0, "u2": 0.0}
 
@@ -223,38 +225,33 @@ def unit_of(coordinate: xr.DataArray | xr.Variable) -> str:
 
 def conditions_of(dataset: xr.Dataset, *drawn: str) -> str:
     """Write the values of all inputs that are not drawn, without the parameters of laws."""
-    inputs = {name: value for name, value in scalars_of(dataset).items() if name not in drawn}
-    units = {name: unit_of(dataset.variables[name]) for name in inputs}
-    return described_inputs(inputs, units, exponents_of(dataset))
+    inputs = {name: quantity for name, quantity in scalars_of(dataset).items() if name not in drawn}
+    return described_inputs(inputs, exponents_of(dataset))
 
 
-def units_of(dataset: xr.Dataset) -> dict[str, str]:
+def scalars_of(dataset: xr.Dataset, start: str = "") -> dict[str, tuple[object, str]]:
+    """Find the inputs that have one value, and a name that begins with `start`; each with its unit."""
     # of a variable alone: to make an array finds its coordinates among all others, a thousand times for a report
-    return {str(name): unit_of(dataset.variables[name]) for name in dataset.coords}
-
-
-def scalars_of(dataset: xr.Dataset, start: str = "") -> dict[str, object]:
-    """Find the inputs that have one value, and a name that begins with `start`."""
     names = (name for name in dataset.coords if str(name).startswith(start) and is_input(name))
-    variables = {name: dataset.variables[name] for name in names}
-    return {str(name): variable.values.item() for name, variable in variables.items() if variable.ndim == 0}
+    variables = {str(name): dataset.variables[name] for name in names}
+    return {name: (each.values.item(), unit_of(each)) for name, each in variables.items() if each.ndim == 0}
 
 
-def described_inputs(inputs: Mapping[str, object], units: Mapping[str, str], exponent: str | None = None) -> str:
+def described_inputs(inputs: Inputs, exponent: str | None = None) -> str:
     """Write inputs with their units; `exponent` is the text for n if the laws shown fix their exponent.
 
     Values of `UNSAID` and unknown ones are left out; inputs of one quantity stand before their common value.
 
-    >>> inputs = {"m1": 2e-4, "m2": 2e-4, "e": 0.5, "R2": math.inf}
-    >>> described_inputs(inputs, {"m1": "kg", "m2": "kg", "e": "1", "R2": "m"}).replace(NO_BREAK, " ")
+    >>> inputs = {"m1": (2e-4, "kg"), "m2": (2e-4, "kg"), "e": (0.5, "1"), "R2": (math.inf, "m")}
+    >>> described_inputs(inputs).replace(NO_BREAK, " ")
     'm1 = m2 = 0.2 g, e = 0.5, R2 = ∞'
     """
     names: dict[tuple[str, str], list[str]] = {}
-    for name, value in inputs.items():
+    n, _ = inputs.get("n", (None, ""))
+    for name, (value, unit) in inputs.items():
         is_said = value == value and value != UNSAID.get(name)
         if is_said and InputName.parse(name).table in ("sweep", "materials"):
-            n = inputs.get("n")
-            unit = with_numbers(units[name], {"n": n}) if isinstance(n, float) else units[name]
+            unit = with_numbers(unit, {"n": n}) if isinstance(n, float) else unit
             text = "∞" if value == math.inf else prefixed(value, unit, 6)
             if name == "n" and exponent:
                 text = exponent
@@ -265,19 +262,18 @@ def described_inputs(inputs: Mapping[str, object], units: Mapping[str, str], exp
     return ", ".join(safe_text(part, 60).replace(" ", NO_BREAK) for part in parts)
 
 
-def parameter_text(key: str, inputs: Mapping[str, object], units: Mapping[str, str]) -> str:
+def parameter_text(key: str, inputs: Inputs) -> str:
     """Write the parameters of a law among some inputs, for its name; a unit of unknown exponents is left out.
 
-    >>> inputs = {"bilinear.K": 1e9, "bilinear.C": 2e-3, "hertz.K": 2e9, "n": 1.5}
-    >>> units = {"bilinear.K": "N/m^n", "bilinear.C": "N s^p/m^n"}
-    >>> parameter_text("bilinear", inputs, units).replace(NO_BREAK, " ")
+    >>> inputs = {"bilinear.K": (1e9, "N/m^n"), "bilinear.C": (2e-3, "N s^p/m^n"), "n": (1.5, "1")}
+    >>> parameter_text("bilinear", inputs).replace(NO_BREAK, " ")
     'K = 1 GN/m^1.5, C = 0.002'
     """
-    own = {name.removeprefix(f"{key}."): value for name, value in inputs.items() if name.startswith(f"{key}.")}
-    numbers = {name: value for name, value in ({"n": inputs.get("n")} | own).items() if isinstance(value, float)}
+    own = {name.removeprefix(f"{key}."): each for name, each in inputs.items() if name.startswith(f"{key}.")}
+    known = {name: each for name, each in inputs.items() if name == "n"} | own
+    numbers = {name: value for name, (value, _) in known.items() if isinstance(value, float)}
     parts = []
-    for name, value in own.items():
-        unit = units.get(f"{key}.{name}", "1")
+    for name, (value, unit) in own.items():
         unit = with_numbers(unit, numbers) if names_in(unit) <= numbers.keys() else "1"
         parts.append(safe_text(f"{name} = {prefixed(value, unit, 6)}", 60).replace(" ", NO_BREAK))
     return ", ".join(parts)

@@ -29,7 +29,7 @@ from ..engine.inputs import Inputs
 from ..errors import UsageError
 from ..formatting import argument, with_year
 from ..plots.explore import axes_of, axis_label, shown_values
-from ..plots.slices import conditions_of, parameter_text, scalars_of, unit_of, units_of
+from ..plots.slices import conditions_of, parameter_text, scalars_of, unit_of
 from ..plots.style import is_geometric, model_styles
 from ..results.layouts import read_inputs
 from ..results.selection import law_positions
@@ -132,15 +132,13 @@ def _page_of(dataset: xr.Dataset, models: Sequence[str] | None) -> str:
 def _laws(dataset: xr.Dataset) -> Iterator[dict[str, Any]]:
     """Name the laws with parameters of one value, and their style in pictures."""
     keys = [str(key) for key in dataset["model"].values]
-    styles, scalars, units = model_styles(keys), scalars_of(dataset), units_of(dataset)
+    styles, scalars = model_styles(keys), scalars_of(dataset)
     for key, title, year in zip(keys, dataset["title"].values, dataset["year"].values, strict=True):
         style = styles[key]
         dashes = [DASH_PIXELS * length for length in style["linestyle"][1]] if style["linestyle"] != "-" else []
         yield {
             "key": key,
-            "label": ", ".join(
-                filter(None, (with_year(str(title), int(year)), parameter_text(key, scalars, units)))
-            ),
+            "label": ", ".join(filter(None, (with_year(str(title), int(year)), parameter_text(key, scalars)))),
             "color": style["color"],
             "marker": style["marker"],
             "dashes": " ".join(map("{:g}".format, dashes)) or "none",
