@@ -170,8 +170,7 @@ class CurveData(PlotData):
         styles = model_styles([curve.law for panel in self.panels for curve in panel.curves if curve.law])
         entries: dict[str, Artist] = {}
         band: dict[str, Artist] = {}
-        stored = {panel: own for panel, own in zip(self.panels, self.measured, strict=False) if own.columns}
-        for axes, panel in zip(all_axes, self.panels, strict=True):
+        for axes, panel, stored in zip_longest(all_axes, self.panels, self.measured):
             _draw_bands(axes, panel)
             axes.set(xscale="log" if panel.x_log else "linear", yscale="log" if panel.y_log else "linear")
             for curve in panel.curves:
@@ -183,8 +182,8 @@ class CurveData(PlotData):
                     entries.setdefault(name, line)
                 if curve.least:
                     band[panel.band_name] = _draw_band(axes, curve, line)
-            entries |= _draw_points(axes, panel, points) if points else {}
-            entries |= _draw_points(axes, panel, stored[panel]) if panel in stored else {}
+            for measured in (points, stored):
+                entries |= _draw_points(axes, panel, measured) if measured and measured.columns else {}
             # the names of marks need room at the ends of the axes
             axes.margins(x=0.06 if panel.marks else 0.02, y=0.12 if panel.marks else None)
             axes.autoscale_view()

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from html import escape
 from io import BytesIO
 from pathlib import Path
@@ -94,20 +93,17 @@ def explore(
     kinds, axes, plugin_set = kinds_to_offer(dataset), axes_of(dataset), read_plugins(plugins)
     if kind is not None and kind not in kinds:
         raise UsageError(f'kind: no kind "{kind}" of this result; {did_you_mean(kind, kinds)}')
-    keys = [str(key) for key in dataset["model"].values]
-    shown = chosen_laws(models, dataset)
+    keys, shown = chosen_laws(None, dataset), chosen_laws(models, dataset)
     swept = [name for name in axes if dataset.sizes[name] > 1]
     config, reasons = _config_and_reasons(dataset, swept, plugin_set)
 
     kind_menu = ipywidgets.Dropdown(options=kinds, value=kind or default_kind(dataset).name, description="kind")
-    # with a row for the scroll bar below names that are wider than the list
-    model_list = ipywidgets.SelectMultiple(
-        options=keys, value=shown, description="models", rows=min(len(keys) + 1, 8)
-    )
     # none to choose from where there is no friction
-    laws = [str(key) for key in dataset["friction"].values] if "friction" in dataset.dims else []
-    friction_list = ipywidgets.SelectMultiple(
-        options=laws, value=laws, description="frictions", rows=min(len(laws) + 1, 8)
+    laws = chosen_laws(None, dataset, "friction") if "friction" in dataset.dims else []
+    model_list, friction_list = (
+        # with a row for the scroll bar below names that are wider than the list
+        ipywidgets.SelectMultiple(options=options, value=value, description=name, rows=min(len(options) + 1, 8))
+        for name, options, value in (("models", keys, shown), ("frictions", laws, laws))
     )
     first = choose_line(dataset, keys).x
     first = first if first in axes else next(iter(axes), None)
@@ -161,7 +157,11 @@ def explore(
         values = ", ".join(f"{name} = {value:.6g}" for name, value in off_grid.items())
         message.value = escape(f"{values}: between values of the grid, integrated again") if values else ""
 
-    draw = partial(_draw_in_turn, draw_values)
+    def draw() -> None:
+        # JupyterLab handles changes in several threads, and each draws the present values
+        with DRAWING:
+            draw_values()
+
     waiting: list[asyncio.TimerHandle] = []
 
     def update(change: object) -> None:
@@ -190,12 +190,6 @@ def explore(
     ]
     box = ipywidgets.Box(columns, layout={"flex_flow": "row wrap", "width": "100%", "grid_gap": "4px 16px"})
     return ipywidgets.VBox([box])
-
-
-def _draw_in_turn(draw: Callable[[], None]) -> None:
-    """Draw when no other thread does: JupyterLab handles changes in several, and each draws the present values."""
-    with DRAWING:
-        draw()
 
 
 def _notes(swept: Sequence[str], reasons: Mapping[str, str]) -> str:
@@ -332,10 +326,10 @@ def kinds_to_offer(dataset: xr.Dataset) -> list[str]:
     ['final-velocities', 'restitution', 'error', 'loop', 'history', 'impulse']
     """
     # a kind may apply to one model alone, such as a map over one of its parameters
-    one_key = [str(key) for key in dataset["model"].values[:1]]
-    kinds = [kind.name for kind in kinds_of(dataset) if kind.default(dataset, one_key) is not None]
+    one_key = chosen_laws(None, dataset)[:1]
     # a picture of an animation is one frame of it, which shows less than a loop
-    return [name for name in kinds if name != "animation"]
+    kinds = [kind for kind in kinds_of(dataset) if kind.name != "animation"]
+    return [kind.name for kind in kinds if kind.default(dataset, one_key) is not None]
 
 
 def axes_of(dataset: xr.Dataset) -> list[str]:

@@ -300,10 +300,9 @@ def number_axis(axis: Axis, size: float = 1.0, *, log: bool = False) -> None:
         narrow = (1.0, 2.0, 5.0) if high < 1e2 * low else (1.0, 3.0)
         axis.set_major_locator(LogLocator(subs=narrow if high < 1e3 * low else (1.0,)))
         axis.set_minor_formatter(NullFormatter())
-    elif size == math.radians(1.0):
-        axis.set_major_locator(DegreeLocator("auto", steps=[1, 2, 2.5, 5, 10], min_n_ticks=3))
     else:
-        axis.set_major_locator(MaxNLocator("auto", steps=[1, 2, 2.5, 5, 10], min_n_ticks=3))
+        locator = DegreeLocator if size == math.radians(1.0) else MaxNLocator
+        axis.set_major_locator(locator("auto", steps=[1, 2, 2.5, 5, 10], min_n_ticks=3))
 
 
 def _tick_text(value: float, position: int, *, size: float, powers: bool) -> str:

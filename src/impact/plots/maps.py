@@ -208,7 +208,8 @@ class MapData(PlotData):
         closest = np.array(self.closest, object)
         entries: LegendEntries = []
         for key, share in self.shares.items():
-            style, name = (_tied(), f"{SEVERAL}, equally close") if key else (_failed(), NO_VALUE)
+            tied = {"facecolor": tint(0.26), "linewidth": 0}
+            style, name = (tied, f"{SEVERAL}, equally close") if key else (_failed(), NO_VALUE)
             if key in styles:
                 look, name = styles[key], names[key]
                 style = {
@@ -372,11 +373,6 @@ def edges_of(values: Sequence[float], log: bool) -> Array:
 def _failed() -> dict[str, Any]:
     """The style of cells without a value."""
     return {"facecolor": tint(0.08), "edgecolor": tint(0.3), "hatch": "/////", "linewidth": 0}
-
-
-def _tied() -> dict[str, Any]:
-    """The style of cells where several models are closest."""
-    return {"facecolor": tint(0.26), "linewidth": 0}
 
 
 MAP = Kind(

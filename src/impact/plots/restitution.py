@@ -91,10 +91,10 @@ def timestep_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     curves: list[Curve] = []
     for index, law in enumerate(split_by_law(line.data, numbered=choice.equations)):
         by_case = [(name, _curve_over_phase(law, line, case["e_out"].isel(model=index))) for name, case in cases]
-        first = by_case[0][1]
+        first, *others = (np.array([row for _, row in curve.rows_of_values()]) for _, curve in by_case)
         # a law that does not depend on e has one curve
-        if all(_have_equal_values(curve, first) for _, curve in by_case):
-            by_case = [("", first)]
+        if all(np.array_equal(first, other, equal_nan=True) for other in others):
+            by_case = [("", by_case[0][1])]
         curves += [replace(curve, case=name) for name, curve in by_case]
     band_name = "Least to largest over the phase"
     shown = (*_without_empty(guides), *curves)
@@ -128,13 +128,6 @@ def _curve_over_phase(law: LawPart, line: Line, values: xr.DataArray) -> Curve:
     by_phase = np.asarray(values.transpose(x_dim, ...).values, float).reshape(values.sizes[x_dim], -1)
     band = (by_phase.min(axis=1), by_phase.max(axis=1)) if by_phase.shape[1] > 1 else ()
     return curve_of(law, line.coordinate, by_phase.mean(axis=1), "e_out", band=band)
-
-
-def _have_equal_values(curve: Curve, other: Curve) -> bool:
-    return all(
-        np.array_equal(values, other_values, equal_nan=True)
-        for (_, values), (_, other_values) in zip(curve.rows_of_values(), other.rows_of_values(), strict=True)
-    )
 
 
 def read_line(dataset: xr.Dataset, choice: Choice, *names: str, keep: Sequence[str] = ()) -> Line:

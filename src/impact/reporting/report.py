@@ -111,9 +111,9 @@ def check_page_path(output: str | Path | None, inputs: Sequence[object], *, over
 
 def _report_of(
     dataset: xr.Dataset,
-    plugins: Sequence[ForceModel | str | Path] = (),
-    models: Sequence[str] | None = None,
-    sections: Sequence[str] | None = None,
+    plugins: Sequence[ForceModel | str | Path],
+    models: Sequence[str] | None,
+    sections: Sequence[str] | None,
 ) -> str:
     """Write a result as one page of HTML; for errors see `report`."""
     require_known(sections or (), SECTIONS, f"{argument('sections')}: no section")
@@ -427,9 +427,7 @@ def _facts(dataset: xr.Dataset) -> list[tuple[str, str]]:
         "program": f"impact {attributes.get('impact_version', '')}",
         "packages": ", ".join(f"{name} {version}" for name, version in packages.items()),
         "solver": ", ".join(f"{name} {number(attributes[name])}" for name in settings if name in attributes),
-        "integrator": attributes.get("integrator", ""),
-        "core": attributes.get("core", ""),
-        "fingerprint": attributes.get("fingerprint", ""),
+        **{name: attributes.get(name, "") for name in ("integrator", "core", "fingerprint")},
         "seal": dataset.encoding.get("seal") or "",
         "reason": attributes.get("reason", ""),
         **{
