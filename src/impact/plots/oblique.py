@@ -93,10 +93,8 @@ def psi_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     along = np.array([min(shown), max(shown)])
     guides = [_guide(along, along, "smooth"), _guide(along, 0.0, "sticks")]
     panel = Panel("", "Slip after the impact", (*guides, *curves), y_name="psi2")
-    plot_data = complete(dataset, line, "Slip after over slip before the impact", [panel], choice)
-    (panel,) = plot_data.panels
-    panel = replace(panel, x_name="psi1", x_label="Slip before the impact", x_unit="1", x_log=False)
-    return replace(plot_data, panels=(panel.with_log_axes(choice.log),))
+    x_axis = {"x_name": "psi1", "x_label": "Slip before the impact", "x_unit": "1", "x_log": False}
+    return complete(dataset, line, "Slip after over slip before the impact", [panel], choice, **x_axis)
 
 
 def friction_loop_curves(histories: Sequence[xr.Dataset], choice: Choice) -> CurveData:

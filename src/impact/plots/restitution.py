@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -100,7 +101,8 @@ def timestep_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     shown = (*_without_empty(guides), *curves)
     panel = Panel("", "Delivered restitution", shown, y_name="e_out", band_name=band_name)
     title = f"Restitution at fixed steps, {safe_text(str(dataset.attrs.get('integrator', '')), 40)}"
-    return complete(dataset, line, title, [panel], choice, x_log=line.x in STEP_AXES)
+    x_axis = {"x_log": True} if line.x in STEP_AXES else {}
+    return complete(dataset, line, title, [panel], choice, **x_axis)
 
 
 def _law_curves(line: Line, choice: Choice, ends: Mapping[str, str]) -> list[Curve]:
@@ -143,21 +145,14 @@ def _without_empty(curves: list[Curve]) -> list[Curve]:
 
 
 def complete(
-    dataset: xr.Dataset,
-    line: Line,
-    title: str,
-    panels: Sequence[Panel],
-    choice: Choice,
-    *,
-    x_log: bool = False,
+    dataset: xr.Dataset, line: Line, title: str, panels: Sequence[Panel], choice: Choice, **x_axis: Any
 ) -> CurveData:
-    """Complete panels with the x axis of their line, and add the title and the conditions."""
+    """Complete panels with the x axis of their line, or other fields, and add the title and the conditions."""
     heading = safe_text(str(dataset.attrs.get("title", "")), 140)
     conditions = with_model(conditions_of(line.data, line.x), line.data, numbered=choice.equations)
     if heading and title != FIGURE_6:
         heading, conditions = title, ": ".join(filter(None, (heading, conditions)))
-    x_axis = x_axis_fields(line.coordinate)
-    x_axis |= {"x_log": x_axis["x_log"] or x_log, "joined": is_ordered(dataset, line.x)}
+    x_axis = {**x_axis_fields(line.coordinate), "joined": is_ordered(dataset, line.x), **x_axis}
     panels = [replace(panel, **x_axis).with_log_axes(choice.log) for panel in panels]
     empty = {c.law: None for panel in panels for c in panel.curves if c.law and not np.isfinite(c.y).any()}
     without_value = tuple(f"{key}, which has no point here" for key in empty)

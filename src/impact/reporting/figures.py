@@ -80,7 +80,7 @@ class Drawing:
         plans = list(iterate_choices(self.dataset, self.keys))
         # numbered as they stand on the page: those of friction have a section of their own
         for of_friction in (False, True):
-            more_figures: list[tuple[int, FigurePlan, Position, PlotData]] = []
+            more_figures: list[tuple[FigurePlan, str, PlotData]] = []
             for plan in plans:
                 kind, _, position = plan
                 if kind.of_friction != of_friction:
@@ -96,12 +96,10 @@ class Drawing:
                 except ImpactError as error:
                     left_out.append(f"The figure {kind.name} is left out: {'; '.join(error.problems)}")
                     continue
-                more_figures += [
-                    (number, _plan_at(self.dataset, plan, index), index, data) for index, data in more
-                ]
-            for first, plan, index, plot_data in more_figures:
-                caption = f"As Figure {first}, at {_changes_text(self.dataset, index)}."
-                figures.append(self.figure(len(figures) + 1, plan, caption, plot_data))
+                for index, data in more:
+                    caption = f"As Figure {number}, at {_changes_text(self.dataset, index)}."
+                    more_figures.append((_plan_at(self.dataset, plan, index), caption, data))
+            figures += [self.figure(i, *more) for i, more in enumerate(more_figures, len(figures) + 1)]
         return figures, left_out
 
     def figure(

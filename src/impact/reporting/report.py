@@ -346,29 +346,24 @@ def _single_values(dataset: xr.Dataset) -> Iterator[tuple[str, str, str]]:
 
 def _axis_row(coordinate: xr.DataArray) -> tuple[str, ...]:
     """Describe a coordinate: name, meaning, unit, ends, number of values, and how they are spaced."""
-    meaning = str(coordinate.attrs.get("long_name", ""))
-    unit = numbered_unit(coordinate)
-    if coordinate.dtype.kind == "f" and not is_large(coordinate.variable):
-        values = coordinate.values
-        largest = np.max(np.abs(values), initial=0.0, where=np.isfinite(values))
-        size, unit = scaled_unit(unit, float(largest))
-        coordinate = coordinate.copy(data=values / size)
-    return str(coordinate.name), meaning, unit if unit not in ("", "1") else "", *_range(coordinate)
-
-
-def _range(coordinate: xr.DataArray) -> tuple[str, str, str, str]:
-    """Find the ends of a coordinate, the number of values, and how they are spaced."""
-    ends, large = ("", ""), is_large(coordinate.variable)
-    if large:
+    name, unit, attributes = str(coordinate.name), numbered_unit(coordinate), coordinate.attrs
+    ends: Sequence[object] = ()
+    if is_large(coordinate.variable):
         extremes = extremes_of(coordinate.to_dataset(name="values"), "values")
-        ends = (_number(extremes.smallest), _number(extremes.largest)) if extremes else ends
-    elif coordinate.dtype.kind == "f":
-        smallest, largest = (end.reduce(coordinate.values, axis=None) for end in (np.fmin, np.fmax))
-        ends = _number(float(smallest)), _number(float(largest))
-    spacing = str(coordinate.attrs.get("equation", "")) or ("–" if large else _spacing(coordinate.values.ravel()))
-    if coordinate.name not in coordinate.dims:
+        ends, spacing = (extremes.smallest, extremes.largest) if extremes else (), "–"
+    else:
+        values = coordinate.values.ravel()
+        if values.dtype.kind == "f":
+            largest = np.max(np.abs(values), initial=0.0, where=np.isfinite(values))
+            size, unit = scaled_unit(unit, float(largest))
+            values = values / size
+            ends = float(np.fmin.reduce(values)), float(np.fmax.reduce(values))
+        spacing = _spacing(values)
+    spacing = str(attributes.get("equation", "")) or spacing
+    if name not in coordinate.dims:
         spacing = f"varies with {' and '.join(map(str, coordinate.dims))}: {spacing}"
-    return *ends, f"{coordinate.size:,}", spacing
+    unit, (low, high) = "" if unit == "1" else unit, map(_number, ends or ("", ""))
+    return name, str(attributes.get("long_name", "")), unit, low, high, f"{coordinate.size:,}", spacing
 
 
 def _spacing(values: NDArray[Any]) -> str:
