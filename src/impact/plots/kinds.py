@@ -39,9 +39,9 @@ KINDS = {
     "spin": "oblique",
     "psi": "oblique",
     "friction-loop": "oblique",
-    "calibration": "calibrations",
-    "uncertainty": "uncertainty",
-    "sensitivity": "sensitivity",
+    "calibration": "studies",
+    "uncertainty": "restitution",
+    "sensitivity": "studies",
 }
 # sources, see `source_of`, that have a picture of their own and no other
 STUDIES = ("calibration", "sensitivity study")
