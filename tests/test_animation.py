@@ -10,10 +10,10 @@ from matplotlib.patches import Circle
 from PIL import Image
 
 import impact
-from impact.plots.animation import FRAMES, animation_data
 from impact.plots.draw import get_plot_data
 from impact.plots.kinds import Choice
 from impact.plots.layout import Picture
+from impact.plots.motions import FRAMES, animation_data
 
 from .conftest import Run
 from .fork_server import ForkServer
@@ -70,7 +70,7 @@ def test_the_command_writes_an_animation_of_a_history(
     impact.save(single.history, tmp_path / "h.h5")
     words = ("--kind", "animation", "-o", f"a.{suffix}", "--width", "40mm")
     # few frames, which show as much
-    few = "from impact.plots import animation; animation.FRAMES = 4"
+    few = "from impact.plots import motions; motions.FRAMES = 4"
     done = forked("plot", "h.h5", *words, cwd=tmp_path, code=few)
     assert done.returncode == 0, done.stderr
     with Image.open(tmp_path / f"a.{suffix}") as picture:

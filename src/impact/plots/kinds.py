@@ -32,7 +32,7 @@ KINDS = {
     "loop": "motions",
     "history": "motions",
     "impulse": "motions",
-    "animation": "animation",
+    "animation": "motions",
     "beta": "oblique",
     "e-t": "oblique",
     "impulse-ratio": "oblique",
