@@ -99,10 +99,9 @@ def difference_data(verdict: Verdict) -> DifferenceData:
 def draw_differences(plot_data: DifferenceData) -> Figure:
     """Plot where two results differ: points above the line exceed the tolerance; equal values are not drawn."""
     with styled():
-        rows = _arrange_panels(plot_data.panels)
+        rows: list[Any] = _arrange_panels(plot_data.panels)
         width, height = default_size()
         figure = Picture(width, escape_mathtext(plot_data.title))
-        grid = figure.add_gridspec(len(rows), 2)
         names = list(dict.fromkeys(name for panel in plot_data.panels for name in panel.ratios))
         # the vertical axes include the tolerance and the band for differences without a number
         ratios = [
@@ -110,10 +109,8 @@ def draw_differences(plot_data: DifferenceData) -> Figure:
         ]
         ends = max(MIN_DRAWN_RATIO, min([0.1, *ratios]) / 2.0), 2.0 * NO_NUMBER_BAND * max([1.0, *ratios])
         entries: dict[str, Artist] = {}
-        for row, panels in enumerate(rows):
-            for column, panel in enumerate(panels):
-                axes = figure.add_subplot(grid[row, :] if len(panels) == 1 else grid[row, column])
-                entries = {**_draw_panel(axes, panel, names, ends), **entries}
+        for index, axes in figure.subplot_mosaic(rows).items():
+            entries = {**_draw_panel(axes, plot_data.panels[index], names, ends), **entries}
         figure.share_labels("", "Largest |new − baseline| over the tolerance")
         if plot_data.not_shown:
             entries[f"and {plot_data.not_shown} more"] = Line2D([], [], linestyle="")
@@ -135,15 +132,15 @@ def _variable_text(name: str) -> str:
     )
 
 
-def _arrange_panels(panels: Sequence[DifferencePanel]) -> list[tuple[DifferencePanel, ...]]:
-    """The panels in rows of two; a panel with many names takes a whole row."""
-    rows: list[tuple[DifferencePanel, ...]] = []
-    for panel in panels:
-        is_wide = sum(map(len, panel.names)) > MAX_NAMES_LENGTH
-        if not is_wide and rows and len(rows[-1]) == 1 and sum(map(len, rows[-1][0].names)) <= MAX_NAMES_LENGTH:
-            rows[-1] = (*rows[-1], panel)
+def _arrange_panels(panels: Sequence[DifferencePanel]) -> list[list[int]]:
+    """The indices of panels in rows of two; a panel with many names, or alone in its row, takes both places."""
+    rows: list[list[int]] = []
+    is_wide = [sum(map(len, panel.names)) > MAX_NAMES_LENGTH for panel in panels]
+    for index, wide in enumerate(is_wide):
+        if not wide and rows and rows[-1][0] == rows[-1][1] and not is_wide[rows[-1][0]]:
+            rows[-1][1] = index
         else:
-            rows.append((panel,))
+            rows.append([index, index])
     return rows
 
 
