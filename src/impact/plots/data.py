@@ -147,10 +147,8 @@ def _column_quantities() -> dict[str, Quantity]:
         if variable.dtype == "f8"
     }
     inputs = {name: Quantity(rule.unit, rule.meaning) for name, rule in SWEEP_QUANTITIES.items()}
-    time, impulse = Quantity("s", "time"), Quantity("N s", "impulse")
-    sigma = Quantity("1", "standard deviation", least=0.0)
+    inputs |= {"t": Quantity("s", "time"), "tau": Quantity("N s", "impulse")}
     laboratory = {name: quantity for name, (quantity, _) in LABORATORY.items()}
-    deviations = {
-        f"{SIGMA}_{name}": replace(sigma, unit=quantity.unit) for name, quantity in (outputs | laboratory).items()
-    }
-    return {**outputs, **inputs, "t": time, "tau": impulse, SIGMA: sigma, **laboratory, **deviations}
+    sigma = Quantity("1", "standard deviation", least=0.0)
+    deviations = {f"{SIGMA}_{name}": replace(sigma, unit=q.unit) for name, q in (outputs | laboratory).items()}
+    return {**outputs, **inputs, SIGMA: sigma, **laboratory, **deviations}

@@ -81,11 +81,7 @@ class Picture(Figure):
         self.show_frame: Callable[[int], None] | None = None
         self.frame_count = 0
         # a later change of the size makes the legend again, in the present style
-        self.style = {
-            key: value
-            for key, value in matplotlib.rcParams.items()
-            if key.startswith(("legend", "font", "text.color"))
-        }
+        self.style = dict(matplotlib.rcParams.find_all(r"^(legend|font|text\.color)"))
         # texts that were broken into lines: original text and present text
         self.fitted: dict[Text, tuple[str, str]] = {}
 
@@ -168,13 +164,13 @@ class Picture(Figure):
         self.has_small_legend |= len(entries) > MANY_ENTRIES
         if entries:
             with matplotlib.rc_context(self.style):
-                self._place_legend()
+                if self.has_legend_rows:
+                    self._place_rows()
+                else:
+                    self._place_columns()
         return self.legend_height()
 
-    def _place_legend(self) -> None:
-        if self.has_legend_rows:
-            self._place_rows()
-            return
+    def _place_columns(self) -> None:
         max_width = self.bbox.width - GAP_INCHES * self.dpi
         columns = max(1, int(max_width / self._legend(1).get_window_extent(self.renderer).width))
         # columns of short names are narrower than a single column: another one may fit

@@ -93,12 +93,11 @@ class Drawing:
                     sentences = [kind.caption, *conditions, *comparison]
                     sentences += [f"Not drawn: {'; '.join(plot_data.not_drawn)}."] if plot_data.not_drawn else []
                     figures.append(self.figure(number, plan, " ".join(sentences), plot_data, is_first=True))
+                    for index, data in more:
+                        caption = f"As Figure {number}, at {_changes_text(self.dataset, index)}."
+                        more_figures.append((_plan_at(self.dataset, plan, index), caption, data))
                 except ImpactError as error:
                     left_out.append(f"The figure {kind.name} is left out: {'; '.join(error.problems)}")
-                    continue
-                for index, data in more:
-                    caption = f"As Figure {number}, at {_changes_text(self.dataset, index)}."
-                    more_figures.append((_plan_at(self.dataset, plan, index), caption, data))
             figures += [self.figure(i, *more) for i, more in enumerate(more_figures, len(figures) + 1)]
         return figures, left_out
 
