@@ -53,10 +53,8 @@ def velocity_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
 def restitution_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     """Read the delivered restitution of every model and the requested one; see `velocity_curves`."""
     line = read_line(dataset, choice, "e_out")
-    e = [line.data["e"]] if "e" in line.data.coords else []
-    requested = [curve_of(NamedLaw("Requested"), line.coordinate, values, "e") for values in e]
-    curves = _law_curves(line, choice, {"e_out": ""})
-    panel = Panel("", "Delivered restitution", (*_without_empty(requested), *curves), y_name="e_out")
+    curves = (*_requested(line.data, line.coordinate), *_law_curves(line, choice, {"e_out": ""}))
+    panel = Panel("", "Delivered restitution", curves, y_name="e_out")
     return complete(dataset, line, "Delivered restitution", [panel], choice)
 
 
@@ -66,20 +64,16 @@ def error_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     signed = _law_curves(line, choice, {"e_error": ""})
     if not _without_empty(signed):
         raise UsageError("this result has no error of the restitution, which needs a requested e; sweep e")
-    absolute = [replace(curve, y=tuple(np.abs(curve.y).tolist()), variable="abs_e_error") for curve in signed]
-    panels = [
-        Panel("", "Error", tuple(signed), bands=BANDS, y_name="e_error"),
-        Panel(
-            "",
-            "Absolute error",
-            tuple(absolute),
-            y_log=True,
-            y_floor=MIN_DRAWN_ERROR,
-            bands=BANDS,
-            y_name="abs_e_error",
-        ),
-    ]
-    return complete(dataset, line, "Error of the restitution", panels, choice)
+    panel = Panel("", "Error", tuple(signed), bands=BANDS, y_name="e_error")
+    absolute = replace(
+        panel,
+        y_label="Absolute error",
+        curves=tuple(replace(c, y=tuple(np.abs(c.y).tolist()), variable="abs_e_error") for c in signed),
+        y_log=True,
+        y_floor=MIN_DRAWN_ERROR,
+        y_name="abs_e_error",
+    )
+    return complete(dataset, line, "Error of the restitution", [panel, absolute], choice)
 
 
 def timestep_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
@@ -91,12 +85,11 @@ def timestep_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
         raise UsageError(f"this result has a single step; {NEEDS_STEPS}")
     line = read_line(dataset, replace(choice, x=choice.x or along[0]), "e_out", keep=("phase", "e"))
     cases = _split_by_restitution(line)
-    guides = [
-        replace(curve_of(NamedLaw("Requested"), line.coordinate, case["e"], "e"), case=name, is_guide=True)
+    curves = [
+        replace(guide, case=name, is_guide=True)
         for name, case in cases
-        if "e" in case.coords
+        for guide in _requested(case, line.coordinate)
     ]
-    curves: list[Curve] = []
     for index, law in enumerate(split_by_law(line.data, numbered=choice.equations)):
         by_case = [(name, _curve_over_phase(law, line, case["e_out"].isel(model=index))) for name, case in cases]
         first, *others = (np.array([row for _, row in curve.rows_of_values()]) for _, curve in by_case)
@@ -105,8 +98,7 @@ def timestep_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
             by_case = [("", by_case[0][1])]
         curves += [replace(curve, case=name) for name, curve in by_case]
     band_name = "Least to largest over the phase"
-    shown = (*_without_empty(guides), *curves)
-    panel = Panel("", "Delivered restitution", shown, y_name="e_out", band_name=band_name)
+    panel = Panel("", "Delivered restitution", tuple(curves), y_name="e_out", band_name=band_name)
     title = f"Restitution at fixed steps, {safe_text(str(dataset.attrs.get('integrator', '')), 40)}"
     x_axis = {"x_log": True} if line.x in STEP_AXES else {}
     return complete(dataset, line, title, [panel], choice, **x_axis)
@@ -149,8 +141,7 @@ def uncertainty_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     else:
         # the requested restitution, unless it depends on the sample
         has_e = name == "e_out" and "e" in line.coords and SAMPLE not in line["e"].dims
-        is_drawn = has_e and bool(np.isfinite(line["e"].values).all())
-        requested = [curve_of(NamedLaw("Requested"), line[x], line["e"], "e")] if is_drawn else []
+        requested = _requested(line, line[x]) if has_e and np.isfinite(line["e"].values).all() else []
         panel = Panel(
             y_label=meaning,
             curves=(*requested, *curves),
@@ -180,6 +171,12 @@ def _free_axis(dataset: xr.Dataset, choice: Choice) -> str | None:
 
 def _law_curves(line: Line, choice: Choice, ends: Mapping[str, str]) -> list[Curve]:
     return law_curves(split_by_law(line.data, numbered=choice.equations), line.coordinate, ends)
+
+
+def _requested(data: xr.Dataset, x: xr.DataArray) -> list[Curve]:
+    """Make the curve of the requested restitution, where there is one."""
+    e = [data["e"]] if "e" in data.coords else []
+    return _without_empty([curve_of(NamedLaw("Requested"), x, values, "e") for values in e])
 
 
 def _split_by_restitution(line: Line) -> list[tuple[str, xr.Dataset]]:
