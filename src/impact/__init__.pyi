@@ -42,9 +42,8 @@ from .inverse.calibrate import calibrate as calibrate
 from .inverse.prepared import PreparedProblem as PreparedProblem, prepare as prepare
 from .inverse.solve import SolveResult as SolveResult, solve as solve
 from .inverse.timestep import TimestepResult as TimestepResult, timestep as timestep
-from .plots.draw import plot as plot
+from .plots.draw import PlotFiles as PlotFiles, plot as plot, plot_to_files as plot_to_files
 from .plots.explore import explore as explore
-from .plots.files import PlotFiles as PlotFiles, plot_to_files as plot_to_files
 from .progress_display import progress_bar as progress_bar
 from .reporting.page import page as page
 from .reporting.report import report as report
