@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -375,17 +375,12 @@ def _failed() -> dict[str, Any]:
     return {"facecolor": tint(0.08), "edgecolor": tint(0.3), "hatch": "/////", "linewidth": 0}
 
 
-MAP = Kind(
+_over_plane = partial(Kind, default=choose_plane, along=("x", "y"))
+MAP = _over_plane(
     "map",
     "Error of the restitution, or beta of oblique impacts, over two axes; a panel for each model or pair.",
     field_map,
-    choose_plane,
-    along=("x", "y"),
 )
-VALIDITY = Kind(
-    "validity",
-    "Model with the smallest error, or several with equal errors, and that error.",
-    validity_map,
-    choose_plane,
-    along=("x", "y"),
+VALIDITY = _over_plane(
+    "validity", "Model with the smallest error, or several with equal errors, and that error.", validity_map
 )

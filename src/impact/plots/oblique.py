@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -19,7 +19,7 @@ from ..results.selection import select
 from .curves import Curve, CurveData, Panel, curve_of, law_curves
 from .kinds import Choice, Kind
 from .labels import LawPart, NamedLaw, split_by_law
-from .motions import choose_point, curves_over
+from .motions import choose_point, curves_over, motion
 from .restitution import complete, read_line
 from .slices import Line, numeric_axes
 
@@ -171,16 +171,16 @@ def _sticking_e_t(data: xr.Dataset) -> list[float]:
 
     It holds without spins before the impact, for an inertia factor q that the balls, or a ball and a wall, have.
     """
-    given = {name: data[name].values.ravel() for name in ROTATION if name in data.coords}
+    inputs = {name: data[name].values.ravel() for name in ROTATION if name in data.coords}
     spins, factors = (
-        np.concatenate([np.zeros(0), *(values for name, values in given.items() if name.startswith(kind))])
+        np.concatenate([np.zeros(0), *(values for name, values in inputs.items() if name.startswith(kind))])
         for kind in ("omega", "inertia")
     )
     has_one = not spins.any() and np.unique(factors).size == 1
     return [1.0 / (1.0 + float(factors[0]))] if has_one else []
 
 
-def choose_pairs(dataset: xr.Dataset, keys: Sequence[str], needed: str = "beta") -> Choice | None:
+def choose_pairs(dataset: xr.Dataset, keys: Sequence[str], needed: str) -> Choice | None:
     """Choose to draw the pairs of a result over the angle; None without friction, an axis or a needed variable."""
     x = _first_axis(dataset, Choice()) if "friction" in dataset.dims and needed in dataset else None
     return None if x is None else Choice(x, models=keys)
@@ -193,34 +193,26 @@ def choose_loop(dataset: xr.Dataset, keys: Sequence[str]) -> Choice | None:
     return choice and replace(choice, x=_first_axis(dataset, Choice()), models=few)
 
 
-_pairs = partial(Kind, of_friction=True)
-BETA = _pairs("beta", "Tangential restitution of the contact points of each pair.", beta_curves, choose_pairs)
-E_T = _pairs(
-    "e-t",
-    "Tangential restitution of the centres, as it is measured.",
-    e_t_curves,
-    partial(choose_pairs, needed="e_t"),
-)
-IMPULSE_RATIO = _pairs(
+def _of_pairs(name: str, caption: str, data: Callable[[xr.Dataset, Choice], CurveData], needed: str) -> Kind:
+    return Kind(name, caption, data, partial(choose_pairs, needed=needed), of_friction=True)
+
+
+BETA = _of_pairs("beta", "Tangential restitution of the contact points of each pair.", beta_curves, "beta")
+E_T = _of_pairs("e-t", "Tangential restitution of the centres, as it is measured.", e_t_curves, "e_t")
+IMPULSE_RATIO = _of_pairs(
     "impulse-ratio",
     "Tangential over normal impulse, and the coefficient of friction.",
     impulse_ratio_curves,
-    partial(choose_pairs, needed="impulse_ratio"),
+    "impulse_ratio",
 )
-SPIN = _pairs(
-    "spin", "Spins of the balls after the impact.", spin_curves, partial(choose_pairs, needed="omega1_post")
+SPIN = _of_pairs("spin", "Spins of the balls after the impact.", spin_curves, "omega1_post")
+PSI = _of_pairs(
+    "psi", "Slip after over slip before the impact, as Maw, Barber and Fawcett draw it.", psi_curves, "psi1"
 )
-PSI = _pairs(
-    "psi",
-    "Slip after over slip before the impact, as Maw, Barber and Fawcett draw it.",
-    psi_curves,
-    partial(choose_pairs, needed="psi1"),
-)
-FRICTION_LOOP = _pairs(
+FRICTION_LOOP = motion(
     "friction-loop",
     "Friction over the slip displacement of one impact: the area is the energy lost.",
     friction_loop_curves,
-    choose_loop,
-    along=(),
-    source="history",
+    default=choose_loop,
+    of_friction=True,
 )

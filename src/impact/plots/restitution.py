@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -245,14 +246,12 @@ def choose_axis(dataset: xr.Dataset, keys: Sequence[str]) -> Choice:
     return replace(choice, x=None) if is_uncertain else choice
 
 
-FINAL_VELOCITIES = Kind(
-    "final-velocities",
-    "Velocities after the impact, and the impulse-momentum solution.",
-    velocity_curves,
-    choose_line,
+_over_line = partial(Kind, default=choose_line)
+FINAL_VELOCITIES = _over_line(
+    "final-velocities", "Velocities after the impact, and the impulse-momentum solution.", velocity_curves
 )
-RESTITUTION = Kind("restitution", "Delivered over requested restitution.", restitution_curves, choose_line)
-ERROR = Kind("error", "Error of the restitution: signed above, absolute below.", error_curves, choose_line)
+RESTITUTION = _over_line("restitution", "Delivered over requested restitution.", restitution_curves)
+ERROR = _over_line("error", "Error of the restitution: signed above, absolute below.", error_curves)
 TIMESTEP = Kind(
     "timestep",
     "Restitution at fixed steps: mean, least and largest over the phase.",
