@@ -46,6 +46,7 @@ class Curve(NamedLaw):
     least: tuple[float, ...] = ()  # a band around the curve
     largest: tuple[float, ...] = ()
     is_guide: bool = False  # a thin line with its case at its end; in the legend if it has a label
+    friction: str = ""  # key of the friction law of a pair
 
     def rows_of_values(self) -> Iterator[tuple[str, tuple[float, ...]]]:
         """Iterate over its values and the ends of its band, with a name for each end."""
@@ -99,7 +100,10 @@ class Panel:
 class CurveData(PlotData):
     """The data of a picture of curves: panels below each other, and measured points that the result has."""
 
+    title: str
+    conditions: str
     panels: tuple[Panel, ...]
+    not_drawn: tuple[str, ...] = ()
     measured: tuple[Points, ...] = ()
 
     @property
@@ -205,7 +209,7 @@ def curve_of(
     points: dict[str, Any] = {
         name: tuple(array.tolist()) for name, array in zip(("x", "y", "least", "largest"), arrays, strict=False)
     }
-    return Curve(law.label, law.model, law.friction, end=end, variable=variable, **points)
+    return Curve(law.label, law.model, end=end, variable=variable, friction=law.friction, **points)
 
 
 def law_curves(laws: Iterable[LawPart], x: ArrayLike, ends: Mapping[str, str]) -> list[Curve]:

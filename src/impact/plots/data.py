@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import Field, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, TypeAlias
 
 import pandas as pd
 import xarray as xr
@@ -30,14 +30,14 @@ LegendEntries: TypeAlias = "list[tuple[Artist, str]]"
 MEASURED = "Measured"
 
 
-@dataclass(frozen=True)
 class PlotData(Protocol):
-    """The data of a picture, which makes its tables and draws itself."""
+    """The data of a picture: a frozen dataclass that makes its tables and draws itself."""
 
+    __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
     title: str
     conditions: str
     panels: tuple[Any, ...]
-    not_drawn: tuple[str, ...] = ()  # what is left out, and why
+    not_drawn: tuple[str, ...]  # what is left out, and why
 
     @property
     def panel_count(self) -> int:

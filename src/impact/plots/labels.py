@@ -203,7 +203,8 @@ class NamedLaw:
 
     label: str
     model: str | None = None
-    friction: str = ""
+    # not a field, since the fields of subclasses have an order in JSON
+    friction = ""
 
     @property
     def law(self) -> str:
@@ -221,6 +222,7 @@ class LawPart(NamedLaw):
     """What a result has for one model, or for one pair."""
 
     data: xr.Dataset
+    friction: str = ""
 
 
 def split_by_law(data: xr.Dataset, *, numbered: bool) -> Iterator[LawPart]:
@@ -236,7 +238,7 @@ def split_by_law(data: xr.Dataset, *, numbered: bool) -> Iterator[LawPart]:
             of_friction = friction_text(friction_key, scalars_of(pair, f"friction.{friction_key}."))
             # a single model is not named beside every friction law
             shown = law_name("" if data.sizes["model"] == 1 else label, of_friction)
-            yield LawPart(shown, key, friction_key, data=pair)
+            yield LawPart(shown, key, data=pair, friction=friction_key)
 
 
 def with_model(conditions: str, data: xr.Dataset, *, numbered: bool) -> str:

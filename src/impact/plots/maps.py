@@ -68,13 +68,15 @@ class Field(NamedLaw):
     """One panel, whose label is its title: a value at each y and x."""
 
     values: Plane
+    friction: str = ""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class MapData(PlotData):
     """The data of a map, or of the closest model, in SI: panels over the same two axes."""
 
-    panels: tuple[Field, ...]
+    title: str
+    conditions: str
     variable: str
     x: str
     y: str
@@ -85,6 +87,8 @@ class MapData(PlotData):
     x_log: bool
     y_log: bool
     signed: bool  # whether the variable has values of both signs
+    panels: tuple[Field, ...]
+    not_drawn: tuple[str, ...] = ()
     left_out: tuple[str, ...] = ()  # keys of the models without a panel
     # keys of the models with the smallest |e_error|, or SEVERAL
     closest: tuple[tuple[str | None, ...], ...] = ()
@@ -338,11 +342,6 @@ def _map_data(
     return MapData(
         f"{title}: {heading_text}" if heading_text else title,
         with_model(conditions_of(data, x, y), data, numbered=choice.equations),
-        not_drawn,
-        panels=tuple(
-            Field(law.label, law.model, law.friction, values=_nested_tuples(part))
-            for law, part in zip(shown, values, strict=True)
-        ),
         variable=variable,
         x=x,
         y=y,
@@ -354,6 +353,11 @@ def _map_data(
         y_log="y" in choice.log or is_geometric(data[y].values),
         # errors, and what has values of both signs, not by rounding alone
         signed=variable.endswith(("_error", "energy_residual")) or bool(-finite.min() > 1e-3 * finite.max() > 0.0),
+        panels=tuple(
+            Field(law.label, law.model, values=_nested_tuples(part), friction=law.friction)
+            for law, part in zip(shown, values, strict=True)
+        ),
+        not_drawn=not_drawn,
         left_out=tuple(law.law for law in laws[len(shown) :]),
     )
 

@@ -203,7 +203,7 @@ def curves_over(
         friction = str(history["friction"].item()) if of_friction else ""
         if friction:
             names.append(friction_text(friction, _with_units(history)))
-        laws.append(LawPart(law_name(*names), str(history["model"].item()), friction, data=history))
+        laws.append(LawPart(law_name(*names), str(history["model"].item()), data=history, friction=friction))
     panels = []
     for x, y, end in pairs:
         curves = tuple(curve_of(law, law.data[x].values, law.data[y].values, y, end) for law in laws)

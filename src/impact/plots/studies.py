@@ -168,17 +168,21 @@ def _deviation(law: xr.Dataset) -> Array:
 class BarPanel(NamedLaw):
     """The indices of one model or pair: by index the values and the ends of their intervals."""
 
+    friction: str
     values: Mapping[str, tuple[float, ...]]
     lower: Mapping[str, tuple[float, ...]]
     upper: Mapping[str, tuple[float, ...]]
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class BarData(PlotData):
     """The data of a picture of Sobol indices: a panel for each model or pair, with bars for each input."""
 
-    panels: tuple[BarPanel, ...]
+    title: str
+    conditions: str
     inputs: tuple[str, ...]
+    panels: tuple[BarPanel, ...]
+    not_drawn: tuple[str, ...] = ()
 
     @property
     def names(self) -> set[str]:
@@ -266,7 +270,7 @@ def sensitivity_bars(dataset: xr.Dataset, choice: Choice) -> BarData:
                 field: {name: tuple(law.data[f"{name}{end}"].values.tolist()) for name in BARS}
                 for field, end in ends.items()
             }
-            panels.append(BarPanel(law.label, law.model, law.friction, **indices))
+            panels.append(BarPanel(law.label, law.model, friction=law.friction, **indices))
     if not panels:
         raise UsageError(f"nothing to draw: {'; '.join(not_drawn)}")
     inputs = tuple(str(name).removeprefix("sweep.").removeprefix("model.") for name in data["input"].values)
@@ -275,9 +279,9 @@ def sensitivity_bars(dataset: xr.Dataset, choice: Choice) -> BarData:
     return BarData(
         f"Which uncertain input matters: {meaning}",
         with_model(", ".join(filter(None, conditions)), data, numbered=choice.equations),
+        inputs,
+        tuple(panels),
         tuple(not_drawn),
-        panels=tuple(panels),
-        inputs=inputs,
     )
 
 
