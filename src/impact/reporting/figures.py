@@ -7,6 +7,7 @@ import itertools
 import math
 import shlex
 from collections.abc import Hashable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple, TypeAlias
@@ -137,13 +138,6 @@ class Drawing:
         start = command_start(self.name or "RESULT.h5", self.dataset, "plot")
         return shlex.join([*start, f"--kind={kind.name}", *words]) if start else ""
 
-    def plot_data(self, plan: FigurePlan) -> PlotData | None:
-        """Read the data of a figure; None where it has no values."""
-        try:
-            return get_plot_data(self.dataset, plan.kind.name, plan.choice, self.plugins)
-        except ImpactError:
-            return None
-
     def has_answer(self, position: Position) -> bool:
         """Whether a model has an answer for an impact at some values of axes."""
         if "status" not in self.dataset:
@@ -180,7 +174,11 @@ def _compare_values(
         # a motion is integrated once
         place = tuple({**position, **index}[dim] for dim in dims)
         if place not in known:
-            known[place] = drawing.plot_data(_plan_at(drawing.dataset, plan, index))
+            known[place] = None
+            # it may have no values there
+            with suppress(ImpactError):
+                choice = _plan_at(drawing.dataset, plan, index).choice
+                known[place] = get_plot_data(drawing.dataset, plan.kind.name, choice, drawing.plugins)
         return known[place]
 
     if plan.kind.source == "history":
