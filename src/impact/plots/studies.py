@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -147,11 +146,7 @@ def _remark(law: xr.Dataset) -> str:
 
 def _measured_points(data: xr.Dataset, name: str, x_name: str) -> Points:
     """Read the measured values; error bars that depend on the fit are those of the best law."""
-    columns: dict[str, Any] = {
-        x_name: data[x_name].values,
-        name: data["measured"].values,
-        SIGMA: _deviation(data.isel(model=0)),
-    }
+    columns = {x_name: data[x_name], name: data["measured"], SIGMA: _deviation(data.isel(model=0))}
     return Points("measured", {key: tuple(np.asarray(values, float).tolist()) for key, values in columns.items()})
 
 
@@ -275,7 +270,7 @@ def sensitivity_bars(dataset: xr.Dataset, choice: Choice) -> BarData:
         raise UsageError(f"nothing to draw: {'; '.join(not_drawn)}")
     inputs = tuple(str(name).removeprefix("sweep.").removeprefix("model.") for name in data["input"].values)
     meaning = OUTPUTS[data.attrs["of"]].short_meaning
-    conditions = [", ".join(distribution_texts(data)), conditions_of(data.drop_vars("quantile"))]
+    conditions = *distribution_texts(data), conditions_of(data.drop_vars("quantile"))
     return BarData(
         f"Which uncertain input matters: {meaning}",
         with_model(", ".join(filter(None, conditions)), data, numbered=choice.equations),
