@@ -75,8 +75,7 @@ def encode_history(history: xr.Dataset) -> bytes:
     """Write a time history as a CSV table with units and all digits, which `read_points` reads again."""
     frame = history.drop_vars(["model", "friction"], errors="ignore").to_dataframe().reset_index()
     units = {name: plain_unit(str(history[name].attrs["units"])) for name in frame.columns}
-    frame = frame.rename(columns={name: heading(name, unit=unit) for name, unit in units.items()})
-    return encode_frame(frame, ".csv")
+    return encode_frame(frame.rename(columns=lambda name: heading(name, unit=units[name])), ".csv")
 
 
 @dataclass(frozen=True)
