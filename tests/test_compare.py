@@ -359,6 +359,11 @@ def test_with_subset_a_parameter_axis_of_a_model_outside_the_subset_is_ignored(w
         verdict = impact.compare(new, baseline, subset=True)
         assert verdict.equal, verdict
         assert verdict.variables[0].points == 2 * 3 * 2 * 2 * 2
+    # a part of a result keeps the parameters of the models that it lacks
+    for part in (wide.sel(model=["bilinear", "hertz"]), wide.sel(model=["hertz"]).isel({GAMMA: 0})):
+        for new, baseline in ((part, wide), (wide, part)):
+            verdict = impact.compare(new, baseline, subset=True)
+            assert verdict.equal, verdict
     moved = _with(other, "e_out", 9.0)
     assert impact.compare(moved, wide, subset=True).headline == "not equal: values (e_out)"
     both = wide.drop_vars(GAMMA).isel({GAMMA: 0})

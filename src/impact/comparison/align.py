@@ -107,10 +107,14 @@ def _select_points(result: xr.Dataset, coords: xr.Dataset, positions: Mapping[st
 
 
 def _drop_foreign_axes(result: xr.Dataset, other: xr.Dataset) -> xr.Dataset:
-    """Drop the parameters of laws that the other result lacks; other laws do not depend on them."""
-    own = {str(key) for dim in LAW_DIMS if dim in other.coords for key in np.ravel(other[dim].values)}
+    """Drop the parameters of laws that either result lacks; other laws do not depend on them."""
+    laws = [
+        {str(key) for dim in LAW_DIMS if dim in each.coords for key in np.ravel(each[dim].values)}
+        for each in (result, other)
+    ]
     names = {str(name): InputName.parse(name) for name in result.coords}
-    foreign = [name for name, parsed in names.items() if not {parsed.model, parsed.friction} <= own | {""}]
+    common = laws[0] & laws[1] | {""}
+    foreign = [name for name, parsed in names.items() if not {parsed.model, parsed.friction} <= common]
     return result.isel({name: 0 for name in foreign if name in result.dims}).drop_vars(foreign)
 
 
