@@ -174,6 +174,16 @@ def test_a_property_of_a_material_with_a_dot_in_its_name_is_extended(
 
 
 @pytest.mark.slow
+def test_a_material_whose_property_was_an_axis_before_a_ball_had_it_is_added(
+    stored_sweep: StoredSweep, tmp_path: Path
+) -> None:
+    config = DASHPOT + "[materials.hard]\nE = [2e9]\nnu = 0.3\nrho = 1000\n"
+    more = ['sweep.material=["soft", "hard"]', "materials.hard.E=[2e9, 3e9]"]
+    larger = impact.extend(stored_sweep(config), more)
+    assert_same_values(larger, single_sweep(config, more, tmp_path))
+
+
+@pytest.mark.slow
 def test_materials_are_extended_and_chosen_whatever_their_names(stored_sweep: StoredSweep, tmp_path: Path) -> None:
     hard = '[materials."a \\u007f \\"b\\""]\nE = 3e9\nnu = 0.3\nrho = 1000\n'
     config = DASHPOT + hard

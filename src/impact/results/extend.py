@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 from numpy.typing import NDArray
 
@@ -178,8 +179,8 @@ def _extended_config(
     for axis in config.axes:
         name = axis.name
         old_values = np.atleast_1d(old.inputs.values(name))
-        # an unknown property of a material has no value
-        if len(axis.columns) > 1 or axis.numbered or old_values.item(0) is None:
+        # a property of a material that no ball had is unknown
+        if len(axis.columns) > 1 or axis.numbered or pd.isna(old_values.item(0)):
             continue
         in_both, _ = match_labels([np.asarray(axis.columns[name])], [old_values])
         if len(in_both) < old_values.size:
