@@ -533,6 +533,17 @@ def test_cases_are_numbered_and_not_joined() -> None:
         check_layout(figure)
 
 
+def test_a_restitution_that_varies_along_two_axes_is_drawn_over_where_one_is_selected() -> None:
+    sweep = {"alpha": [0.2, 0.3], "v1": [0.5, 1.0], "m1": 1.0, "m2": 1.0, "K": 6e9}
+    result = impact.sweep({"models": "lankarani-nikravesh-1990", "sweep": sweep})
+    for sel, e in (({"alpha": 0.2}, (0.8, 0.9)), ({"v1": 0.5}, (0.85, 0.9))):
+        panel = single_panel(get_curve_data(result, "restitution", sel=sel))
+        assert panel.x_name == "e"
+        assert panel.joined
+        assert panel.curves[0].x == pytest.approx(e)
+        assert panel.curves[-1].y == pytest.approx(np.sort(result["e_out"].sel(sel).values.ravel()))
+
+
 def test_another_axis_can_be_drawn_over(wide: xr.Dataset) -> None:
     panel = single_panel(get_curve_data(wide, x="v1", sel={"e": 0.6}))
     assert panel.curves[0].x == (1.0, 2.0)

@@ -223,7 +223,9 @@ def complete(
     conditions = with_model(conditions_of(line.data, line.x), line.data, numbered=choice.equations)
     if heading and title != FIGURE_6:
         heading, conditions = title, ": ".join(filter(None, (heading, conditions)))
-    x_axis = {**x_axis_fields(line.coordinate), "joined": is_ordered(dataset, line.x), **x_axis}
+    # in the order of the result; e of an alpha has one axis only after a selection
+    joined = is_ordered(select(dataset, choice.sel or {}), line.x)
+    x_axis = {**x_axis_fields(line.coordinate), "joined": joined, **x_axis}
     panels = [replace(panel, **x_axis).with_log_axes(choice.log) for panel in panels]
     empty = {c.law: None for panel in panels for c in panel.curves if c.law and not np.isfinite(c.y).any()}
     without_value = tuple(f"{key}, which has no point here" for key in empty)
