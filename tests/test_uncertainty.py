@@ -216,6 +216,17 @@ def test_one_uncertain_input_explains_the_whole_variance() -> None:
     assert study["first_upper"].item() == study["total_upper"].item() == 1.0
 
 
+def test_the_reference_of_impulse_and_momentum_has_a_study_for_each_model() -> None:
+    config = {**hertz(n=64), "models": ["hertz", "exact-hysteresis"]}
+    config["sweep"] |= {"e": 0.5}
+    study, of_exact = (impact.sensitivity(config, of=of) for of in ("v1_reference", "v1_post"))
+    assert study["first"].dims == ("model", "input")
+    # exact-hysteresis delivers the requested restitution
+    for model in config["models"]:
+        indices = study["first"].sel(model=model)
+        np.testing.assert_allclose(indices, of_exact["first"].sel(model="exact-hysteresis"), atol=1e-6)
+
+
 def test_inputs_that_change_nothing_are_named_and_few_samples_are_noted(cli: Run, tmp_path: Path) -> None:
     (tmp_path / "c.toml").write_text(TEXT)
     words = ("sensitivity", "c.toml", "--set", "sweep.e.uniform=[0.3, 0.6]", "--set", "models='tsuji-1992'")

@@ -190,7 +190,8 @@ def sensitivity_of(plan: Plan, of: str, swept: xr.Dataset) -> xr.Dataset:
     config = plan.config
     assert config.design is not None
     inputs, n = list(config.distributions), config.design.n
-    outputs = swept[of].transpose("model", ..., SAMPLE)
+    # the reference is the same for each model
+    outputs = swept[of].broadcast_like(swept["model"]).transpose("model", ..., SAMPLE)
     others = [str(dim) for dim in outputs.dims if dim not in ("model", SAMPLE)]
     values = np.asarray(outputs.values, float).reshape(-1, len(inputs) + 2, n)
     result = sensitivity_template(plan, of, others)
