@@ -182,6 +182,9 @@ def test_the_spins_of_both_balls_are_drawn_where_both_turn(beads: xr.Dataset) ->
         ("omega1_post", "ω₁⁺"),
         ("omega2_post", "ω₂⁺"),
     ]
+    # also where their spins are constant
+    single = curves_of(beads.isel(angle=[6]), "spin", models=[TSUJI], frictions=[COULOMB], x="angle")
+    assert [curve.y for curve in of_pairs(single)] == [curve.y[6:7] for curve in of_pairs(both)]
     wall = BALLS | {"m2": math.inf, "R2": math.inf}
     result = sweep(models=[TSUJI], frictions=[COULOMB], friction={}, sweep=wall)
     one = curves_of(result, "spin")

@@ -10,7 +10,6 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from ..array_types import Array
 from ..contact.status import FIRST_FAILURE, FrictionStatus
 from ..contact.variables import OUTPUTS
 from ..errors import UsageError
@@ -66,7 +65,7 @@ def spin_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     # the spin of a wall need not be stored
     spins = [name for name in SPINS if name in dataset] or SPINS
     line, pairs = _pairs_along(dataset, choice, *spins)
-    turning = [name for name in spins if any(_varies(pair.data[name].values) for pair in pairs)] or [*spins[:1]]
+    turning = [n for n in spins if any(np.nan_to_num(pair.data[n].values).any() for pair in pairs)] or spins[:1]
     ends = dict(zip(SPINS, ("ω₁⁺", "ω₂⁺"), strict=True)) if len(turning) > 1 else {}
     curves = [c for name in turning for c in law_curves(pairs, line.coordinate, {name: ends.get(name, "")})]
     y_name = "omega_post" if ends else turning[0]
@@ -158,12 +157,6 @@ def _panel(line: Line, pairs: Sequence[LawPart], name: str, y_label: str, guides
 def _guide(x: ArrayLike, y: ArrayLike, text: str) -> Curve:
     """Make a thin line with a text at its end; y is a number, or one at each x."""
     return replace(curve_of(NamedLaw(""), x, y, ""), case=text, is_guide=True)
-
-
-def _varies(values: Array) -> bool:
-    """Whether an array has two different finite values."""
-    finite = values[np.isfinite(values)]
-    return bool((finite != finite[:1]).any())
 
 
 def _sticking_e_t(data: xr.Dataset) -> list[float]:
