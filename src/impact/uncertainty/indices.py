@@ -41,21 +41,17 @@ def indices_of(values: Array, seed: int | None = None) -> dict[str, Array]:
     >>> indices_of((x + y).reshape(1, 4, 4096))["first"].round(1)
     array([[0.5, 0.5]])
     """
-    outputs, blocks, n = values.shape
-    inputs = blocks - 2
-    estimates = np.empty((outputs, 2 * inputs))
-    resampled = np.empty((outputs, 0 if seed is None else RESAMPLES, 2 * inputs))
-    for output in range(outputs):
-        estimates[output] = _indices_from_means(_columns(values[output]).mean(axis=1))
+    n = values.shape[2]
+    estimates = np.stack([_indices_from_means(_columns(block).mean(axis=1)) for block in values])
+    resampled = np.empty((len(values), 0 if seed is None else RESAMPLES, estimates.shape[1]))
     # not the random numbers of the samples, which have the same seed
     random = np.random.default_rng(None if seed is None else [seed, 1])
     step = max(MAX_BLOCK // n, 1)
     for start in range(0, resampled.shape[1], step):
         drawn = [random.integers(0, n, n) for _ in range(start, min(start + step, RESAMPLES))]
         counts = np.stack([np.bincount(rows, minlength=n) for rows in drawn]) / n
-        for output in range(outputs):
-            means = counts @ _columns(values[output]).T
-            resampled[output, start : start + step] = _indices_from_means(means)
+        for block, of_block in zip(values, resampled, strict=True):
+            of_block[start : start + step] = _indices_from_means(counts @ _columns(block).T)
     lower = upper = np.full_like(estimates, np.nan)
     if seed is not None:
         ends = 0.5 - 0.5 * CONFIDENCE, 0.5 + 0.5 * CONFIDENCE
