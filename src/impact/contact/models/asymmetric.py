@@ -20,7 +20,7 @@ from .dashpot import dashpot
 def approach_dashpot(key: str, *, zeta: Formula, **about: Unpack[About]) -> ForceModel:
     """Make a law of a spring and a dashpot that acts on approach only, from the formula of its damping ratio."""
     about.setdefault("family", "asymmetric")
-    law = dashpot(key, zeta=zeta, release="gap", **about)
+    law = dashpot(key, zeta=zeta, **about)
     return replace(law, unloading=spring, oracle=approach_restitution)
 
 

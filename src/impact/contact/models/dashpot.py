@@ -38,7 +38,9 @@ def dashpot_force(elastic: Array, x: Array, v: Array, n: float, c: Array) -> Arr
     return dragged(elastic, power(x, drag_exponent(n)), v, c)
 
 
-def dashpot(key: str, *, zeta: Formula, release: Literal["gap", "force"], **about: Unpack[About]) -> ForceModel:
+def dashpot(
+    key: str, *, zeta: Formula, release: Literal["gap", "force"] = "gap", **about: Unpack[About]
+) -> ForceModel:
     """Make a law of a spring and a dashpot, from the formula of its damping ratio ζ = α/√(2(n+1)).
 
     >>> law = dashpot("mine", title="Mine", year=2026, equation="ζ = 1 − e", reference="", zeta=lambda e: 1 - e,
@@ -102,7 +104,6 @@ KELVIN_VOIGT = dashpot(
     ),
     parameters=DASHPOT_CONSTANT,
     zeta=lambda C, m, K: C / (2 * np.sqrt(m * K)),
-    release="gap",
     exponent=1.0,
 )
 
@@ -128,7 +129,6 @@ ANAGNOSTOPOULOS_1988 = dashpot(
         note="no source of the formula names the paper",
     ),
     zeta=gap_damping,
-    release="gap",
     exponent=1.0,
 )
 
@@ -161,7 +161,6 @@ TSUJI_1992 = dashpot(
         doi=DEMLAB_VISCOELASTIC,
     ),
     zeta=gap_damping,
-    release="gap",
     exponent=1.5,
 )
 
@@ -232,7 +231,6 @@ FENG_2026 = dashpot(
     "arXiv:2603.27764",
     evidence=Evidence("seen", "arXiv:2603.27764"),
     zeta=gap_damping,
-    release="gap",
 )
 
 EXACT_DASHPOT_NO_TENSION = dashpot(

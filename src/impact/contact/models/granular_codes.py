@@ -66,7 +66,6 @@ LIGGGHTS_HOOKE = linear_dashpot(
     evidence=Evidence("seen", OF_HOOKE[1]),
     parameters=CHARACTERISTIC_SPEED,
     zeta=gap_damping,
-    release="gap",
     stiffness=stiffness_by_speed,
 )
 
@@ -232,7 +231,6 @@ MFIX_HERTZ = hertzian_dashpot(
     reference="MFiX, DES_COLL_MODEL HERTZIAN, whose α has 2 in the place of √5",
     evidence=Evidence("seen", MFIX),
     zeta=lambda e: 2 / np.sqrt(5.0) * gap_damping(e),
-    release="gap",
 )
 
 # ---- Kratos
