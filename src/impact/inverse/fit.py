@@ -206,10 +206,9 @@ class FitProblem:
         """Whether there are more points than parameters, of the noise too."""
         return self.data.values.size > self.count + (self.data.noise != "given")
 
-    def predict(self, evaluate: Evaluate, u: Array, *, is_final: bool = False) -> Array:
+    def predict(self, evaluate: Evaluate, u: Array) -> Array:
         """Predict the measurements from rows u, shape (k, p) to (k, n)."""
-        final = self.final_function if is_final else None
-        return evaluate(final or self.function, self.bounds.values(u))
+        return evaluate(self.function, self.bounds.values(u))
 
     def scale(self, predicted: Array) -> Array:
         """Subtract the measurements from predictions, in given standard deviations, shape (..., n)."""
@@ -383,7 +382,8 @@ def final_jacobian(problem: FitProblem, evaluate: Evaluate, u: Array) -> tuple[A
     rows = np.tile(u, (4 * count + 1, 1))
     for parameter in range(count):
         rows[4 * parameter : 4 * parameter + 4, parameter] += offsets[parameter]
-    predicted = problem.predict(evaluate, np.clip(rows, 0.0, 1.0), is_final=True)
+    function = problem.final_function or problem.function
+    predicted = evaluate(function, problem.bounds.values(np.clip(rows, 0.0, 1.0)))
     jacobian = np.einsum("pk,pkn->np", weights, predicted[:-1].reshape(count, 4, predicted.shape[1]))
     return predicted[-1], jacobian
 

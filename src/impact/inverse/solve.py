@@ -85,7 +85,6 @@ SLOPE_STEP = 1e-6
 REFINED_TOLERANCE = 1e-7
 
 SolveStatus: TypeAlias = Literal["ok", "at_bound", "several_roots", "no_root"]
-Conditions: TypeAlias = tuple[Mapping[str, float | str], ...]
 
 
 @dataclass(frozen=True)
@@ -118,7 +117,7 @@ class SolveResult(Displayed):
     status: SolveStatus
     roots: tuple[Root, ...]
     attainable: tuple[float, float]
-    over: Conditions | None
+    over: tuple[Mapping[str, float | str], ...] | None
     friction: str = ""
 
     def as_dict(self) -> dict[str, Any]:
@@ -492,14 +491,7 @@ class SolveProblem:
             size = 1.0 / float(impacts.dimensionless(self.model, self.unknown.name)[0])
         return size if 0.0 < size < math.inf else 1.0
 
-    def result(
-        self,
-        target: float,
-        status: SolveStatus,
-        roots: Iterable[Root],
-        values: Array,
-        over: Conditions | None = None,
-    ) -> SolveResult:
+    def result(self, target: float, status: SolveStatus, roots: Iterable[Root], values: Array) -> SolveResult:
         """Make the result of roots, with the range of some values of the variable."""
         return SolveResult(
             model=self.model.key,
@@ -510,7 +502,7 @@ class SolveProblem:
             roots=tuple(roots),
             # to the digits of the scan
             attainable=(float(f"{np.nanmin(values):.6g}"), float(f"{np.nanmax(values):.6g}")),
-            over=over,
+            over=None,
             friction=self.friction,
         )
 
@@ -696,4 +688,4 @@ def _best_over_axis(problem: SolveProblem, target: float) -> SolveResult:
     )
     status: SolveStatus = "at_bound" if value in (problem.unknown.least, problem.unknown.most) else "ok"
     root = Root(value, float(outputs["e_out"].mean()))
-    return problem.result(target, status, (root,), outputs[problem.variable], over)
+    return replace(problem.result(target, status, (root,), outputs[problem.variable]), over=over)
