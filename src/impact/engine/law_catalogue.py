@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from itertools import groupby
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
-from ..contact.catalogue import look_up
+from ..contact.catalogue import Law, look_up
 from ..contact.dimensionless import delivered
 from ..contact.evidence import count_states
 from ..contact.friction import FrictionLaw
@@ -51,8 +51,6 @@ CAPS = {
     "spring": "the spring alone, without a dashpot where it slips",
     "both": "the spring, and spring and dashpot together",
 }
-
-Described = TypeVar("Described", bound=ForceModel | FrictionLaw)
 
 
 @dataclass(frozen=True)
@@ -169,16 +167,16 @@ def parameter_rows(table: str, parameters: Sequence[Parameter]) -> dict[str, str
     return rows
 
 
-class Laws(dict[str, Described], Displayed):
+class Laws(dict[str, Law], Displayed):
     """Laws by key, which a notebook shows as a table."""
 
     _noun: str
-    _describe: Callable[[Described], Displayed]
+    _describe: Callable[[Law], Displayed]
 
     def __repr__(self) -> str:
         return f"{len(self)} {self._noun}s: {', '.join(self)}"
 
-    def find(self, key: str) -> Described:
+    def find(self, key: str) -> Law:
         """Look up a law.
 
         Raises
@@ -367,9 +365,7 @@ def frictions(*, pattern: str = "*", search: str | None = None) -> Frictions:
     return Frictions(matching_laws(friction_catalogue(), "friction law", pattern, search))
 
 
-def matching_laws(
-    laws: Mapping[str, Described], noun: str, pattern: str, search: str | None
-) -> dict[str, Described]:
+def matching_laws(laws: Mapping[str, Law], noun: str, pattern: str, search: str | None) -> dict[str, Law]:
     """Select the laws whose keys match a pattern, and whose description has all words of a search.
 
     Raises
