@@ -167,7 +167,7 @@ class Interpolant:
         edges: Array | Sequence[float],
         floors: Array,
         max_divisions: int = MAX_DIVISIONS,
-        is_needed: Callable[[Array], bool] = lambda values: True,
+        is_needed: Callable[[Array], bool] | None = None,
     ) -> None:
         self.function, self.floors, self.max_divisions, self.is_needed = function, floors, max_divisions, is_needed
         bounds = np.asarray(edges, float).tolist()
@@ -243,7 +243,7 @@ class Interpolant:
         is_finite = np.isfinite(interval.values)
         # what fails in most of it, or near its ends, is not worth many divisions
         is_worth = is_finite.all() or (is_finite.mean() > 0.5 and interval.divisions < MAX_DIVISIONS)
-        return bool(is_worth) and self.is_needed(interval.values)
+        return bool(is_worth) and (self.is_needed is None or self.is_needed(interval.values))
 
 
 class InterpolatedCollisions:

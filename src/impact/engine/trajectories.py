@@ -14,12 +14,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..contact.deduplicate import deduplicate
 from ..contact.dimensionless import dimensionless_values, exponent_names
 from ..contact.friction import Pair, check_friction, friction_values
 from ..contact.frictions.multibody_codes import MUJOCO_ELLIPTIC
 from ..contact.impacts import CHECKS, Impacts, check_inputs
 from ..contact.model import ForceModel
-from ..contact.records import CollisionResult, Record, deduplicate
+from ..contact.records import CollisionResult, Record
 from ..contact.status import STATUS_OK
 from ..contact.tangential import TangentialResult
 from .build_impacts import build_impacts, build_oblique, fixed_steps_at

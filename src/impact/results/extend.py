@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import xarray as xr
 from numpy.typing import NDArray
 
@@ -179,8 +178,8 @@ def _extended_config(
     for axis in config.axes:
         name = axis.name
         old_values = np.atleast_1d(old.inputs.values(name))
-        # a property of a material that no ball had is unknown
-        if len(axis.columns) > 1 or axis.numbered or pd.isna(old_values.item(0)):
+        # a property of a material that no ball had is NaN
+        if len(axis.columns) > 1 or axis.numbered or old_values[0] != old_values[0]:
             continue
         in_both, _ = match_labels([np.asarray(axis.columns[name])], [old_values])
         if len(in_both) < old_values.size:
