@@ -210,6 +210,16 @@ def test_errors_of_the_solver_have_the_colour_of_no_error() -> None:
     assert mesh.get_clim() == (-1e-9, 1e-9)
 
 
+def test_a_constant_has_one_colour_and_one_height_whatever_its_last_digits() -> None:
+    sweep = {"e": 0.8, "v1": [0.1, 1.0, 2.0], "m1": 1.0, "m2": [1.0, 2.0, 3.0], "K": 6e9}
+    result = impact.sweep({"models": ["tsuji-1992"], "sweep": sweep})
+    assert 0.0 < abs(result["e_error"]).max() < 1e-9
+    picture = impact.plot(result, kind="map", variable="e_out").axes[0]
+    (mesh,) = (part for part in picture.collections if isinstance(part, QuadMesh))
+    for limits in (mesh.get_clim(), impact.plot(result, kind="restitution").axes[0].get_ylim()):
+        assert limits == pytest.approx((0.76, 0.84))
+
+
 def test_edges_lie_half_way_between_values() -> None:
     assert edges_of([1.0, 2.0, 6.0], log=False).tolist() == [0.5, 1.5, 4.0, 8.0]
     assert edges_of([1.0, 4.0, 64.0], log=True) == pytest.approx([0.5, 2.0, 16.0, 256.0])

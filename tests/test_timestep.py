@@ -238,6 +238,21 @@ def test_no_steps_are_tried_where_surfaces_part_later_than_a_collision_is_follow
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    ("model", "e", "tol"), [(LINEAR, 0.5, 0.01), ("bilinear", 0.744, 0.02), ("tsuji-1992", 0.671, 0.02)]
+)
+def test_every_step_below_the_needed_one_is_within_the_tolerance(model: str, e: float, tol: float) -> None:
+    """The error rises and falls with the fraction of a step in which a contact ends."""
+    needed = impact.timestep(model, at={"e": e}, tol=tol).needed
+    assert needed is not None
+    shares = np.random.default_rng(1).uniform(1.0, 3.0, 100)
+    rows = impact.timestep(model, at={"e": e}, dt=[needed.dt, *(needed.dt / shares).tolist()]).rows
+    assert max(max(row.e_largest - e, e - row.e_least) for row in rows) <= tol * e
+    # not many fewer are enough
+    rows = impact.timestep(model, at={"e": e}, dt=(needed.dt * np.linspace(1.0, 1.2, 50)).tolist()).rows
+    assert max(max(row.e_largest - e, e - row.e_least) for row in rows) > tol * e
+
+
 def test_a_step_that_cannot_be_changed_needs_a_time_constant(cli: Run) -> None:
     """At 2 ms MuJoCo delivers 0.7 at every phase from a time constant of about 0.225 s on, in 80 ms of contact."""
     words = ("timestep", "--model", "mujoco-solref", "--at", "e=0.7", "--at", "v1=1", "--tol", "1%")

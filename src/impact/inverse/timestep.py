@@ -72,6 +72,11 @@ NEARBY, MIN_SLOPE = 1.1, 1e-2
 SECANT_TOLERANCE, MAX_SECANTS = 1e-6, 20
 # a contact of more steps than this is none that a parameter is looked for
 MAX_SECANT_STEPS = 4096
+# the error rises and falls with the fraction of a step in which a contact ends: a number of steps is judged by so many
+# fractions and phases, which find at least this part of the largest error
+FRACTIONS, JUDGED_PHASES, FOUND_SHARE = np.arange(64) / 64, 64, 0.98
+# beyond the number that is found, up to this multiple of it, so many numbers are tried
+SCAN_RANGE, SCANNED = 3.0, 200
 # relative to the tolerance: an error of zero, for its logarithm
 EXACT_ERROR = 1e-300
 # e is kept within this distance
@@ -142,7 +147,7 @@ class TimestepRow:
 
 @dataclass(frozen=True)
 class NeededSteps:
-    """The smallest number of steps per contact with which every phase is within `tol`, and its dt [s]."""
+    """The number of steps per contact from which on every phase is within `tol`, and its dt [s]."""
 
     tol: float
     steps_per_contact: int
@@ -498,9 +503,9 @@ def compensated_e(law: FixedStepLaw, dt: Array) -> Array:
 def needed_steps(
     law: FixedStepLaw, tol: float, most: int = MAX_STEPS_PER_CONTACT, nearby: NeededSteps | None = None
 ) -> NeededSteps | None:
-    """Search for the smallest number of steps per contact with which every phase is within a tolerance.
+    """Search for the number of steps per contact from which on every phase is within a tolerance.
 
-    The search begins at the number that a similar law needs, which mostly is the answer.
+    The search begins at the number that a similar law needs. That every larger number is enough is tried for many.
     """
     e_continuous = law.continuous["e_out"]
     target = law.e if law.has_e else e_continuous
@@ -512,11 +517,13 @@ def needed_steps(
     if abs(e_continuous - target) >= tol * target or is_overdamped:
         return None
 
+    judged = replace(law, phases=JUDGED_PHASES)
+
     @cache
     def log_error(steps: int) -> float:
         """The logarithm of the largest error over the tolerance; inf where a phase has no rebound."""
-        (e,) = law.outputs(np.array([law.contact_time / steps]), "e_out")
-        error = float(np.abs(e - target).max()) / (tol * target)
+        (e,) = judged.outputs(law.contact_time / (steps + FRACTIONS), "e_out")
+        error = float(np.abs(e - target).max()) / (FOUND_SHARE * tol * target)
         return math.log(error or EXACT_ERROR) if math.isfinite(error) else math.inf
 
     upper, turn = 2 if nearby is None else min(max(nearby.steps_per_contact, 2), most), 0
@@ -534,7 +541,14 @@ def needed_steps(
         share = 1.0 / (1.0 - log_error(upper) / log_error(lower)) if is_known else 0.5
         middle = min(max(round(lower * (upper / lower) ** share), lower + 1), upper - 1)
         lower, upper = (lower, middle) if log_error(middle) <= 0.0 else (middle, upper)
-    return NeededSteps(tol, upper, law.contact_time / upper)
+    while upper <= most:
+        steps = upper * np.linspace(1.0, SCAN_RANGE, SCANNED)
+        (e,) = judged.outputs(law.contact_time / steps, "e_out")
+        beyond = steps[~(np.abs(e - target).max(axis=1) <= tol * target)]
+        if not beyond.size:
+            return NeededSteps(tol, upper, law.contact_time / upper)
+        upper = math.floor(beyond.max()) + 1
+    return None
 
 
 def missing_parameter(name: str, tol: float) -> str:

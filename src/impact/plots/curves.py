@@ -24,7 +24,7 @@ from ..formatting import NO_BREAK, heading
 from .data import MEASURED, LegendEntries, PlotData, Points, stacked
 from .labels import LawPart, NamedLaw, annotate_right_edge, label_axis, pretty_conditions, symbol, words_of
 from .slices import unit_of
-from .style import FAINT, SOFT, is_geometric, model_styles, tint
+from .style import FAINT, SOFT, is_geometric, limits_of, model_styles, tint
 
 # the colour of distances from zero, and its shares in those that are shaded, the widest first, and in lines
 BAND_COLOUR, BAND_SHARES, BAND_LINE_SHARE = "#0072B2", (0.08, 0.2), 0.65
@@ -191,6 +191,8 @@ class CurveData(PlotData):
             # the names of marks need room at the ends of the axes
             axes.margins(x=0.06 if panel.marks else 0.02, y=0.12 if panel.marks else None)
             axes.autoscale_view()
+            if not panel.y_log:
+                axes.set_ylim(limits_of(*axes.get_ylim()))
             _label_bands(axes, panel)
             _label_floor(axes, panel)
             _label_axes(axes, panel, labels, last=axes is all_axes[-1] or len(all_axes) == 1)

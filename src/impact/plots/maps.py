@@ -41,7 +41,7 @@ from .labels import (
 )
 from .layout import Picture
 from .slices import choose_plane, conditions_of, not_a_sweep, read, take_plane, unit_of
-from .style import is_geometric, model_styles, tint
+from .style import is_geometric, limits_of, model_styles, tint
 
 # a value at each y and x
 Plane = tuple[tuple[float, ...], ...]
@@ -200,7 +200,7 @@ class MapData(PlotData):
             least = MIN_DRAWN_DISTANCE if self.variable == "e_error" else 0.0
             top = max(abs(low), abs(top), least)
             low = -top
-        norm = Normalize(low, top) if low < top else Normalize(low - 0.5, low + 0.5)
+        norm = Normalize(*limits_of(low, top))
         return self._draw_values(axes, values, norm, "RdBu_r" if self.signed else "viridis")
 
     def _draw_closest(self, axes: Sequence[Axes], labels: Mapping[str, str]) -> tuple[QuadMesh, LegendEntries]:
@@ -365,13 +365,19 @@ def _map_data(
 def edges_of(values: Sequence[float], log: bool) -> Array:
     """Compute the edges of cells, half way between their values, of shape (values + 1,).
 
+    None is below 0 where all values are above it.
+
     >>> edges_of([0.0, 1.0, 3.0], log=False).tolist(), edges_of([1.0, 100.0], log=True).round(9).tolist()
     ([-0.5, 0.5, 2.0, 4.0], [0.1, 10.0, 1000.0])
+    >>> edges_of([1.0, 10.0], log=False).tolist()
+    [0.0, 5.5, 14.5]
     """
     centres = np.log(values) if log else np.asarray(values, float)
     middle = (centres[1:] + centres[:-1]) / 2.0
     edges = np.concatenate(([2.0 * centres[0] - middle[0]], middle, [2.0 * centres[-1] - middle[-1]]))
-    return np.asarray(np.exp(edges) if log else edges)
+    if log:
+        return np.asarray(np.exp(edges))
+    return np.maximum(edges, 0.0) if centres[0] > 0.0 else edges
 
 
 def _failed() -> dict[str, Any]:

@@ -44,6 +44,8 @@ METADATA: dict[str, dict[str, None]] = {
     "gif": {},
 }
 FRAMES_PER_SECOND = 20
+# values are equal that differ by less, relative to the largest
+FLAT = 1e-6
 # share of the colour of texts in what is less important
 SOFT, FAINT = 2 / 3, 8 / 15
 # all threads share matplotlib's settings and its parser of formulas: one draws at a time
@@ -131,6 +133,18 @@ def _next_free(choices: Sequence[Any], start: int, used: Counter[Any], refused: 
     """Choose the least used, the first from index `start` on; a refused one only if there is no other."""
     ordered = [choices[(start + step) % len(choices)] for step in range(len(choices))]
     return min(ordered, key=lambda choice: (choice in refused, used[choice]))
+
+
+def limits_of(low: float, high: float) -> tuple[float, float]:
+    """Choose the limits of an axis or of colours; values that differ by errors of the solver are a constant.
+
+    >>> limits_of(0.0, 0.8), limits_of(0.8, 0.8 + 2e-11)
+    ((0.0, 0.8), (0.76, 0.8400000000199999))
+    """
+    size = max(abs(low), abs(high))
+    if high - low > FLAT * size:
+        return low, high
+    return low - 0.05 * (size or 1.0), high + 0.05 * (size or 1.0)
 
 
 def is_geometric(values: np.ndarray) -> bool:
