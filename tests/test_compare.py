@@ -370,6 +370,22 @@ def test_with_subset_a_parameter_axis_of_a_model_outside_the_subset_is_ignored(w
     assert ("physics config", GAMMA) in _faults(impact.compare(both, wide.isel({GAMMA: 0}), subset=True))
 
 
+def test_an_axis_that_a_model_outside_the_subset_shares_is_compared_at_all_points() -> None:
+    law, mass = {"kelvin-voigt": {"C": [1.0, 2.0, 3.0]}}, {"m1": [1.0, 2.0, 3.0]}
+    sweep = {"e": 0.5, "v1": 1.0, "m2": 2.0, "R1": 0.1, "R2": 0.1, "material": "steel"} | mass
+    zipped = sweep | {"zip": [["model.kelvin-voigt.C", "m1"]]}
+    both = impact.sweep({"models": ["kelvin-voigt", "hunt-crossley-1975"], "sweep": zipped, "model": law})
+    alone = impact.sweep({"models": "hunt-crossley-1975", "sweep": sweep})
+    for other in (alone, both.sel(model=["hunt-crossley-1975"])):
+        for new, baseline in ((other, both), (both, other)):
+            verdict = impact.compare(new, baseline, subset=True)
+            assert verdict.equal, verdict
+            assert verdict.variables[0].points == 3
+        changed = _with(other, "e_out", 9.0, **{str(dim): -1 for dim in other["e_out"].dims})
+        (difference,) = impact.compare(changed, both, subset=True).differing
+        assert difference.at["m1"] == 3.0
+
+
 # values and their tolerances, computed by hand
 
 SCALES = {

@@ -115,7 +115,11 @@ def _drop_foreign_axes(result: xr.Dataset, other: xr.Dataset) -> xr.Dataset:
     names = {str(name): InputName.parse(name) for name in result.coords}
     common = laws[0] & laws[1] | {""}
     foreign = [name for name, parsed in names.items() if not {parsed.model, parsed.friction} <= common]
-    return result.isel({name: 0 for name in foreign if name in result.dims}).drop_vars(foreign)
+    for axis in [name for name in foreign if name in result.dims]:
+        # an axis that has inputs of other laws as well is theirs
+        shared = [name for name in columns_along(result, axis) if name not in foreign]
+        result = result.swap_dims({axis: shared[0]}) if shared else result.isel({axis: 0})
+    return result.drop_vars(foreign)
 
 
 def _comparable_coordinates(result: xr.Dataset, other: xr.Dataset) -> xr.Dataset:
