@@ -69,8 +69,9 @@ def test_a_value_of_e_takes_the_steps_of_the_page_in_their_order(tmp_path: Path)
 
 
 def code_of(name: str) -> object:
-    """The code of a function, or of the initialiser or the values of a class."""
+    """The code of a function, or of what makes a class or its values."""
     module, _, attribute = name.rpartition(".")
     value = getattr(import_module(module), attribute)
-    value = getattr(value, "values", value.__init__) if isinstance(value, type) else value
+    if isinstance(value, type):
+        value = value.__new__ if issubclass(value, tuple) else getattr(value, "values", value.__init__)
     return value.__code__
