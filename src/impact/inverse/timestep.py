@@ -72,8 +72,8 @@ NEARBY, MIN_SLOPE = 1.1, 1e-2
 SECANT_TOLERANCE, MAX_SECANTS = 1e-6, 20
 # a contact of more steps than this is none that a parameter is looked for
 MAX_SECANT_STEPS = 4096
-# the error rises and falls with the fraction of a step in which a contact ends: a number of steps is judged by so many
-# fractions and phases, which find at least this part of the largest error
+# the error rises and falls with the fraction of a step in which a contact ends: a number of steps is judged by so
+# many fractions and phases, which find at least this part of the largest error
 FRACTIONS, JUDGED_PHASES, FOUND_SHARE = np.arange(64) / 64, 64, 0.98
 # beyond the number that is found, up to this multiple of it, so many numbers are tried
 SCAN_RANGE, SCANNED = 3.0, 200
