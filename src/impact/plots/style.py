@@ -138,8 +138,8 @@ def _next_free(choices: Sequence[Any], start: int, used: Counter[Any], refused: 
 def limits_of(low: float, high: float) -> tuple[float, float]:
     """Choose the limits of an axis or of colours; values that differ by errors of the solver are a constant.
 
-    >>> limits_of(0.0, 0.8), limits_of(0.8, 0.8 + 2e-11)
-    ((0.0, 0.8), (0.76, 0.8400000000199999))
+    >>> limits_of(0.0, 0.8), [round(end, 9) for end in limits_of(0.8, 0.8 + 2e-11)]
+    ((0.0, 0.8), [0.76, 0.84])
     """
     size = max(abs(low), abs(high))
     if high - low > FLAT * size:
