@@ -26,6 +26,7 @@ import xarray as xr
 import impact
 from impact.atomic import atomic_write
 from impact.cli.main import app
+from impact.config.tables import Output
 from impact.errors import ResultError, StoreError, UsageError
 from impact.plots.differences import difference_data, draw_differences
 from impact.results.xarray_backend import write_sealed
@@ -780,9 +781,8 @@ def test_a_rerun_with_a_changed_plug_in_has_a_note(forked: ForkServer, plugin: P
 def _save_unchecked(dataset: xr.Dataset, path: Path) -> None:
     """A sealed file, which `impact.save` might refuse to write."""
     with atomic_write(path, overwrite=True) as sink:
-        write_sealed(
-            sink, dataset, ((str(name), (), variable.values) for name, variable in dataset.data_vars.items())
-        )
+        values = ((str(name), (), variable.values) for name, variable in dataset.data_vars.items())
+        write_sealed(sink, path, dataset, values, Output())
 
 
 def test_a_rerun_of_a_result_with_an_invalid_config_is_refused(forked: ForkServer, tmp_path: Path) -> None:
