@@ -262,6 +262,16 @@ def test_every_step_below_the_needed_one_is_within_the_tolerance(model: str, e: 
     assert max(max(row.e_largest - e, e - row.e_least) for row in rows) > tol * e
 
 
+def test_a_law_that_is_nearly_a_tolerance_off_needs_many_steps() -> None:
+    at = {"e": 0.95}
+    law = impact.timestep("lankarani-nikravesh-1990", at=at, steps_per_contact=[100])
+    tol = 1.005 * abs(law.e_continuous - 0.95) / 0.95
+    needed = impact.timestep("lankarani-nikravesh-1990", at=at, tol=tol).needed
+    assert needed is not None
+    (row,) = impact.timestep("lankarani-nikravesh-1990", at=at, dt=[needed.dt]).rows
+    assert max(row.e_largest - 0.95, 0.95 - row.e_least) <= 0.95 * tol
+
+
 def test_a_step_that_cannot_be_changed_needs_a_time_constant(cli: Run) -> None:
     """At 2 ms MuJoCo delivers 0.7 at every phase from a time constant of about 0.235 s on, in 84 ms of contact."""
     words = ("timestep", "--model", "mujoco-solref", "--at", "e=0.7", "--at", "v1=1", "--tol", "1%")

@@ -109,11 +109,11 @@ def collide(
         return outputs(model, impacts, result, names, checked)
     pair, inputs = oblique
     with np.errstate(all="ignore"):
-        own = np.where(checked == STATUS_OK, check_friction(pair, inputs), checked).astype(np.int8)
-    shape = np.broadcast_shapes(impacts.n.shape, own.shape, *(column.shape for column in columns.values()))
-    n, own = np.broadcast_to(impacts.n, shape), np.broadcast_to(own, shape)
+        status = np.where(checked == STATUS_OK, check_friction(pair, inputs), checked).astype(np.int8)
+    shape = np.broadcast_shapes(impacts.n.shape, status.shape, *(column.shape for column in columns.values()))
+    n, status = np.broadcast_to(impacts.n, shape), np.broadcast_to(status, shape)
     columns = {name: np.broadcast_to(column, shape) for name, column in columns.items()}
-    tangential = simulate_friction(pair, n, columns, own, errors=errors, recorded=recorded_slip, **settings)
+    tangential = simulate_friction(pair, n, columns, status, errors=errors, recorded=recorded_slip, **settings)
     return outputs(model, impacts, result, names, checked, (inputs, tangential, pair.friction.kind))
 
 

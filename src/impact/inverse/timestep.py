@@ -514,16 +514,16 @@ def needed_steps(
     # the surfaces of an overdamped contact part later than a collision at a step is followed
     is_overdamped = law.continuous["separation_time"] > MAX_CONTACTS * law.contact_time
     # no step does what the continuous law does not
-    if abs(e_continuous - target) >= tol * target or is_overdamped:
+    room = tol * target - abs(e_continuous - target)
+    if room <= 0.0 or is_overdamped:
         return None
-
-    judged = replace(law, phases=JUDGED_PHASES)
+    judged, allowed = replace(law, phases=JUDGED_PHASES), tol * target - (1.0 - FOUND_SHARE) * room
 
     @cache
     def log_error(steps: int) -> float:
-        """The logarithm of the largest error over the tolerance; inf where a phase has no rebound."""
+        """The logarithm of the largest error over what is allowed; inf where a phase has no rebound."""
         (e,) = judged.outputs(law.contact_time / (steps + FRACTIONS), "e_out")
-        error = float(np.abs(e - target).max()) / (FOUND_SHARE * tol * target)
+        error = float(np.abs(e - target).max()) / allowed
         return math.log(error or EXACT_ERROR) if math.isfinite(error) else math.inf
 
     upper, turn = 2 if nearby is None else min(max(nearby.steps_per_contact, 2), most), 0
