@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import re
 import shlex
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -82,6 +84,26 @@ def test_the_law_of_a_ramped_dashpot_meets_the_contract(cli: Run, folder: Path) 
         {"models": list(parameters), "sweep": balls, "model": parameters}, plugins=[folder / "ramped.py"]
     )
     assert both["e_out"].values[0] == pytest.approx(both["e_out"].values[1], abs=1e-5)
+
+
+@pytest.mark.parametrize("frictions", [(), ("liggghts-history",)], ids=["central", "oblique"])
+def test_an_end_at_zero_force_just_before_zero_indentation_is_located(
+    folder: Path, frictions: tuple[str, ...]
+) -> None:
+    # a weak dashpot that is linear near first contact: the force vanishes at an indentation of up to (C/d)^2
+    (law,) = read_plugins([folder / "ramped.py"]).models
+    law = replace(law, coordinate_power=6)
+    table: dict[str, object] = {"v1": 1.0, "m1": 1.0, "m2": math.inf, "K": 6e7}
+    config: dict[str, object] = {
+        "models": [law.key],
+        "sweep": table,
+        "model": {law.key: {"C": {"geomspace": [1e-3, 1e4, 100]}, "d": 1e-3}},
+    }
+    if frictions:
+        table |= {"e": 0.7, "R1": 0.05, "angle": "5 deg", "mu": 0.1}
+        config |= {"frictions": list(frictions), "friction": {key: {"kt_over_kn": 0.8} for key in frictions}}
+    result = impact.sweep(config, plugins=[law])
+    assert set(result["friction_status" if frictions else "status"].values.flat) == {1}
 
 
 def test_the_check_of_a_law_reports_each_clause(cli: Run, tmp_path: Path) -> None:

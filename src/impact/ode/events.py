@@ -75,7 +75,8 @@ def at_event(
     """
     located = near & (np.abs(remaining) <= EVENT_RTOL * h + EVENT_ATOL)
     crossed = (g < 0.0) & np.logical_not(located)
-    shorter = h + offset
+    # the zero of the linear step, where that of the cubic is not: the formula of the function may have changed
+    shorter = h + choose(near, offset + remaining, offset)
     shorter = choose((shorter > 0.0) & (shorter < h), shorter, 0.5 * h)
     return located, crossed, choose(crossed, shorter, h_next)
 
