@@ -155,6 +155,8 @@ BAD = [
      ["x.toml:4: sweep.e: got linspace and arange, expected one of linspace = [first, last, count], " "geomspace = [first, last, count], arange = [first, stop, step]"]),
     ("e = 0.5", "e = { linspac = [0, 1, 3] }",
      ['x.toml:4: sweep.e.linspac: unknown key; did you mean "linspace"?']),
+    ("e = 0.5", "e = { logspace = [0, 1, 3] }",
+     ['x.toml:4: sweep.e.logspace: unknown key; did you mean "geomspace"?']),
     ("e = 0.5", "e = { linspace = [0, 1] }",
      ["x.toml:4: sweep.e.linspace: got a list of 2, expected [first, last, count]"]),
     ("e = 0.5", "e.arange = 3", ["x.toml:4: sweep.e.arange: got 3, expected [first, stop, step]"]),

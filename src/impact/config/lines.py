@@ -43,6 +43,7 @@ KEY_SYNONYMS = {
     "friction": "mu",
     "friction_coefficient": "mu",
     "impact_angle": "angle",
+    "logspace": "geomspace",
 }
 WORDS_OF_BALLS = {
     "mass": "m",
