@@ -44,7 +44,6 @@ def notes(collision: Collision) -> Lines:
 
 
 CODE = Code(
-    name="adams",
     title="Adams, IMPACT",
     laws={"adams-impact": "IMPACT"},
     newest="MD R2",

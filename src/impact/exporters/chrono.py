@@ -171,7 +171,6 @@ def warnings(collision: Collision) -> Lines:
 
 
 CODE = Code(
-    name="chrono",
     title="Project Chrono, SMC",
     laws={
         key: f"{system}, {force}" + ("" if of_material else ", kn and gn")

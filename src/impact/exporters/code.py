@@ -137,7 +137,7 @@ class Code:
 
     Parameters
     ----------
-    name, title : on the command line, and in words
+    name, title : on the command line, that of its module, which the registry enters; and in words
     laws : what the code calls each of its laws, by key of the catalogue; the first is the default
     newest : the newest release whose laws were seen, taken where the code is not installed
     tested : what was run, or what was read instead
@@ -161,7 +161,6 @@ class Code:
     suffix, program : of the file of a script, and what runs it; None without one
     """
 
-    name: str
     title: str
     laws: Mapping[str, str]
     newest: str
@@ -180,6 +179,7 @@ class Code:
     has_friction: Callable[[str, str], bool] = lambda key, friction: True
     shortens_arms: bool = False
     wall_inputs: Callable[[str, str, Mapping[str, float]], Mapping[str, float]] = lambda key, version, values: {}
+    name: str = ""
     suffix: str = ".py"
     program: Program | None = None
 

@@ -122,7 +122,6 @@ def warnings(collision: Collision) -> Lines:
 
 
 CODE = Code(
-    name="drake",
     title="Drake",
     laws={
         "drake-point-contact": "point contact, one material",

@@ -61,7 +61,6 @@ def notes(collision: Collision) -> Lines:
 
 
 CODE = Code(
-    name="exudyn",
     title="EXUDYN",
     laws={key: f"impactModel {number}" for key, number in IMPACT_MODELS.items()},
     newest="1.13.6",

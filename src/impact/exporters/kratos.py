@@ -210,7 +210,6 @@ def notes(collision: Collision) -> Lines:
 
 
 CODE = Code(
-    name="kratos",
     title="Kratos DEM",
     laws=LAWS,
     newest="10.4.4",

@@ -282,7 +282,6 @@ def warnings(collision: Collision) -> Lines:
 
 
 CODE = Code(
-    name="lammps",
     title="LAMMPS, pair style granular",
     laws={key: f"{spring}, damping {damping}{limit}" for key, (spring, damping, limit) in OPTIONS.items()},
     newest="20250722",

@@ -164,7 +164,6 @@ PROGRAM = Program(
     lambda program, file: (program, "-in", file, "-log", "none"),
 )
 CODE = Code(
-    name="liggghts",
     title="LIGGGHTS, pair style gran",
     laws={key: f"model {model}{options}" for key, (model, options) in OPTIONS.items()},
     newest="3.8.0",

@@ -58,7 +58,6 @@ def notes(collision: Collision) -> Lines:
 
 
 CODE = Code(
-    name="mercurydpm",
     title="MercuryDPM",
     laws=SPECIES,
     newest="1.0 (trunk of July 2024)",

@@ -28,7 +28,6 @@ def notes(collision: Collision) -> Lines:
 
 
 CODE = Code(
-    name="modelica",
     title="Modelica Standard Library, ElastoGap",
     laws={"modelica-elastogap": "ElastoGap"},
     newest="4.1.0",

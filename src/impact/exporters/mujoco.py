@@ -133,7 +133,6 @@ def warnings(collision: Collision) -> Lines:
 
 
 CODE = Code(
-    name="mujoco",
     title="MuJoCo",
     laws={"mujoco-solref": "solref, standard format", "mujoco-solref-direct": "solref, direct format"},
     newest="4.0.0",

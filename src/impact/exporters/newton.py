@@ -93,7 +93,6 @@ def notes(collision: Collision) -> Lines:
 
 
 CODE = Code(
-    name="newton",
     title="Newton, SolverSemiImplicit",
     laws={"newton-semi-implicit": "ke and kd of ShapeConfig"},
     newest="1.8.0",

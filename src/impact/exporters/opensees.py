@@ -93,7 +93,6 @@ def notes(collision: Collision) -> Lines:
 
 
 CODE = Code(
-    name="opensees",
     title="OpenSees",
     laws={key: f'uniaxialMaterial "{name}"' for key, name in MATERIALS.items()},
     newest="3.7.1.2",

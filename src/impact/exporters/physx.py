@@ -35,7 +35,6 @@ def notes(collision: Collision) -> Lines:
 
 
 CODE = Code(
-    name="physx",
     title="PhysX, Isaac Sim and Isaac Lab",
     laws={"kelvin-voigt-no-tension": "compliant contact"},
     newest="5.6.1",

@@ -80,7 +80,6 @@ def notes(collision: Collision) -> Lines:
 
 
 CODE = Code(
-    name="pybullet",
     title="PyBullet",
     laws={"kelvin-voigt-no-tension": "contactStiffness and contactDamping"},
     newest="3.2.7",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from importlib import import_module
 
 from ..errors import UsageError, did_you_mean
@@ -15,7 +16,9 @@ MODULES = (
     # text only
     "chrono mercurydpm modelica adams simscape physx"
 )
-CODES: dict[str, Code] = {name: import_module(f".{name}", __package__).CODE for name in MODULES.split()}
+CODES: dict[str, Code] = {
+    name: replace(import_module(f".{name}", __package__).CODE, name=name) for name in MODULES.split()
+}
 
 
 def find_code(name: str) -> Code:

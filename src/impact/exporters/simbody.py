@@ -5,10 +5,6 @@ from __future__ import annotations
 from .code import Code, Collision, Lines, Parameters
 from .programs import python_package
 
-LAWS = {
-    "simbody-hunt-crossley": "HuntCrossleyForce, equal materials",
-    "simbody-hunt-crossley-mixed": "HuntCrossleyForce, two materials",
-}
 TEMPLATE = '''\
 import opensim
 
@@ -93,9 +89,11 @@ def notes(collision: Collision) -> Lines:
 
 
 CODE = Code(
-    name="simbody",
     title="Simbody in OpenSim",
-    laws=LAWS,
+    laws={
+        "simbody-hunt-crossley": "HuntCrossleyForce, equal materials",
+        "simbody-hunt-crossley-mixed": "HuntCrossleyForce, two materials",
+    },
     newest="4.6",
     tested="scripts were run in OpenSim 4.6, RungeKutta3 with a fixed step",
     parameters=parameters,

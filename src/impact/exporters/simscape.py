@@ -57,7 +57,6 @@ def warnings(collision: Collision) -> Lines:
 
 
 CODE = Code(
-    name="simscape",
     title="Simscape Multibody, Spatial Contact Force",
     laws={"simscape-contact": "Smooth Spring-Damper"},
     newest="R2019b",

@@ -10,16 +10,6 @@ from ..errors import UsageError
 from .code import Code, Collision, Lines, Parameters, keyword_arguments
 from .programs import Program, printed_version
 
-LAWS = {
-    "yade-en": "Law2_ScGeom_MindlinPhys_Mindlin, en",
-    "yade-en-clamped": "Law2_ScGeom_MindlinPhys_Mindlin, en before 2023.02a",
-    "yade-en-pulling": "Law2_ScGeom_MindlinPhys_Mindlin, en before September 2013",
-    "yade-betan": "Law2_ScGeom_MindlinPhys_Mindlin, betan by the formula of a linear spring",
-    "yade-betan-pulling": "Law2_ScGeom_MindlinPhys_Mindlin, the same before September 2013",
-    "yade-betan-direct": "Law2_ScGeom_MindlinPhys_Mindlin, betan",
-    "yade-viscoelastic": "Law2_ScGeom_ViscElPhys_Basic, kn and cn",
-    "yade-viscoelastic-pulling": "Law2_ScGeom_ViscElPhys_Basic, kn and cn before January 2014",
-}
 # the law of each option by the release, or month, that it begins with; the oldest first
 HISTORY = (
     (("", "yade-en-pulling"), ("2013.09", "yade-en-clamped"), ("2023.02a", "yade-en")),
@@ -63,10 +53,6 @@ omega1, omega2 = {{ each("ball.state.angVel[2]", "ball in O.bodies", "0.0") }}
 {% endif %}
 {{ print_beta }}print("e_out =", (v2 - v1) / {{ v0 }})
 """
-FRICTIONS = {
-    "yade-mindlin": "Law2_ScGeom_MindlinPhys_Mindlin, betas",
-    "yade-viscoelastic": "Law2_ScGeom_ViscElPhys_Basic, ks and cs",
-}
 # the laws that a friction law is combined with; beside en, betas is ignored
 LAWS_WITH = {"yade-mindlin": "yade-betan", "yade-viscoelastic": "yade-viscoelastic"}
 
@@ -186,9 +172,17 @@ PROGRAM = Program(
     lambda program, file: (program, "-j1", "-n", "-x", file),
 )
 CODE = Code(
-    name="yade",
     title="YADE",
-    laws=LAWS,
+    laws={
+        "yade-en": "Law2_ScGeom_MindlinPhys_Mindlin, en",
+        "yade-en-clamped": "Law2_ScGeom_MindlinPhys_Mindlin, en before 2023.02a",
+        "yade-en-pulling": "Law2_ScGeom_MindlinPhys_Mindlin, en before September 2013",
+        "yade-betan": "Law2_ScGeom_MindlinPhys_Mindlin, betan by the formula of a linear spring",
+        "yade-betan-pulling": "Law2_ScGeom_MindlinPhys_Mindlin, the same before September 2013",
+        "yade-betan-direct": "Law2_ScGeom_MindlinPhys_Mindlin, betan",
+        "yade-viscoelastic": "Law2_ScGeom_ViscElPhys_Basic, kn and cn",
+        "yade-viscoelastic-pulling": "Law2_ScGeom_ViscElPhys_Basic, kn and cn before January 2014",
+    },
     newest="2023.02a",
     tested="scripts were run in YADE 2023.02a",
     scheme="kick-drift",
@@ -198,7 +192,10 @@ CODE = Code(
     read_version=read_version,
     notes=notes,
     template=TEMPLATE,
-    frictions=FRICTIONS,
+    frictions={
+        "yade-mindlin": "Law2_ScGeom_MindlinPhys_Mindlin, betas",
+        "yade-viscoelastic": "Law2_ScGeom_ViscElPhys_Basic, ks and cs",
+    },
     # betas is ignored beside en
     has_friction=lambda key, friction: key.startswith(LAWS_WITH[friction]),
     shortens_arms=True,
