@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal, get_args
 
 from ..errors import ModelError
@@ -47,6 +48,10 @@ class Evidence:
         source = f" in {self.source}" if self.state == "seen" else f": {self.source}" if self.source else ""
         doi = f"; DOI seen in {self.doi}" if self.doi else ""
         return self.state + source + doi + (f"; {self.note}" if self.note else "")
+
+
+# evidence in each state
+seen, derived, disputed, not_verified = (partial(Evidence, state) for state in EVIDENCE_STATES)
 
 
 def count_states(evidence: Iterable[Evidence]) -> str:

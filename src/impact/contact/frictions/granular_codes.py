@@ -6,7 +6,7 @@ import re
 from dataclasses import replace
 from typing import Any
 
-from ..evidence import Evidence
+from ..evidence import seen
 from ..fixed_step import KICK_DRIFT
 from ..friction import FrictionLaw
 from ..model import Parameter
@@ -31,7 +31,7 @@ def lammps(
         year=2019,
         equation=equation,
         reference=f"{LAMMPS_REFERENCE} {option}{hint}",
-        evidence=Evidence("seen", source, note=YEAR_NOT_SEEN),
+        evidence=seen(source, note=YEAR_NOT_SEEN),
         damping="xt",
         parameters=(*stiffness, XT, limit("abs")),
         **fields,
@@ -76,8 +76,7 @@ LAMMPS_CLASSIC = replace(
     equation="f = k_t a ξ + xₜ c_n g,  ξ̇ = g,  |f| ≤ μ |F|, where it slips ξ = (f − xₜ c_n g)/k_t, without a, so "
     "that f depends on the unit of length",
     reference="LAMMPS, fix wall/gran, linear_history_classic and mindlin_classic",
-    evidence=Evidence(
-        "seen",
+    evidence=seen(
         LAMMPS,
         note="that version has neither the a of hooke/history nor the a left out; both were found in runs of the "
         "release of 22 July 2025",
@@ -107,8 +106,7 @@ LIGGGHTS_HISTORY = FrictionLaw(
     f"f = μ |F|,  {LIGGGHTS_DAMPING}",
     reference="LIGGGHTS-PUBLIC, tangential history",
     kind="spring",
-    evidence=Evidence(
-        "seen",
+    evidence=seen(
         f"{LIGGGHTS}tangential_model_history.h, {LIGGGHTS_NORMAL_MODELS}",
         note="also @25fc3965; tangential_reduce is ktToKnUser there, with the number 0.285714286",
     ),
@@ -131,7 +129,7 @@ LIGGGHTS_NO_HISTORY = FrictionLaw(
     equation=f"f = min(c |g|, μ |F|) sgn g,  {LIGGGHTS_DAMPING}",
     reference="LIGGGHTS-PUBLIC, tangential no_history",
     kind="dashpot",
-    evidence=Evidence("seen", f"{LIGGGHTS}tangential_model_no_history.h, {LIGGGHTS_NORMAL_MODELS}"),
+    evidence=seen(f"{LIGGGHTS}tangential_model_no_history.h, {LIGGGHTS_NORMAL_MODELS}"),
     parameters=(KT_OVER_KN, DAMPING_SWITCH, limit("abs")),
     stiffness="liggghts",
     damping="liggghts",
@@ -148,8 +146,7 @@ YADE_MINDLIN = FrictionLaw(
     equation=f"f = f_e + c g,  ḟ_e = 8 G* a g,  c = 2 β_s √(8 G* a m),  {YADE_LIMIT}",
     reference="YADE, Law2_ScGeom_MindlinPhys_Mindlin, without adhesion",
     kind="spring",
-    evidence=Evidence(
-        "seen",
+    evidence=seen(
         f"{YADE_2025}, HertzMindlin.cpp",
         note="betas is by default −ln e/√(π² + ln² e) here, in YADE the betan of its contact force",
     ),
@@ -170,7 +167,7 @@ YADE_VISCOELASTIC = FrictionLaw(
     equation=f"f = k_t ξ + c_t g,  ξ̇ = g,  {YADE_LIMIT.replace('f_e', 'k_t ξ')}",
     reference="YADE, Law2_ScGeom_ViscElPhys_Basic, ks and cs",
     kind="spring",
-    evidence=Evidence("seen", f"{YADE_2025}, ViscoelasticPM.cpp", note="the year is that of its contact force"),
+    evidence=seen(f"{YADE_2025}, ViscoelasticPM.cpp", note="the year is that of its contact force"),
     parameters=(
         *CONSTANT_STIFFNESS,
         Parameter("c_t", "N s/m", "tangential damping", default=0.0, least=0.0),
@@ -192,8 +189,7 @@ KRATOS_VISCOUS_COULOMB = FrictionLaw(
     "|f_e| ≤ μ max(F, 0), |f| ≤ μ max(F, 0)",
     reference="Kratos DEM, DEM_D_Hertz_viscous_Coulomb and DEM_D_Linear_viscous_Coulomb",
     kind="spring",
-    evidence=Evidence(
-        "seen",
+    evidence=seen(
         f"{KRATOS}, custom_constitutive/DEM_D_Hertz_viscous_Coulomb_CL.cpp @03f57bf0, "
         "DEM_D_Linear_viscous_Coulomb_CL.cpp @013f9253 and DEM_D_Linear_viscous_Coulomb_CL.h @016af01b",
         note="for STATIC_FRICTION = DYNAMIC_FRICTION; a spring beyond the limit is not cut back while the dashpot "

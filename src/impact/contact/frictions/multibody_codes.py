@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...array_types import Array
-from ..evidence import Evidence
+from ..evidence import seen
 from ..fixed_step import MUJOCO_CONE
 from ..friction import FrictionLaw
 from ..model import Parameter
@@ -32,8 +32,7 @@ DRAKE_REGULARIZED = FrictionLaw(
     "y = |g|/v_s,  S(t) = t³(10 − 15 t + 6 t²)",
     reference="Drake, MultibodyPlant with time_step 0",
     kind="regularized",
-    evidence=Evidence(
-        "seen",
+    evidence=seen(
         "RobotLocomotion/drake, multibody/plant/multibody_plant.cc @b6a7cfc8, StribeckModel, and "
         "multibody_plant_config.h @007f5fc9, the default of v_s",
         note="its first year was not seen",
@@ -54,7 +53,7 @@ SIMBODY_HUNT_CROSSLEY = FrictionLaw(
     reference=SIMBODY_FORCE.reference,
     doi=SIMBODY_FORCE.doi,
     kind="regularized",
-    evidence=Evidence("seen", f"{SIMBODY}; also @178eb211", doi=SIMBODY_FORCE.evidence.doi),
+    evidence=seen(f"{SIMBODY}; also @178eb211", doi=SIMBODY_FORCE.evidence.doi),
     parameters=(
         Parameter(
             "v_t", "m/s", "transition velocity, the slip of the largest friction", default=0.01, least=1e-12
@@ -77,8 +76,7 @@ MUJOCO_ELLIPTIC = FrictionLaw(
     reference=MUJOCO_SOLREF.reference,
     kind="cone",
     doi=MUJOCO_SOLREF.doi,
-    evidence=Evidence(
-        "seen",
+    evidence=seen(
         "google-deepmind/mujoco, src/engine/engine_core_constraint.c @00010f58",
         doi=MUJOCO_SOLREF.evidence.doi,
         note="the closed form for one contact was derived from it, and agrees with runs of MuJoCo 4.0.0",

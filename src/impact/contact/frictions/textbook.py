@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ..evidence import Evidence
+from ..evidence import not_verified, seen
 from ..friction import FrictionLaw
 from ..model import Parameter
 from ..models.cited_sources import DEMLAB_VISCOELASTIC, YADE_2025
@@ -46,7 +46,7 @@ COULOMB_1785 = FrictionLaw(
     equation="f = μ N sgn g until g = 0, then 0",
     reference="Coulomb CA (1785) Théorie des machines simples. Mém. Math. Phys. Acad. R. Sci. 10, 161",
     kind="coulomb",
-    evidence=Evidence("not verified", note="the memoir was not seen; the law is that of textbooks"),
+    evidence=not_verified(note="the memoir was not seen; the law is that of textbooks"),
     parameters=(limit("abs"),),
 )
 
@@ -59,8 +59,7 @@ CUNDALL_STRACK_1979 = FrictionLaw(
     "29, 47",
     doi="10.1680/geot.1979.29.1.47",
     kind="spring",
-    evidence=Evidence(
-        "seen",
+    evidence=seen(
         f"{YADE_2025}, ElasticContactLaw.cpp, after the paper",
         doi=DEMLAB_VISCOELASTIC,
         note="the paper was not seen; it has a dashpot, which acts while the contact sticks",
@@ -77,8 +76,7 @@ YADE_CUNDALL_STRACK = replace(
     equation="f = k_t ξ, |f| ≤ μ max(F, 0),  ξ̇ = g while it sticks",
     reference="YADE, Law2_ScGeom_FrictPhys_CundallStrack",
     doi="",
-    evidence=Evidence(
-        "seen",
+    evidence=seen(
         f"{YADE_2025}, ElasticContactLaw.cpp",
         note="its first year was not seen; its own contact force is K δ",
     ),

@@ -6,7 +6,7 @@ import numpy as np
 
 from ...array_types import Array
 from ..closed_forms.plastic import edinburgh_adhesion, edinburgh_restitution, jkr_restitution, jkr_root
-from ..evidence import Evidence
+from ..evidence import seen
 from ..force_expressions import spring
 from ..model import ForceModel, Parameter
 from ..powers import integer_power, power
@@ -21,8 +21,7 @@ JKR_1971 = ForceModel(
     reference="Thornton C, Ning Z (1998) A theoretical model for the stick/bounce behaviour of adhesive, "
     "elastic-plastic spheres. Powder Technol. 99, 154; Johnson KL, Kendall K, Roberts AD (1971)",
     doi="10.1016/S0032-5910(98)00099-0",
-    evidence=Evidence(
-        "seen",
+    evidence=seen(
         "lammps/lammps, doc/src/pair_granular.rst @02dde6e35f (2019), whose γ is Γ/2; the restitution in a public "
         "digest (2026) of Thornton and Ning (1998), equations (49) to (57)",
         doi="the same digest",
@@ -60,8 +59,7 @@ LIGGGHTS_EDINBURGH = ForceModel(
     "limited to k₂ δₚⁿ/2, else (δₚⁿ − f/k₂)^(1/n);  K = 2E* R* for n = 1, else (4/3)E* √R*",
     reference="LIGGGHTS-PUBLIC, model edinburgh by Mohanty R and Zorec TM (2017), with coefficientRestitution 1, "
     "fixKc off and no pullOffForce",
-    evidence=Evidence(
-        "seen",
+    evidence=seen(
         "CFDEMproject/LIGGGHTS-PUBLIC, src/normal_model_edinburgh.h @84ba3d76 (3.8.0, 2017)",
         note="without the dashpot that may stand beside it; unless n = 1 the two values of d differ where f "
         "reaches its limit, so that e jumps there, as in LIGGGHTS; a wall is the limit of two spheres, while "

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from ..evidence import Evidence
+from ..evidence import not_verified, seen
 from ..model import ForceModel
 from .cited_sources import OPENSEES_HERTZDAMP
 from .dashpot import KELVIN_VOIGT
@@ -24,7 +24,7 @@ def in_code(
 
     The key and the title of the law begin with the name of the code.
     """
-    about: dict[str, Any] = {"year": year, "reference": reference, "evidence": Evidence("seen", source, note=note)}
+    about: dict[str, Any] = {"year": year, "reference": reference, "evidence": seen(source, note=note)}
     return same_law(law, f"{code.lower()}-{key}", title=f"{code} {title}", family="codes", **about)
 
 
@@ -36,8 +36,7 @@ MARHEFKA_ORIN_1999 = same_law(
     reference="Marhefka DW, Orin DE (1999) A compliant contact model with nonlinear damping for simulation of "
     "robotic systems. IEEE Trans. Syst. Man Cybern. A 29, 566",
     doi="10.1109/3468.798060",
-    evidence=Evidence(
-        "seen",
+    evidence=seen(
         "JuliaRobotics/RigidBodyDynamics.jl, src/contact.jl @d6df4ebe (2024)",
         doi="superAngGao/robot_simulator, docs/restitution_impedance_research_2026-04-07.md @cc6a33f (2026)",
     ),
@@ -51,8 +50,7 @@ MUTHUKUMAR_DESROCHES_2006 = same_law(
     reference="Muthukumar S, DesRoches R (2006) A Hertz contact model with non-linear damping for pounding "
     "simulation. EESD 35, 811",
     doi="10.1002/eqe.557",
-    evidence=Evidence(
-        "not verified",
+    evidence=not_verified(
         doi=OPENSEES_HERTZDAMP,
         note="that it had a formula for e which Ye, Li and Zhu (2009) call incorrect was seen; the material of "
         "OpenSees takes χ itself",
@@ -67,7 +65,7 @@ YE_2009_HERTZ = same_law(
     reference="Ye K, Li L, Zhu H (2009) A note on the Hertz contact model with nonlinear damping for pounding "
     "simulation. EESD 38, 1135",
     doi="10.1002/eqe.883",
-    evidence=Evidence("seen", OPENSEES_HERTZDAMP, doi="the first page of the paper"),
+    evidence=seen(OPENSEES_HERTZDAMP, doi="the first page of the paper"),
 )
 
 KHATIWADA_2014 = same_law(
@@ -77,7 +75,7 @@ KHATIWADA_2014 = same_law(
     year=2014,
     reference="Khatiwada S, Chouw N, Butterworth JW (2014) A generic structural pounding model using numerically "
     "exact displacement proportional damping. Eng. Struct. 62-63, 33",
-    evidence=Evidence("not verified", note="neither the paper nor its formula was seen anywhere"),
+    evidence=not_verified(note="neither the paper nor its formula was seen anywhere"),
 )
 
 JACOBS_WALDRON_2015 = same_law(
@@ -88,8 +86,7 @@ JACOBS_WALDRON_2015 = same_law(
     reference="Jacobs DA, Waldron KJ (2015) Modeling inelastic collisions with the Hunt-Crossley model using the "
     "energetic coefficient of restitution. J. Comput. Nonlinear Dyn. 10, 021001",
     doi="10.1115/1.4028473",
-    evidence=Evidence(
-        "not verified",
+    evidence=not_verified(
         doi="the publisher's page",
         note="by its abstract the paper prints an approximation, which this exact relation is not",
     ),
@@ -103,7 +100,7 @@ SCHAFER_1996 = same_law(
     reference="Schäfer J, Dippel S, Wolf DE (1996) Force schemes in simulations of granular materials. J. Phys. "
     "I 6, 5",
     doi="10.1051/jp1:1996129",
-    evidence=Evidence(
-        "not verified", doi="the publisher's page", note="the formula is that of every linear spring and dashpot"
+    evidence=not_verified(
+        doi="the publisher's page", note="the formula is that of every linear spring and dashpot"
     ),
 )

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..closed_forms.dashpot import approach_damping, approach_restitution
 from ..closed_forms.hysteresis import approach_damped_restitution
-from ..evidence import Evidence
+from ..evidence import derived, not_verified, seen
 from ..force_expressions import damped, spring, unload_with_stiffness
 from ..formula_calls import Formula
 from ..model import About, ForceModel
@@ -33,7 +33,7 @@ JANKOWSKI_2006 = approach_dashpot(
     "restitution in the non-linear viscoelastic model of structural pounding. EESD 35, 517; Jankowski R (2005) "
     "Non-linear viscoelastic modelling of earthquake-induced structural pounding. EESD 34, 595",
     doi="10.1002/eqe.537",
-    evidence=Evidence("seen", OPENSEES_JANKOWSKI, doi=OPENSEES_JANKOWSKI),
+    evidence=seen(OPENSEES_JANKOWSKI, doi=OPENSEES_JANKOWSKI),
     zeta=lambda e: 9 * np.divide(1 - e * e, e * (e * (9 * np.pi - 16) + 16)),
     exponent=1.5,
 )
@@ -45,7 +45,7 @@ MAHMOUD_JANKOWSKI_2011 = approach_dashpot(
     equation="F = K δ + 2 ξ √(m K) δ̇, then F = K δ,  ξ = (1 − e²)/(e(e(π − 2) + 2))",
     reference="Mahmoud S, Jankowski R (2011) Modified linear viscoelastic model of earthquake-induced structural "
     "pounding. Iran. J. Sci. Technol. C 35, 51",
-    evidence=Evidence("not verified", note="the formula is within 0.0072 of the exact one"),
+    evidence=not_verified(note="the formula is within 0.0072 of the exact one"),
     zeta=lambda e: np.divide(1 - e * e, e * (e * (np.pi - 2) + 2)),
     exponent=1.0,
 )
@@ -57,7 +57,7 @@ EXACT_APPROACH_DASHPOT = approach_dashpot(
     equation="F = K δⁿ + α √(m K) δ^((n−1)/2) δ̇, then F = K δⁿ,  α = ζ √(2(n + 1)),  e = exp(−ζ acos(ζ)/√(1 − "
     "ζ²))",
     reference="the limit that Jankowski (2006) and Mahmoud and Jankowski (2011) approximate",
-    evidence=Evidence("derived", "src/impact/contact/closed_forms/dashpot.py"),
+    evidence=derived("src/impact/contact/closed_forms/dashpot.py"),
     zeta=approach_damping,
 )
 
@@ -68,8 +68,7 @@ PANT_WIJEYEWICKREMA_2012 = ForceModel(
     equation="F = K δ (1 + χ δ̇/v₀), then F = K δ,  χ = 3(1 − e²)/(2e²)",
     reference="Pant DR, Wijeyewickrema AC (2012) Structural performance of a base-isolated reinforced concrete "
     "building subjected to seismic pounding. EESD 41, 1709",
-    evidence=Evidence(
-        "not verified",
+    evidence=not_verified(
         RAILWAY,
         note="that code has the χ, but over the whole contact; here it damps the approach only",
     ),
@@ -90,7 +89,7 @@ KELVIN_VOIGT_HYSTERETIC = ForceModel(
     reference="Machado M, Moreira P, Flores P, Lankarani HM (2012) Compliant contact force models in multibody "
     "dynamics: evolution of the Hertz contact theory. Mech. Mach. Theory 53, 99",
     doi="10.1016/j.mechmachtheory.2012.02.010",
-    evidence=Evidence("seen", DYS, doi="two public bibliographies (2026)", note="the paper may have e²"),
+    evidence=seen(DYS, doi="two public bibliographies (2026)", note="the paper may have e²"),
     force=spring,
     coefficients={"Kr": lambda K, e: e * K},
     unloading=unload_with_stiffness,

@@ -14,7 +14,7 @@ import numpy as np
 
 from ...array_types import Array
 from ..closed_forms.dashpot import force_damping, force_restitution, gap_damping, gap_restitution
-from ..evidence import Evidence
+from ..evidence import derived, seen
 from ..force_expressions import dragged
 from ..formula_calls import Formula
 from ..model import About, ForceModel, Parameter
@@ -97,8 +97,7 @@ KELVIN_VOIGT = dashpot(
     reference="Cundall PA, Strack ODL (1979) A discrete numerical model for granular assemblies. Géotechnique "
     "29, 47; Goldsmith W (1960) Impact. Arnold, London",
     doi="10.1680/geot.1979.29.1.47",
-    evidence=Evidence(
-        "seen",
+    evidence=seen(
         "OpenSees/OpenSees, SRC/material/uniaxial/ViscoelasticGap.cpp @2890cb36f (2026), after Goldsmith (1960)",
         doi=DEMLAB_VISCOELASTIC,
     ),
@@ -112,7 +111,7 @@ KELVIN_VOIGT_NO_TENSION = with_release(
     "force",
     key="kelvin-voigt-no-tension",
     title="Kelvin and Voigt, without tension",
-    evidence=Evidence("seen", MAPLESIM_HELP, doi=DEMLAB_VISCOELASTIC),
+    evidence=seen(MAPLESIM_HELP, doi=DEMLAB_VISCOELASTIC),
 )
 
 ANAGNOSTOPOULOS_1988 = dashpot(
@@ -122,8 +121,7 @@ ANAGNOSTOPOULOS_1988 = dashpot(
     equation=f"{LINEAR_DASHPOT},  {ZETA_BY_LOGARITHM}, to δ = 0",
     reference="Anagnostopoulos SA (1988) Pounding of buildings in series during earthquakes. EESD 16, 443",
     doi="10.1002/eqe.4290160311",
-    evidence=Evidence(
-        "seen",
+    evidence=seen(
         f"{LIGGGHTS}normal_model_hooke.h",
         doi="koreascience.or.kr, JAKO201832853252619, references",
         note="no source of the formula names the paper",
@@ -137,8 +135,7 @@ ANAGNOSTOPOULOS_1988_NO_TENSION = with_release(
     "force",
     key="anagnostopoulos-1988-no-tension",
     title="Anagnostopoulos, without tension",
-    evidence=Evidence(
-        "seen",
+    evidence=seen(
         CHRONO,
         doi="koreascience.or.kr, JAKO201832853252619, references",
         note="the end at zero force is that of codes",
@@ -154,8 +151,7 @@ TSUJI_1992 = dashpot(
     "particles in a horizontal pipe. Powder Technol. 71, 239; Antypov D, Elliott JA (2011) On an analytical "
     "solution for the damped Hertzian spring. EPL 94, 50004",
     doi="10.1016/0032-5910(92)88030-L",
-    evidence=Evidence(
-        "seen",
+    evidence=seen(
         f"{LIGGGHTS}normal_model_hertz.h; equations (10) and (17) of Antypov and Elliott (2011) in "
         "Azeko2xo/woodem, pkg/dem/Hertz.cpp @f94485c (2015)",
         doi=DEMLAB_VISCOELASTIC,
@@ -169,8 +165,7 @@ TSUJI_1992_NO_TENSION = with_release(
     "force",
     key="tsuji-1992-no-tension",
     title="Tsuji, Tanaka and Ishida, without tension",
-    evidence=Evidence(
-        "seen",
+    evidence=seen(
         "Azeko2xo/woodem, pkg/dem/Hertz.cpp @f94485c (2015), noAttraction; projectchrono/chrono, ChContactSMC.cpp "
         "@7689fbc02d (2026)",
         doi=DEMLAB_VISCOELASTIC,
@@ -186,8 +181,7 @@ SCHWAGER_POSCHEL_2007 = dashpot(
     reference="Schwager T, Pöschel T (2007) Coefficient of restitution and linear-dashpot model revisited. "
     "Granul. Matter 9, 465",
     doi="10.1007/s10035-007-0065-z",
-    evidence=Evidence(
-        "seen",
+    evidence=seen(
         f"{YADE_2025}, ViscoelasticPM.cpp, after equation (21) of the paper, whose sign it corrects",
         doi=YADE_BIBLIOGRAPHY,
     ),
@@ -204,8 +198,7 @@ THORNTON_CUMMINS_CLEARY_2013 = dashpot(
     reference="Thornton C, Cummins SJ, Cleary PW (2013) An investigation of the comparative behaviour of "
     "alternative contact force models during inelastic collisions. Powder Technol. 233, 30",
     doi="10.1016/j.powtec.2012.08.012",
-    evidence=Evidence(
-        "seen",
+    evidence=seen(
         f"{YADE_2025}, HertzMindlin.cpp, after (B6), (B7) and Table 2 of the paper",
         doi=YADE_BIBLIOGRAPHY,
     ),
@@ -229,7 +222,7 @@ FENG_2026 = dashpot(
     equation=f"{GENERAL_DASHPOT},  α = −√(2(n + 1)) ln e/√(π² + ln² e), to δ = 0",
     reference="Feng YT (2026) Exact phase-space analytical solution for the power-law damped contact oscillator. "
     "arXiv:2603.27764",
-    evidence=Evidence("seen", "arXiv:2603.27764"),
+    evidence=seen("arXiv:2603.27764"),
     zeta=gap_damping,
 )
 
@@ -239,7 +232,7 @@ EXACT_DASHPOT_NO_TENSION = dashpot(
     year=2026,
     equation=f"{GENERAL_DASHPOT},  α = ζ √(2(n + 1)),  e = exp(−2 ζ acos(ζ)/√(1 − ζ²)), to F = 0",
     reference="Schwager T, Pöschel T (2007) Granul. Matter 9, 465, for n = 1; Feng YT (2026) arXiv:2603.27764",
-    evidence=Evidence("derived", "src/impact/contact/closed_forms/dashpot.py"),
+    evidence=derived("src/impact/contact/closed_forms/dashpot.py"),
     zeta=force_damping,
     release="force",
 )

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...array_types import Array
 from ..closed_forms.plastic import luding_restitution, muthukumar_restitution, thornton_restitution
-from ..evidence import Evidence
+from ..evidence import not_verified, seen
 from ..force_expressions import spring, unload_to_residual
 from ..formula_calls import Formula
 from ..model import ForceModel, Parameter
@@ -40,8 +40,7 @@ WALTON_BRAUN_VARIABLE = elastic_plastic(
     reference="Walton OR, Braun RL (1986) Viscosity, granular-temperature, and stress calculations for shearing "
     "assemblies of inelastic, frictional disks. J. Rheol. 30, 949",
     doi="10.1122/1.549893",
-    evidence=Evidence(
-        "seen",
+    evidence=seen(
         DEMLAB_PLASTIC,
         doi=DEMLAB_PLASTIC,
         note="that code keeps the residual of e, so that its force may jump at the peak",
@@ -63,8 +62,7 @@ LUDING_2008 = elastic_plastic(
     "δ₀ = (1 − K/k)δₘ,  δ* = k₂/(k₂ − K) φ 2R*",
     reference="Luding S (2008) Cohesive, frictional powders: contact models for tension. Granul. Matter 10, 235",
     doi="10.1007/s10035-008-0099-x",
-    evidence=Evidence(
-        "seen",
+    evidence=seen(
         "CFDEMproject/LIGGGHTS-PUBLIC @3d5c00f2 (3.8.0, 2024), src/normal_model_hooke_hysteresis.h",
         doi=YADE_BIBLIOGRAPHY,
         note="without the dashpot that may stand beside it",
@@ -109,8 +107,7 @@ THORNTON_1997 = hertzian_plastic(
     "δ_y = (π p_y/(2E*))² R*,  Rₚ = (4E*/(3Fₘ))((2Fₘ + F_y)/(2π p_y))^(3/2)",
     reference="Thornton C (1997) Coefficient of restitution for collinear collisions of elastic-perfectly plastic "
     "spheres. J. Appl. Mech. 64, 383; Thornton C, Ning Z (1998) Powder Technol. 99, 154",
-    evidence=Evidence(
-        "seen",
+    evidence=seen(
         "a public digest (2026) of Thornton and Ning (1998), equations (2) to (46)",
         note="p_y over the yield strength is a usual value",
     ),
@@ -144,8 +141,7 @@ JOHNSON_1985 = hertzian_plastic(
     equation="F = 2π R* p_d δ;  back F = Fₘ((δ − δₚ)/(δₘ − δₚ))^(3/2),  δₘ − δₚ = 3Fₘ/(4 a E*),  a² = 2R*δₘ;  "
     "F = K δ^(3/2) where v₀ ≤ V_y,  (1/2) m V_y² = (2/5) K δ_y^(5/2),  δ_y = (1.6π Y/(2E*))² R*",
     reference="Johnson KL (1985) Contact mechanics, chapter 11. Cambridge University Press",
-    evidence=Evidence(
-        "not verified",
+    evidence=not_verified(
         note="a public digest of Thornton and Ning (1998) gives the prefactor 1.72 of its e(V), ours is 1.7176; "
         "V_y is that of a largest pressure 1.6 Y; p_d over the yield strength is a usual value",
     ),
@@ -194,8 +190,7 @@ JACKSON_GREEN_2010 = hertzian_plastic(
     reference="Jackson RL, Green I (2005) A finite element study of elasto-plastic hemispherical contact against "
     "a rigid flat. J. Tribol. 127, 343, the loading; Jackson RL, Chusoipin I, Green I (2005), the residual; "
     "Jackson RL, Green I, Marghitu DB (2010) Nonlinear Dyn. 60, 217",
-    evidence=Evidence(
-        "seen",
+    evidence=seen(
         "tmd-lab/microslip-rough-contact, SPHERE_PLASTIC_PRE2.m and test_plastic_contact_unload.m @21706045 "
         "(2022)",
         note="the year of Jackson, Chusoipin and Green was not seen; no loss below w = 1.9, where the fit of e in "
@@ -239,8 +234,7 @@ KOGUT_ETSION_2005 = hertzian_plastic(
     reference="Kogut L, Etsion I (2002) Elastic-plastic contact analysis of a sphere and a rigid flat. J. Appl. "
     "Mech. 69, 657; Etsion I, Kligerman Y, Kadin Y (2005) Unloading of an elastic-plastic loaded spherical "
     "contact. Int. J. Solids Struct. 42, 3716",
-    evidence=Evidence(
-        "not verified",
+    evidence=not_verified(
         "the loading was seen in TaoYang1999/SCHC-framework, asperity_f_cal.m @98b786e, which goes on with "
         "2π R w H beyond w = 110",
         note="the unloading was not seen, public code has another one under the names of Etsion, Kligerman and "
@@ -288,8 +282,7 @@ MUTHUKUMAR_2003 = elastic_plastic(
     "K₂ = K d^(n−1) − (10/9) D,  D = K d^(n−1)(1 − e²)/(n + 1)",
     reference="Muthukumar S (2003) A contact element approach with hysteresis damping for the analysis and design "
     "of pounding in bridges. PhD thesis, Georgia Institute of Technology",
-    evidence=Evidence(
-        "seen",
+    evidence=seen(
         f"{IMPACT_MATERIAL}, and OpenSees/OpenSees, SRC/material/uniaxial/ImpactMaterial.cpp @2890cb36f (2026)",
     ),
     parameters=(Parameter("d", "m", "indentation that the law is designed for", least=1e-9),),

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...array_types import Array
 from ..closed_forms.dashpot import force_damping, gap_damping
-from ..evidence import Evidence
+from ..evidence import seen
 from ..model import Parameter
 from ..powers import power
 from .aliases import in_code, same_law
@@ -63,7 +63,7 @@ LIGGGHTS_HOOKE = linear_dashpot(
     year=2014,
     equation=f"{LINEAR_DASHPOT},  {ZETA_BY_LOGARITHM}, to δ = 0;  {STIFFNESS_BY_SPEED}",
     reference=OF_HOOKE[0],
-    evidence=Evidence("seen", OF_HOOKE[1]),
+    evidence=seen(OF_HOOKE[1]),
     parameters=CHARACTERISTIC_SPEED,
     zeta=gap_damping,
     stiffness=stiffness_by_speed,
@@ -76,7 +76,7 @@ CHRONO_SMC_HOOKE = with_release(
     title="Chrono SMC, Hooke (sequential core, 2016 to 2026)",
     year=2016,
     reference="Project Chrono, ChContactSMC; LIGGGHTS hooke with limitForce has it too",
-    evidence=Evidence("seen", CHRONO, note="the multicore solver does not cut the tension off"),
+    evidence=seen(CHRONO, note="the multicore solver does not cut the tension off"),
 )
 
 LIGGGHTS_HOOKE_LIMIT = in_liggghts(
@@ -93,7 +93,7 @@ LETHE_LAWS = tuple(
     same_law(
         law, key, title=f"Lethe, {method} (2026)", year=2020, family="codes",
         reference="Lethe, particle particle contact force method",
-        evidence=Evidence("seen", LETHE, note=f"its year is that of the licence; {note}"),
+        evidence=seen(LETHE, note=f"its year is that of the licence; {note}"),
     )
     for law, key, method, note in (
         (TSUJI_1992, "lethe-hertz", "hertz and hertz_mindlin_limit_overlap, _force", "its K is 3e-5 smaller"),
@@ -120,8 +120,7 @@ CHRONO_SMC_PLAINCOULOMB = hertzian_dashpot(
     year=2016,
     equation=f"{HERTZIAN_DASHPOT},  α = −√5 ln e/√(π² + ln² e), to F = 0;  K = (4/3) E* √(1 m)",
     reference="Project Chrono, ChContactSMC",
-    evidence=Evidence(
-        "seen",
+    evidence=seen(
         CHRONO,
         note="its stiffness lacks the radius; the multicore solver does not cut the tension off",
     ),
@@ -182,7 +181,7 @@ YADE_EN = hertzian_dashpot(
     year=2023,
     equation=THORNTON_EQUATION.replace("to F = 0", "β = 0 at e = 1, to F = 0"),
     reference=f"{HERTZ_MINDLIN}, en, by (B6), (B7) and Table 2 of Thornton, Cummins and Cleary (2013)",
-    evidence=Evidence("seen", MINDLIN),
+    evidence=seen(MINDLIN),
     zeta=lambda e: np.where(e < 1.0, thornton_zeta(np.minimum(e, np.nextafter(1.0, 0.0))), 0.0),
     release="force",
 )
@@ -192,7 +191,7 @@ YADE_BETAN = hertzian_dashpot(
     year=2013,
     equation=f"{TANGENT_DASHPOT},  β = −ln e/√(π² + ln² e), to F = 0",
     reference=f"{HERTZ_MINDLIN}, betan, which YADE leaves to the user, by the formula of a linear spring",
-    evidence=Evidence("seen", MINDLIN),
+    evidence=seen(MINDLIN),
     # 2 β √(3/2) is α
     zeta=lambda e: np.sqrt(1.2) * gap_damping(e),
     release="force",
@@ -203,7 +202,7 @@ YADE_BETAN_PULLING = with_release(
     key="yade-betan-pulling",
     title="YADE HertzMindlin betan, by the traditional formula (2010 to September 2013)",
     year=2010,
-    evidence=Evidence("seen", f"{CLAMPED}, whose removed lines pull"),
+    evidence=seen(f"{CLAMPED}, whose removed lines pull"),
 )
 YADE_BETAN_DIRECT = hertzian_dashpot(
     "yade-betan-direct",
@@ -211,7 +210,7 @@ YADE_BETAN_DIRECT = hertzian_dashpot(
     year=2013,
     equation=f"{TANGENT_DASHPOT}, to F = 0",
     reference=f"{HERTZ_MINDLIN}, betan",
-    evidence=Evidence("seen", MINDLIN),
+    evidence=seen(MINDLIN),
     parameters=(damping("betan", "1", "damping ratio β of the tangent stiffness"),),
     zeta=lambda betan: np.sqrt(1.2) * betan,
     release="force",
@@ -229,7 +228,7 @@ MFIX_HERTZ = hertzian_dashpot(
     year=2014,
     equation=f"{HERTZIAN_DASHPOT},  α = −2 ln e/√(π² + ln² e), to δ = 0",
     reference="MFiX, DES_COLL_MODEL HERTZIAN, whose α has 2 in the place of √5",
-    evidence=Evidence("seen", MFIX),
+    evidence=seen(MFIX),
     zeta=lambda e: 2 / np.sqrt(5.0) * gap_damping(e),
 )
 
@@ -244,8 +243,7 @@ KRATOS_HERTZ = hertzian_dashpot(
     year=2015,
     equation=THORNTON_EQUATION.replace("to F = 0", "e from 0.001, β = 0 above e = 0.999, to F = 0"),
     reference="Kratos DEM, DEM_D_Hertz_viscous_Coulomb",
-    evidence=Evidence(
-        "seen",
+    evidence=seen(
         f"{KRATOS}, custom_constitutive/DEM_D_Hertz_viscous_Coulomb_CL.cpp @72b6f58f and "
         "python_scripts/sphere_strategy.py @4ddf9200",
         note="when the damping of e was added was not seen; the law file @03f57bf0 has δ², by a slip",
@@ -260,8 +258,7 @@ KRATOS_LINEAR = linear_dashpot(
     equation=f"{LINEAR_DASHPOT},  e = exp(−2 ζ acos(ζ)/√(1 − ζ²)), e from 0.001, ζ = 0 above e = 0.999, "
     "to F = 0;  K = 1.432 π 0.31225 E* R*, against a wall without 1.432",
     reference="Kratos DEM, DEM_D_Linear_viscous_Coulomb",
-    evidence=Evidence(
-        "seen",
+    evidence=seen(
         f"{KRATOS}, custom_constitutive/DEM_D_Linear_viscous_Coulomb_CL.cpp @013f9253 and "
         "python_scripts/sphere_strategy.py @4ddf9200",
         note="Kratos finds ζ by bisection to 1e-4, this law exactly; when the damping of e was added was not seen",
@@ -293,8 +290,7 @@ DEMLAB_TTI = hertzian_dashpot(
     year=2021,
     equation=f"{HERTZIAN_DASHPOT},  α = −2.2664 ln e/√(10.1354 + ln² e), to F = 0",
     reference="Rangel R, DEMLab, contact law of Tsuji, Tanaka and Ishida with remove_cohesion, its default",
-    evidence=Evidence(
-        "seen",
+    evidence=seen(
         DEMLAB_VISCOELASTIC,
         note="its first year was not seen",
     ),

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...array_types import Array
 from ..closed_forms.hysteresis import delivered_restitution, exact_damping_ratio
-from ..evidence import Evidence
+from ..evidence import derived, disputed, not_verified, seen
 from ..force_expressions import damped, spring
 from ..formula_calls import Formula
 from ..model import About, ForceModel
@@ -68,8 +68,7 @@ HERTZ = ForceModel(
     reference="Hertz H (1882) Über die Berührung fester elastischer Körper. J. reine angew. Math. 92, 156",
     domain_source="by definition",
     doi="10.1515/crll.1882.92.156",
-    evidence=Evidence(
-        "seen",
+    evidence=seen(
         f"{GHARIB_HURMUZLU}, equation (10)",
         doi=DEMLAB_VISCOELASTIC,
     ),
@@ -89,11 +88,7 @@ HUNT_CROSSLEY_1975 = hysteresis(
     domain_source="Zhang and Sharf, quoted by Gharib and Hurmuzlu 2012",
     domain={"e": (0.95, 1.0)},
     doi="10.1115/1.3423596",
-    evidence=Evidence(
-        "seen",
-        f"{GHARIB_HURMUZLU}, equation (19)",
-        doi="Rahuldrabit/MBDyn, manual/mybib.bib @db248e0 (2025)",
-    ),
+    evidence=seen(f"{GHARIB_HURMUZLU}, equation (19)", doi="Rahuldrabit/MBDyn, manual/mybib.bib @db248e0 (2025)"),
     chi=lambda e: 1.5 * (1 - e),
 )
 
@@ -104,7 +99,7 @@ HERBERT_MCWHANNELL_1977 = hysteresis(
     equation="F = K δⁿ (1 + χ δ̇/v₀),  χ = 6(1 − e)/((2e − 1)² + 3)  (20)",
     reference="Herbert RG, McWhannell DC (1977) Shape and frequency composition of pulses from an impact pair. "
     "J. Eng. Ind. 99, 513",
-    evidence=Evidence("seen", f"{GHARIB_HURMUZLU}, equation (20); {DYS}", note="the paper's title was not seen"),
+    evidence=seen(f"{GHARIB_HURMUZLU}, equation (20); {DYS}", note="the paper's title was not seen"),
     chi=lambda e: 6 * (1 - e) / ((2 * e - 1) * (2 * e - 1) + 3),
 )
 
@@ -115,7 +110,7 @@ LEE_WANG_1983 = hysteresis(
     equation="F = K δⁿ (1 + χ δ̇/v₀),  χ = 3(1 − e)/4  (21)",
     reference="Lee TW, Wang AC (1983) On the dynamics of intermittent-motion mechanisms, part 1: Dynamic model "
     "and response. J. Mech. Transm. Autom. Des. 105, 534",
-    evidence=Evidence("seen", f"{GHARIB_HURMUZLU}, equation (21); {DYS}", note="the paper's title was not seen"),
+    evidence=seen(f"{GHARIB_HURMUZLU}, equation (21); {DYS}", note="the paper's title was not seen"),
     chi=lambda e: 0.75 * (1 - e),
 )
 
@@ -128,7 +123,7 @@ LANKARANI_NIKRAVESH_1990 = hysteresis(
     "analysis of multibody systems. J. Mech. Des. 112, 369",
     domain_source="Gharib and Hurmuzlu 2012",
     doi="10.1115/1.2912617",
-    evidence=Evidence("seen", f"{GHARIB_HURMUZLU}, equation (22)", doi=OPENSEES_HERTZDAMP),
+    evidence=seen(f"{GHARIB_HURMUZLU}, equation (22)", doi=OPENSEES_HERTZDAMP),
     domain={"e": (0.9, 1.0)},
     chi=lambda e: 0.75 * (1 - e * e),
 )
@@ -140,8 +135,7 @@ EXACT_HYSTERESIS = hysteresis(
     equation="F = K δⁿ (1 + χ δ̇/v₀),  χ(1 + e) = ln[(1 + χ)/(1 − e χ)]  (23)",
     reference="Gonthier Y, McPhee J, Lange C, Piedboeuf JC (2002) CSME Forum, Queen's University; Gonthier "
     "and others (2004) Multibody Syst. Dyn. 11, 209",
-    evidence=Evidence(
-        "derived",
+    evidence=derived(
         "the first integral of the motion, docs/paper.md",
         note="equation (23) as printed in Gharib and Hurmuzlu (2012), who give it to their reference 14, lacks a "
         "factor v₀; of that entry only the end was seen, its authors are inferred; Zhang and Sharf (2004) were "
@@ -158,7 +152,7 @@ GONTHIER_2004 = hysteresis(
     reference="Gonthier Y, McPhee J, Lange C, Piedboeuf JC (2004) A regularized contact model with asymmetric "
     "damping and dwell-time dependent friction. Multibody Syst. Dyn. 11, 209",
     doi="10.1023/B:MUBO.0000029392.21648.bc",
-    evidence=Evidence("seen", DYS, doi="a bibliography checked at Crossref in October 2026"),
+    evidence=seen(DYS, doi="a bibliography checked at Crossref in October 2026"),
     chi=lambda e: np.divide(1 - e * e, e),
 )
 
@@ -169,7 +163,7 @@ ZHIYING_QISHAO_2006 = hysteresis(
     equation="F = K δⁿ (1 + χ δ̇/v₀),  χ = (3/4)(1 − e²) exp(2(1 − e))",
     reference="Qin Z, Lu Q (2006) Analysis of impact process model based on restitution coefficient. J. Dyn. "
     "Control 4, 294",
-    evidence=Evidence("seen", DYS),
+    evidence=seen(DYS),
     chi=lambda e: 0.75 * (1 - e * e) * np.exp(2 * (1 - e)),
 )
 
@@ -180,7 +174,7 @@ YE_2009_KELVIN = hysteresis(
     equation="F = K δ (1 + χ δ̇/v₀),  χ = 3(1 − e)/(2e)",
     reference="Ye K, Li L, Zhu H (2009) A modified Kelvin impact model for pounding simulation of base-isolated "
     "building with adjacent structures. Earthq. Eng. Eng. Vib. 8, 433",
-    evidence=Evidence("seen", RAILWAY, note="the abstract of the paper was seen, without the formula"),
+    evidence=seen(RAILWAY, note="the abstract of the paper was seen, without the formula"),
     exponent=1.0,
     chi=lambda e: np.divide(1.5 * (1 - e), e),
 )
@@ -193,7 +187,7 @@ FLORES_2011 = hysteresis(
     reference="Flores P, Machado M, Silva MT, Martins JM (2011) On the continuous contact force models for soft "
     "materials in multibody dynamics. Multibody Syst. Dyn. 25, 357",
     doi="10.1007/s11044-010-9237-4",
-    evidence=Evidence("seen", f"{DYS}; {MBDYN}", doi=MODIA3D_DOCUMENTATION),
+    evidence=seen(f"{DYS}; {MBDYN}", doi=MODIA3D_DOCUMENTATION),
     chi=flores_chi,
 )
 
@@ -206,7 +200,7 @@ GHARIB_HURMUZLU_2012 = hysteresis(
     "J. Appl. Mech. 79, 064506",
     domain_source="Gharib and Hurmuzlu 2012",
     doi="10.1115/1.4006494",
-    evidence=Evidence("seen", f"{GHARIB_HURMUZLU}, equation (28)", doi=GHARIB_HURMUZLU),
+    evidence=seen(f"{GHARIB_HURMUZLU}, equation (28)", doi=GHARIB_HURMUZLU),
     domain={"e": (0.0, 0.3)},
     chi=lambda e: np.divide(1.0, e),
 )
@@ -219,8 +213,7 @@ HU_GUO_2015 = hysteresis(
     reference="Hu S, Guo X (2015) A dissipative contact force model for impact analysis in multibody dynamics. "
     "Multibody Syst. Dyn. 35, 131",
     doi="10.1007/s11044-015-9453-z",
-    evidence=Evidence(
-        "disputed",
+    evidence=disputed(
         "3(1 − e)/(2e) in a Python port of Multi_Con_250812.m, a wheel-rail code whose repository is not known, "
         f"and by the slope at e = 1; 3(1 − e)/(4e) in {DYS}",
         doi="the address of a page whose title was not shown",
@@ -237,8 +230,7 @@ CARVALHO_MARTINS_2019 = hysteresis(
     reference="Carvalho AS, Martins JM (2019) Exact restitution and generalizations for the Hunt-Crossley contact "
     "model. Mech. Mach. Theory 139, 174",
     doi="10.1016/j.mechmachtheory.2019.03.028",
-    evidence=Evidence(
-        "seen",
+    evidence=seen(
         "jgerstmayr/EXUDYN, docs/RST/items/ObjectContactSphereSphere.rst @7de98d35, impactModel 2, and "
         "main/src/Objects/CObjectContactSphereSphere.cpp @e4b8e513",
         doi="two public bibliographies (2026)",
@@ -256,8 +248,7 @@ SAFAEIFAR_FARSHIDIANFAR_2020 = hysteresis(
     reference="Safaeifar H, Farshidianfar A (2020) A new model of the contact force for the collision between two "
     "solid bodies. Multibody Syst. Dyn. 50, 233",
     doi="10.1007/s11044-020-09732-2",
-    evidence=Evidence(
-        "not verified",
+    evidence=not_verified(
         doi="the address of a page whose title was not shown",
         note="its slope at e = 1 is 0.833, which is wrong for small losses",
     ),
@@ -271,6 +262,6 @@ ZHANG_2020 = hysteresis(
     equation="F = K δⁿ (1 + χ δ̇/v₀),  χ = 3(1 − e)/(2 e^0.89)",
     reference="Zhang J, Li W, Zhao L, He G (2020) A continuous contact force model for impact analysis in "
     "multibody dynamics. Mech. Mach. Theory 153, 103946",
-    evidence=Evidence("not verified", note="the formula agrees with the exact law to 0.0083"),
+    evidence=not_verified(note="the formula agrees with the exact law to 0.0083"),
     chi=lambda e: np.divide(1.5 * (1 - e), power(e, 0.89)),
 )

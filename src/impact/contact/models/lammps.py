@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ...array_types import Array
-from ..evidence import Evidence
+from ..evidence import seen
 from ..model import ForceModel
 from .aliases import same_law
 from .dashpot import (
@@ -90,7 +90,7 @@ def with_and_without_limit(
             year=first_year,
             equation=f"{spring} + {damping}, to {end}",
             reference="LAMMPS, pair style granular",
-            evidence=Evidence("seen", source, note=note),
+            evidence=seen(source, note=note),
             family="codes",
         )
 

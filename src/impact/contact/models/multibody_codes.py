@@ -12,7 +12,7 @@ import numpy as np
 
 from ...array_types import Array
 from ..closed_forms.dashpot import force_restitution, limited_restitution
-from ..evidence import Evidence
+from ..evidence import not_verified, seen
 from ..model import ForceModel, Parameter
 from ..powers import power, powers
 from .aliases import in_code, same_law
@@ -58,8 +58,7 @@ ADAMS_IMPACT = code_law(
     year=1990,
     equation="F = max(0, K δⁿ + c s(δ/d) δ̇),  s(t) = t²(3 − 2t) to t = 1, then 1",
     reference="MSC Adams, function IMPACT; MotionSolve and SolidWorks Motion have it too",
-    evidence=Evidence(
-        "seen",
+    evidence=seen(
         "the SolidWorks help, r_function_impact (2012 to 2025); the Adams help, functions IMPACT and STEP",
         note="the cubic follows from the words of the help, cubic and with continuous slopes; its year was not "
         "seen",
@@ -74,8 +73,7 @@ ADAMS_IMPACT = code_law(
     breakpoints=(lambda d: d, lambda elastic, x, v, c, d: 1 + c * smooth_step(x / d) * v / elastic),
 )
 
-RECURDYN_EVIDENCE = Evidence(
-    "not verified",
+RECURDYN_EVIDENCE = not_verified(
     "the RecurDyn help and FAQ name k, c, m₁, m₂ and m₃, but show the formula as a picture that was not stored",
     note="its first year was not seen",
 )
@@ -130,7 +128,7 @@ SIMBODY_HUNT_CROSSLEY = code_hysteresis(
     reference="Sherman MA, Seth A, Delp SL (2011) Simbody: multibody dynamics for biomedical research. Procedia "
     "IUTAM 2, 241",
     doi="10.1016/j.piutam.2011.04.023",
-    evidence=Evidence("seen", SIMBODY, doi="simbody/simbody, CONTRIBUTING.md @f312d0dd (2026)"),
+    evidence=seen(SIMBODY, doi="simbody/simbody, CONTRIBUTING.md @f312d0dd (2026)"),
     parameters=(damping("c", "s/m", "dissipation of the pair, the slope of e over a small speed"),),
     exponent=1.5,
     chi=lambda c, v0: 1.5 * c * v0,
@@ -163,8 +161,7 @@ DRAKE_POINT_CONTACT = code_hysteresis(
     year=2019,
     equation="F = K δ (1 + χ δ̇/v₀),  χ = d v₀",
     reference="Drake, contact_model_doxygen.h, and the defaults of SceneGraphConfig since v1.36.0 (December 2024)",
-    evidence=Evidence(
-        "seen",
+    evidence=seen(
         "RobotLocomotion/drake, multibody/plant/contact_model_doxygen.h and geometry/scene_graph_config.h "
         "@be259df724 (2026)",
         note="of the discrete approximations TAMSI, SIMILAR and LAGGED in the limit of small steps; SAP has "
@@ -198,8 +195,7 @@ MODELICA_ELASTOGAP = code_law(
     year=2008,
     equation="F = max(0, K δⁿ + min(d δ̇, K δⁿ))",
     reference="Modelica Standard Library, Mechanics.Translational.Components.ElastoGap",
-    evidence=Evidence(
-        "seen",
+    evidence=seen(
         "modelica/ModelicaStandardLibrary, Modelica/Mechanics/Translational/Components/ElastoGap.mo @b756f9deed "
         "(2026)",
         note="its first year was not seen",
@@ -210,7 +206,7 @@ MODELICA_ELASTOGAP = code_law(
     release="force",
 )
 
-MAPLESIM_EVIDENCE = Evidence("seen", MAPLESIM_HELP, note="its first year was not seen")
+MAPLESIM_EVIDENCE = seen(MAPLESIM_HELP, note="its first year was not seen")
 MAPLESIM_LINEAR = same_law(
     KELVIN_VOIGT_NO_TENSION,
     "maplesim-linear",
@@ -244,8 +240,7 @@ MODIA3D_PRESENT = code_hysteresis(
     reference="Neumayr A, Otter M (2019) Collision handling with elastic response calculation and zero-crossing "
     "functions. EOOLT '19, 57",
     doi="10.1145/3365984.3365986",
-    evidence=Evidence(
-        "seen",
+    evidence=seen(
         f"{MODIA3D} @a418027 (v0.12.3, 2026)",
         doi=MODIA3D_DOCUMENTATION,
     ),
@@ -261,8 +256,7 @@ MODIA3D_EXPONENTIAL = replace(
     year=2019,
     equation="F = K δ^(3/2) (1 + χ δ̇/v₀),  χ = min(d v₀, 8(1 − ε)/(5ε) v₀/r),  ε = e + (0.01 − e) "
     "0.01^(v₀/v_s),  r = v₀ from v_s on, below it v_s/3 + (v₀²/v_s)(1 − v₀/(3 v_s))",
-    evidence=Evidence(
-        "seen",
+    evidence=seen(
         f"{MODIA3D} at v0.4.0 (2019) and v0.5.2 (2021)",
         doi=MODIA3D_DOCUMENTATION,
     ),
@@ -288,8 +282,7 @@ CHRONO_SMC_FLORES = code_hysteresis(
     equation="F = K δ^(3/2) (1 + χ δ̇/v₀),  χ = 8(1 − ε)/(5ε) v₀/v_c,  ε = max(e, 0.01)",
     reference="Project Chrono, ChIterativeSolverMulticoreSMC.cpp; v_c is the characteristic speed, in its "
     "MultiStep mode the larger of it and the speed at contact",
-    evidence=Evidence(
-        "seen",
+    evidence=seen(
         "projectchrono/chrono, src/chrono_multicore/solver/ChIterativeSolverMulticoreSMC.cpp @7689fbc02d (2026)",
         note="the sequential core has no Flores law and takes that of Hooke instead",
     ),
@@ -306,8 +299,7 @@ MUJOCO_SOLREF = code_law(
     reference="Todorov E (2014) Convex and analytically-invertible dynamics with contacts and constraints: Theory "
     "and implementation in MuJoCo. ICRA, 6054; documentation of MuJoCo, Modeling, Solver parameters",
     doi="10.1109/ICRA.2014.6907751",
-    evidence=Evidence(
-        "seen",
+    evidence=seen(
         "google-deepmind/mujoco, doc/modeling.rst and src/engine/engine_core_constraint.c @a7255075b (2026)",
         doi="google-deepmind/mujoco, python/LQR.ipynb @a7255075b",
         note="for a constant impedance, which the default solimp is not, and in the limit of small time steps",
@@ -347,8 +339,7 @@ SIMSCAPE_CONTACT = code_law(
     year=2019,
     equation="F = max(0, s(δ/w)(K δ + b δ̇)),  s(t) = t²(3 − 2t) to t = 1, then 1",
     reference="MathWorks Simscape Multibody, block Spatial Contact Force, from R2019b on",
-    evidence=Evidence(
-        "not verified",
+    evidence=not_verified(
         "the MathWorks documentation gives no formula for s, only its ends and that they are level",
         note="the cubic and the limit at zero are ours",
     ),
@@ -391,8 +382,7 @@ EXUDYN_CARVALHO_GONTHIER = code_hysteresis(
     equation="F = K δⁿ (1 + χ δ̇/v₀),  χ = (3/2)(1 − e)(11 − e)/(1 + 9e) for e > 1/3, else (1 − e²)/e",
     reference="EXUDYN, ObjectContactSphereSphere, which has carvalho-martins-2019 and gonthier-2004; v₀ is at "
     "least minimumImpactVelocity",
-    evidence=Evidence(
-        "seen",
+    evidence=seen(
         "jgerstmayr/EXUDYN, main/src/Objects/CObjectContactSphereSphere.cpp @e44aca1b (2026)",
         note="its first year was not seen",
     ),
@@ -406,8 +396,7 @@ NEWTON_SEMI_IMPLICIT = approach_dashpot(
     year=2025,
     equation="F = K δ + k_d δ̇, then F = K δ;  e = exp(−ζ acos(ζ)/√(1 − ζ²)),  ζ = k_d/(2 √(K m))",
     reference="Newton, eval_body_contact; K and k_d are the means of ke and kd of both shapes",
-    evidence=Evidence(
-        "seen",
+    evidence=seen(
         "newton 1.8.0, newton/_src/solvers/semi_implicit/kernels_contact.py",
         note="its year is that of the licence; of warp.sim a copy of its kernel was seen",
     ),

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..evidence import Evidence
+from ..evidence import seen
 from ..force_expressions import spring, unload_to_residual, unload_with_stiffness
 from ..model import ForceModel, Parameter
 from ..powers import power
@@ -20,8 +20,7 @@ LANKARANI_NIKRAVESH_1994 = ForceModel(
     reference="Lankarani HM, Nikravesh PE (1994) Continuous contact force models for impact analysis in "
     "multibody systems. Nonlinear Dyn. 5, 193",
     doi="10.1007/BF00045676",
-    evidence=Evidence(
-        "seen",
+    evidence=seen(
         f"{GHARIB_HURMUZLU}, equations (29) to (32)",
         doi="modelica/ModelicaStandardLibrary, ElastoGap.mo @b756f9deed (2026)",
     ),
@@ -42,8 +41,7 @@ GHARIB_HURMUZLU_2012_ENERGETIC = replace(
     reference="Gharib M, Hurmuzlu Y (2012) A new contact force model for low coefficient of restitution impact. "
     "J. Appl. Mech. 79, 064506",
     doi="10.1115/1.4006494",
-    evidence=Evidence(
-        "seen",
+    evidence=seen(
         f"{GHARIB_HURMUZLU}, equations (33) to (42)",
         doi=GHARIB_HURMUZLU,
         note="(39) as printed has K in the place of Kᵣ",
@@ -60,8 +58,7 @@ BILINEAR = ForceModel(
     reference="Walton OR, Braun RL (1986) Viscosity, granular-temperature, and stress calculations for shearing "
     "assemblies of inelastic, frictional disks. J. Rheol. 30, 949",
     doi="10.1122/1.549893",
-    evidence=Evidence(
-        "seen",
+    evidence=seen(
         f"{GHARIB_HURMUZLU}, equation (43); rlrangel/DEMLab, ContactForceN_ElastoPlasticLinear.m @23e741d (2024)",
         doi=DEMLAB_PLASTIC,
     ),
@@ -83,7 +80,7 @@ ISMAIL_STRONGE_2008 = replace(
     reference="Ismail KA, Stronge WJ (2008) Impact of viscoplastic bodies: dissipation and restitution. "
     "J. Appl. Mech. 75, 061011",
     doi="",
-    evidence=Evidence("seen", f"{GHARIB_HURMUZLU}, equation (43)", note="the paper itself was not seen"),
+    evidence=seen(f"{GHARIB_HURMUZLU}, equation (43)", note="the paper itself was not seen"),
     parameters=(Parameter("gamma", "1", "plastic loss factor γ", 2.0, 1.0),),
     coefficients={"Kr": lambda K, gamma: gamma * gamma * K},
     oracle=lambda gamma: np.divide(1.0, gamma),

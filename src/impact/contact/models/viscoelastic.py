@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Literal, Unpack
 
 from ..closed_forms.viscoelastic import pade_damping
-from ..evidence import Evidence
+from ..evidence import derived, not_verified, seen
 from ..force_expressions import dragged
 from ..formula_calls import Formula
 from ..model import About, ForceModel, Parameter
@@ -46,8 +46,7 @@ KUWABARA_KONO_1987 = drag(
     "Appl. Phys. 26, 1230; Brilliantov NV, Spahn F, Hertzsch JM, Pöschel T (1996) Phys. Rev. E 53, 5382; Ramírez "
     "R, Pöschel T, Brilliantov NV, Schwager T (1999) Phys. Rev. E 60, 4465",
     doi="10.1143/JJAP.26.1230",
-    evidence=Evidence(
-        "seen",
+    evidence=seen(
         "kuwt/MercuryDPM_fork, HertzianBSHPViscoelasticInteraction.cc @e548763b (2023); rlrangel/DEMLab @23e741d "
         "(2024)",
         doi=DEMLAB_VISCOELASTIC,
@@ -65,7 +64,7 @@ LEE_HERRMANN_1993 = drag(
     reference="Lee J, Herrmann HJ (1993) Angle of repose and angle of marginal stability: molecular dynamics of "
     "granular particles. J. Phys. A 26, 373",
     doi="10.1088/0305-4470/26/2/021",
-    evidence=Evidence("seen", DEMLAB_VISCOELASTIC, doi=DEMLAB_VISCOELASTIC),
+    evidence=seen(DEMLAB_VISCOELASTIC, doi=DEMLAB_VISCOELASTIC),
     parameters=(damping("gamma", "1/s", "damping γ per effective mass"),),
     c=lambda gamma, m: gamma * m,
     q=0.0,
@@ -80,8 +79,7 @@ KUWABARA_KONO_AT_SPEED = drag(
     reference="Müller P, Pöschel T (2011) Phys. Rev. E 84, 021302; Brilliantov NV, Spahn F, Hertzsch JM, Pöschel "
     "T (1996) Model for collisions in granular gases. Phys. Rev. E 53, 5382",
     doi="10.1103/PhysRevE.84.021302",
-    evidence=Evidence(
-        "seen",
+    evidence=seen(
         "c61292558/yade4deepin, a copy of YADE 2025.2.0, pkg/dem/HertzMindlin.cpp @f1486c0 (2025); the form P "
         "also in the self tests of MercuryDPM (2023)",
         doi="kuwt/MercuryDPM_fork, HertzianBSHPViscoelasticInteraction @e548763b (2023)",
@@ -100,7 +98,7 @@ HERTZ_POWER_DAMPING = ForceModel(
     equation="F = K δ^(3/2) + C δ^q δ̇, to F = 0",
     reference="the general form of lee-herrmann-1993 (q = 0), tsuji-1992-no-tension (1/4) and kuwabara-kono-1987 "
     "(1/2)",
-    evidence=Evidence("derived", "the form itself, for a damping of the user"),
+    evidence=derived("the form itself, for a damping of the user"),
     parameters=(
         damping("C", "N s/m^(q+1)", "damping coefficient"),
         Parameter("q", "1", "exponent of the indentation in the damping", default=0.5, least=0.0, most=10.0),
@@ -119,8 +117,7 @@ BORDBAR_HYPPANEN_2007 = drag(
     equation="F = K δ^(3/2) + C δ^0.65 δ̇, to F = 0",
     reference="Bordbar MH, Hyppänen T (2007) Modeling of binary collision between multisize viscoelastic spheres. "
     "J. Numer. Anal. Ind. Appl. Math. 2, 115",
-    evidence=Evidence(
-        "not verified",
+    evidence=not_verified(
         note="the paper is in lists of references; the formula was seen nowhere; hertz-power-damping with q = "
         "0.65 is the same",
     ),
