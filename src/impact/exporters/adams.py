@@ -8,9 +8,8 @@ from .code import Code, Collision, Lines, Parameters
 MM_PER_M = 1000.0
 
 
-def parameters(collision: Collision) -> dict[str, float | str]:
+def parameters(c: Collision) -> dict[str, float | str]:
     """Stiffness, exponent, damping and penetration in mm, N, s and kg."""
-    c = collision
     return {
         "stiffness": c["K"] / MM_PER_M ** c["n"],
         "exponent": c["n"],

@@ -59,9 +59,8 @@ def from_material(collision: Collision) -> bool:
     return of_material and not (force == "Hooke" and collision.has_user_stiffness)
 
 
-def parameters(collision: Collision) -> dict[str, float | str]:
+def parameters(c: Collision) -> dict[str, float | str]:
     """Write the properties of the material, or the coefficients kn and gn, and the settings of the system."""
-    c = collision
     system, force, _ = SETTINGS[c.model.key]
     settings: dict[str, float | str] = {"ContactForceModel": force}
     if not from_material(c):
@@ -82,9 +81,8 @@ def parameters(collision: Collision) -> dict[str, float | str]:
     return settings
 
 
-def coefficients(collision: Collision) -> dict[str, float | str]:
+def coefficients(c: Collision) -> dict[str, float | str]:
     """kn and gn: Hooke multiplies gn by m, Hertz multiplies kn by R* √δ and gn by R* √δ m."""
-    c = collision
     K, m = c["K"], c["m"]
     if c.model.key == "kuwabara-kono-1987":
         radius = c.effective_radius
@@ -161,8 +159,7 @@ def notes(collision: Collision) -> Lines:
     yield "the same law in 6.0.0 to 10.0.0; before 9.0.0 the material was ChMaterialSurfaceSMC"
 
 
-def warnings(collision: Collision) -> Lines:
-    c = collision
+def warnings(c: Collision) -> Lines:
     if c.model.key == "chrono-smc-flores" and abs(c["vc"] / c["v0"] - 1.0) > 0.01:
         yield (
             f"Flores takes characteristic_vel = {quantity(c['vc'], 'm/s')} for the closing speed, which is "

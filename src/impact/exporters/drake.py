@@ -61,12 +61,11 @@ v1, v2 = {{ each("joint.get_translation_rate(context)", "joint in joints", v2) }
 """
 
 
-def parameters(collision: Collision) -> dict[str, float | str]:
+def parameters(c: Collision) -> dict[str, float | str]:
     """Point stiffness [N/m] and dissipation [s/m] of each ball; those of one where both are the same.
 
     The stiffnesses act in series. A stiffness of the contact that the user sets replaces theirs, at their ratio.
     """
-    c = collision
     k1, k2 = c["k1"], c["k2"]
     if c.has_user_stiffness:
         k1, k2 = c["K"] * (1.0 + k1 / k2), c["K"] * (1.0 + k2 / k1)

@@ -38,9 +38,9 @@ print("e_out =", (v2 - v1) / {{ v0 }})
 """
 
 
-def parameters(collision: Collision) -> dict[str, float | str]:
+def parameters(c: Collision) -> dict[str, float | str]:
     """Write the arguments of CreateSphereSphereContact."""
-    c, number = collision, IMPACT_MODELS[collision.model.key]
+    number = IMPACT_MODELS[c.model.key]
     loss = {"restitutionCoefficient": c["e"]} if number else {"contactDamping": c["C"]}
     return {"impactModel": number, "contactStiffness": c["K"], "contactStiffnessExponent": c["n"], **loss}
 

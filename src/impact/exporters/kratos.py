@@ -156,9 +156,8 @@ os._exit(0)
 '''
 
 
-def parameters(collision: Collision) -> dict[str, float | str]:
+def parameters(c: Collision) -> dict[str, float | str]:
     """Variables of the materials and of their relation, by their names in Kratos."""
-    c = collision
     c.require_materials("Kratos takes Young's modulus and Poisson's ratio")
     values: dict[str, float | str] = {"YOUNG_MODULUS": c["E1"], "POISSON_RATIO": c["nu1"]}
     if not c.has_one_material:

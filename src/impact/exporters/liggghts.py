@@ -66,9 +66,8 @@ def read_version(text: str) -> str:
     return text
 
 
-def parameters(collision: Collision) -> dict[str, float | str]:
+def parameters(c: Collision) -> dict[str, float | str]:
     """Write the words after each property of fix property/global: its kind, and values by (pair of) types."""
-    c = collision
     c.require_materials("LIGGGHTS takes Young's modulus and Poisson's ratio")
     if c.friction and not math.isnan(c["kt_over_kn"]):
         raise UsageError("kt_over_kn: LIGGGHTS has none; tangential_reduce = on of model hooke is 2/7")

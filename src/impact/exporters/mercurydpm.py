@@ -14,9 +14,8 @@ SPECIES = {
 }
 
 
-def parameters(collision: Collision) -> dict[str, float | str]:
+def parameters(c: Collision) -> dict[str, float | str]:
     """Write the arguments of the setters; the mass is twice the effective one."""
-    c = collision
     if c.model.key == "mercurydpm-linear-viscoelastic":
         return {"stiffness": c["K"], "restitution": c["e"], "mass": 2.0 * c["m"]}
     loss = {"restitution": c["e"]} if c.model.key == "tsuji-1992" else {"dissipation": c["A"]}
@@ -37,8 +36,7 @@ def lines(collision: Collision, parameters: Parameters) -> Lines:
     yield f"setTimeStep({collision.dt!r});"
 
 
-def notes(collision: Collision) -> Lines:
-    c = collision
+def notes(c: Collision) -> Lines:
     yield "in SI, C++; the values are those of the pair"
     if c.model.key == "mercurydpm-linear-viscoelastic":
         yield "two species: the mixed one has the harmonic means 2/(1/a + 1/b) of stiffness and dissipation"

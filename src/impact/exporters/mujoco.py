@@ -72,9 +72,8 @@ OF_FRICTION = (
 )
 
 
-def parameters(collision: Collision) -> dict[str, float | str]:
+def parameters(c: Collision) -> dict[str, float | str]:
     """Write the attributes of a geom; solref holds numbers per effective mass."""
-    c = collision
     if c.model.key == "mujoco-solref":
         if c["timeconst"] < 2.0 * c.dt:
             raise UsageError(

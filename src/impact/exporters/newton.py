@@ -56,9 +56,8 @@ v1, v2 = (float(speed[0]) for speed in state.body_qd.numpy())
 """
 
 
-def parameters(collision: Collision) -> dict[str, float | str]:
+def parameters(c: Collision) -> dict[str, float | str]:
     """Write the attributes of ShapeConfig, the same for both shapes."""
-    c = collision
     normal = {"ke": c["K"], "kd": c["kd"]}
     if not c.friction:
         return {**normal}
@@ -72,8 +71,7 @@ def lines(collision: Collision, parameters: Parameters) -> Lines:
     return [f"contact = newton.ModelBuilder.ShapeConfig({values}{smooth})", f"dt = {collision.dt!r}"]
 
 
-def notes(collision: Collision) -> Lines:
-    c = collision
+def notes(c: Collision) -> Lines:
     # the spacing of coordinates near a radius, over the peak indentation of the undamped spring
     share = 2.0**-23 * c["R1"] / (c["v0"] * math.sqrt(c["m"] / c["K"]))
     yield "in SI, the same for both shapes: ke and kd of a contact are the means, not those of springs in series"

@@ -46,9 +46,8 @@ print("e_out =", (v2 - v1) / {{ v0 }})
 """
 
 
-def parameters(collision: Collision) -> dict[str, float | str]:
+def parameters(c: Collision) -> dict[str, float | str]:
     """Arguments of the material, except for the gap."""
-    c = collision
     match MATERIALS[c.model.key]:
         case "Hertzdamp":
             return {"Kh": c["K"], "xiNorm": 8.0 * (1.0 - c["e"]) / (5.0 * c["e"]), "n": c["n"]}

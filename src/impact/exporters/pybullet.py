@@ -46,9 +46,8 @@ v1, v2 = (bullet.getBaseVelocity(ball)[0][0] for ball in balls)
 """
 
 
-def parameters(collision: Collision) -> dict[str, float | str]:
+def parameters(c: Collision) -> dict[str, float | str]:
     """Write the arguments of changeDynamics for each of two bodies, whose springs act in series."""
-    c = collision
     normal = {"contactStiffness": 2.0 * c["K"], "contactDamping": 0.5 * c["C"]}
     # the coefficient of a contact is the product of those of both bodies
     return {**normal, "lateralFriction": math.sqrt(c["mu"])} if c.friction else {**normal}

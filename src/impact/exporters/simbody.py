@@ -58,9 +58,8 @@ print("e_out =", (v2 - v1) / {{ v0 }})
 '''
 
 
-def parameters(collision: Collision) -> dict[str, float | str]:
+def parameters(c: Collision) -> dict[str, float | str]:
     """Write stiffness and dissipation of each sphere; the stiffness is the modulus of plane strain."""
-    c = collision
     c.require_materials("Simbody takes the moduli of both spheres")
     values: dict[str, float | str] = {}
     for i in (1, 2):

@@ -11,9 +11,8 @@ from .code import Code, Collision, Lines, Parameters
 WIDE_TRANSITION = 0.1
 
 
-def parameters(collision: Collision) -> dict[str, float | str]:
+def parameters(c: Collision) -> dict[str, float | str]:
     """Write the parameters of the section Normal Force, in the block's default units."""
-    c = collision
     return {
         "NormalForceType": "SmoothSpringDamper",
         "NormalStiffness": c["K"],
@@ -27,9 +26,8 @@ def lines(collision: Collision, parameters: Parameters) -> Lines:
     return ["set_param(block, ...", *(f"    {pair}, ..." for pair in pairs[:-1]), f"    {pairs[-1]});"]
 
 
-def transition_share(collision: Collision) -> float:
+def transition_share(c: Collision) -> float:
     """Compute the width of the transition region over the undamped peak indentation v₀ √(m/K) [-]."""
-    c = collision
     return c["w"] / (c["v0"] * math.sqrt(c["m"] / c["K"]))
 
 

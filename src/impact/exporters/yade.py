@@ -75,13 +75,12 @@ def law_for_version(key: str, version: str) -> str:
     return key
 
 
-def parameters(collision: Collision) -> dict[str, float | str]:
+def parameters(c: Collision) -> dict[str, float | str]:
     """Arguments of the material and of the functor that makes the contact.
 
     Those of viscoelastic contacts are of each ball, whose springs and dashpots act in series. The tangential
     stiffness of the other contacts is 8 G* a.
     """
-    c = collision
     angle = {"frictionAngle": math.atan(c["mu"])} if c.friction else {}
     if "viscoelastic" in c.model.key:
         values: dict[str, float | str] = {"kn": 2.0 * c["K"], "cn": 2.0 * c["C"], "ks": 0.0, "cs": 0.0}
