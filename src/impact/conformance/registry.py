@@ -51,10 +51,9 @@ class Engine:
 
     def command(self, program: str | None) -> tuple[list[str], str]:
         """Make the command of the adapter, for the requested or the installed program, and find its version."""
-        path = self.program.find(program)
+        path, version = self.program.find(program)
         if path is None and program is not None:
             raise _no_program(program)
-        version = None if path is None else self.program.version_of(path)
         if path is None or version is None:
             place = "on the path" if path is None else f"in {path}" if self.is_package else f"as {path}"
             missing = f"{self.name}: {self.title} is not installed {place}"
@@ -121,17 +120,13 @@ class Engines(Displayed):
             {
                 "engine": engine.name,
                 "title": engine.title,
-                "version": self._version(engine),
+                # an interpreter was asked, which is none of the other programs
+                "version": engine.program.find(self.program if engine.is_package else None)[1],
                 "install": engine.program.install,
                 "settings": engine.settings,
             }
             for engine in ENGINES.values()
         ]
-
-    def _version(self, engine: Engine) -> str | None:
-        # an interpreter was asked, which is none of these programs
-        found = engine.program.find(self.program if engine.is_package else None)
-        return found and engine.program.version_of(found)
 
     def sections(self, width: int) -> Iterator[Block]:
         headings = ("engine", "version", "install", "settings")

@@ -12,7 +12,7 @@ from typing import Any
 from .._version import __version__
 from ..contact.numba.dispatch import is_installed
 from ..display import Block, Displayed, Table
-from .programs import package_version
+from .programs import find_program, package_version
 from .registry import CODES
 from .releases import installed_version
 
@@ -76,7 +76,7 @@ def doctor() -> Environment:
     for code in CODES.values():
         if code.program:
             version = installed_version(code)
-            program = code.program.find() if version else None
+            program = find_program(code.program.name) if version else None
             codes.append({"code": code.name, "version": version, "program": program})
     core: dict[str, str | None] = {"numba": None, "cache": None}
     if is_installed():

@@ -43,9 +43,10 @@ class Program:
     version_of: Callable[[str], str | None]
     command: Callable[[str, str], Sequence[str]] = lambda program, file: (program, file)
 
-    def find(self, requested: str | None = None) -> str | None:
-        """Find the requested program, or the one that is installed."""
-        return find_program(self.name, requested)
+    def find(self, requested: str | None = None) -> tuple[str | None, str | None]:
+        """Find the requested program, or the one that is installed, and its version; None where it is missing."""
+        path = find_program(self.name, requested)
+        return path, None if path is None else self.version_of(path)
 
 
 def find_program(name: str, requested: str | None = None) -> str | None:

@@ -28,14 +28,14 @@ def read_release(code: Code, text: str, origin: str) -> str:
 def installed_version(code: Code) -> str | None:
     """Find the version of a code that is installed here; None also for a program that reports no release."""
     with contextlib.suppress(UsageError):
-        return _version_of(code, code.program.find() if code.program else None)
+        return _find_release(code, None)[1]
     return None
 
 
-def _version_of(code: Code, path: str | None) -> str | None:
-    """Ask a program for its version, in the form in which versions are compared."""
-    text = code.program.version_of(path) if code.program and path else None
-    return None if text is None else read_release(code, text, f"version of {path}")
+def _find_release(code: Code, program: str | None) -> tuple[str | None, str | None]:
+    """Find what runs scripts, and its version in the form in which versions are compared."""
+    path, text = code.program.find(program) if code.program else (None, None)
+    return path, None if text is None else read_release(code, text, f"version of {path}")
 
 
 def choose_version(
@@ -49,8 +49,7 @@ def choose_version(
     must_run = verify or program is not None
     if not code.program and must_run:
         raise UsageError(f"{argument('verify')}: no script for {code.title}: {code.tested}")
-    path = code.program.find(program) if code.program else None
-    installed = _version_of(code, path)
+    path, installed = _find_release(code, program)
     if code.program and installed is None and must_run:
         name = "" if program is None else f'"{program}": '
         raise UsageError(f"{name}no {code.title} there; {code.program.install}, or {argument('program', 'FILE')}")
