@@ -38,7 +38,7 @@ def beta_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     line, pairs = _pairs_along(dataset, choice, "beta")
     guides = [_guide(line.coordinate, value, text) for value, text in BETA_GUIDES]
     panel = _panel(line, pairs, "beta", "Tangential restitution of the contact", guides)
-    return complete(dataset, line, "Tangential restitution of the contact", [panel], choice)
+    return complete(line, "Tangential restitution of the contact", [panel], choice)
 
 
 def e_t_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
@@ -46,7 +46,7 @@ def e_t_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     line, pairs = _pairs_along(dataset, choice, "e_t")
     guides = [_guide(line.coordinate, e_t, "sticks") for e_t in _sticking_e_t(line.data)]
     panel = _panel(line, pairs, "e_t", "Tangential restitution of the centres", guides)
-    return complete(dataset, line, "Tangential restitution of the centres", [panel], choice)
+    return complete(line, "Tangential restitution of the centres", [panel], choice)
 
 
 def impulse_ratio_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
@@ -57,7 +57,7 @@ def impulse_ratio_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     mu = line.data["mu"].values
     signs = [(sign, text) for sign, text in ((1.0, "μ"), (-1.0, "−μ")) if np.nanmax(sign * values) > 0.0]
     guides = [_guide(line.coordinate, sign * mu, text) for sign, text in signs]
-    return complete(dataset, line, "Impulse ratio", [replace(panel, curves=(*guides, *panel.curves))], choice)
+    return complete(line, "Impulse ratio", [replace(panel, curves=(*guides, *panel.curves))], choice)
 
 
 def spin_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
@@ -70,7 +70,7 @@ def spin_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     curves = [c for name in turning for c in law_curves(pairs, line.coordinate, {name: ends.get(name, "")})]
     y_name = "omega_post" if ends else turning[0]
     panel = Panel("", "Spin after the impact", tuple(curves), y_unit=OUTPUTS[turning[0]].unit, y_name=y_name)
-    return complete(dataset, line, "Spin after the impact", [panel], choice)
+    return complete(line, "Spin after the impact", [panel], choice)
 
 
 def psi_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
@@ -93,7 +93,7 @@ def psi_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     guides = [_guide(along, along, "smooth"), _guide(along, 0.0, "sticks")]
     panel = Panel("", "Slip after the impact", (*guides, *curves), y_name="psi2")
     x_axis = {"x_name": "psi1", "x_label": "Slip before the impact", "x_unit": "1", "x_log": False}
-    return complete(dataset, line, "Slip after over slip before the impact", [panel], choice, **x_axis)
+    return complete(line, "Slip after over slip before the impact", [panel], choice, **x_axis)
 
 
 def friction_loop_curves(histories: Sequence[xr.Dataset], choice: Choice) -> CurveData:

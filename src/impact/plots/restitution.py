@@ -12,11 +12,11 @@ import xarray as xr
 
 from ..errors import UsageError
 from ..formatting import argument, label as number_label, safe_text
-from ..results.selection import require_outputs, select
+from ..results.selection import require_outputs
 from .curves import Curve, CurveData, Panel, curve_of, law_curves, x_axis_fields
 from .kinds import Choice, Kind
 from .labels import REFERENCE, LawPart, NamedLaw, split_by_law, with_model
-from .slices import Line, choose_line, conditions_of, is_ordered, numeric_axes, read, take_line
+from .slices import Line, choose_line, conditions_of, numeric_axes, read, take_line
 
 FIGURE_6 = "Final velocities comparison"
 # distances from zero that are shaded, the widest first
@@ -41,7 +41,7 @@ def velocity_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     ]
     all_curves = (*_without_empty(references), *_law_curves(line, choice, ends))
     panel = Panel("", "Velocity after the impact", all_curves, y_unit="m/s", y_name="v_post")
-    return complete(dataset, line, FIGURE_6, [panel], choice)
+    return complete(line, FIGURE_6, [panel], choice)
 
 
 def restitution_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
@@ -49,7 +49,7 @@ def restitution_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     line = read_line(dataset, choice, "e_out")
     curves = (*requested_curve(line.data, line.coordinate), *_law_curves(line, choice, {"e_out": ""}))
     panel = Panel("", "Delivered restitution", curves, y_name="e_out")
-    return complete(dataset, line, "Delivered restitution", [panel], choice)
+    return complete(line, "Delivered restitution", [panel], choice)
 
 
 def error_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
@@ -67,7 +67,7 @@ def error_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
         y_floor=MIN_DRAWN_ERROR,
         y_name="abs_e_error",
     )
-    return complete(dataset, line, "Error of the restitution", [panel, absolute], choice)
+    return complete(line, "Error of the restitution", [panel, absolute], choice)
 
 
 def timestep_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
@@ -95,7 +95,7 @@ def timestep_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     panel = Panel("", "Delivered restitution", tuple(curves), y_name="e_out", band_name=band_name)
     title = f"Restitution at fixed steps, {safe_text(str(dataset.attrs.get('integrator', '')), 40)}"
     x_axis = {"x_log": True} if line.x in STEP_AXES else {}
-    return complete(dataset, line, title, [panel], choice, **x_axis)
+    return complete(line, title, [panel], choice, **x_axis)
 
 
 def _law_curves(line: Line, choice: Choice, ends: Mapping[str, str]) -> list[Curve]:
@@ -143,17 +143,13 @@ def _without_empty(curves: list[Curve]) -> list[Curve]:
     return [curve for curve in curves if np.isfinite(curve.y).any()]
 
 
-def complete(
-    dataset: xr.Dataset, line: Line, title: str, panels: Sequence[Panel], choice: Choice, **x_axis: Any
-) -> CurveData:
+def complete(line: Line, title: str, panels: Sequence[Panel], choice: Choice, **x_axis: Any) -> CurveData:
     """Complete panels with the x axis of their line, or other fields, and add the title and the conditions."""
-    heading = safe_text(str(dataset.attrs.get("title", "")), 140)
+    heading = safe_text(str(line.data.attrs.get("title", "")), 140)
     conditions = with_model(conditions_of(line.data, line.x), line.data, numbered=choice.equations)
     if heading and title != FIGURE_6:
         heading, conditions = title, ": ".join(filter(None, (heading, conditions)))
-    # in the order of the result; e of an alpha has one axis only after a selection
-    joined = is_ordered(select(dataset, choice.sel or {}), line.x)
-    x_axis = {**x_axis_fields(line.coordinate), "joined": joined, **x_axis}
+    x_axis = {**x_axis_fields(line.coordinate), "joined": line.is_ordered, **x_axis}
     panels = [replace(panel, **x_axis).with_log_axes(choice.log) for panel in panels]
     empty = {c.law: None for panel in panels for c in panel.curves if c.law and not np.isfinite(c.y).any()}
     without_value = tuple(f"{key}, which has no point here" for key in empty)

@@ -39,6 +39,7 @@ class Line(NamedTuple):
     data: xr.Dataset
     x: str
     not_drawn: tuple[str, ...]
+    is_ordered: bool  # so that a line may join its points
 
     @property
     def coordinate(self) -> xr.DataArray:
@@ -102,7 +103,8 @@ def take_line(dataset: xr.Dataset, choice: Choice, keep: Sequence[str] = ()) -> 
     line, not_drawn = _sorted_along(_drop_other_axes(dataset, [dataset[x].dims[0], *kept]), x)
     if not line[x].size:
         raise UsageError(f"{x} has no finite value to draw over")
-    return Line(line, x, not_drawn)
+    # in the order of the result; e of an alpha has one axis only after a selection
+    return Line(line, x, not_drawn, _is_ordered(dataset, x))
 
 
 def take_plane(
@@ -165,8 +167,8 @@ def _sorted_along(dataset: xr.Dataset, name: str) -> tuple[xr.Dataset, tuple[str
     return (dataset if in_order else dataset.isel({dataset[name].dims[0]: order})), not_drawn
 
 
-def is_ordered(dataset: xr.Dataset, name: str) -> bool:
-    """Whether the points along a coordinate have an order, so that a line may join them."""
+def _is_ordered(dataset: xr.Dataset, name: str) -> bool:
+    """Whether the points along a coordinate have an order."""
     (dim,) = dataset[name].dims
     # the dimension of cases and samples only numbers them
     if dim not in dataset.coords or dataset[dim].dtype.kind in "iu":

@@ -37,7 +37,7 @@ def uncertainty_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     if x in dataset.coords and dataset[x].dims == (SAMPLE,):
         raise UsageError(f"{argument('x', x)}: is an uncertain input, expected another axis")
     keep = (SAMPLE, "friction") if "friction" in dataset[name].dims else (SAMPLE,)
-    line, x_name, not_drawn = take_line(dataset, replace(choice, x=x or SAMPLE), keep)
+    line, x_name, not_drawn, _ = take_line(dataset, replace(choice, x=x or SAMPLE), keep)
     line = read(line, [name])
     meaning = "Delivered restitution" if name == "e_out" else words_of(line[name].attrs, name).capitalize()
     curves: list[Curve] = []
