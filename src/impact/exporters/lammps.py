@@ -8,31 +8,26 @@ from datetime import datetime
 
 import numpy as np
 
+from ..contact.frictions.granular_codes import LAMMPS_LINEAR, LAMMPS_MINDLIN
 from ..contact.materials import effective_shear_modulus
+from ..contact.models.lammps import LAMMPS_MODELS
 from ..errors import UsageError
 from ..formatting import argument, number
 from .code import Code, Collision, Lines, Parameters
 from .programs import Program, printed_version
 
-# normal and damping model of pair style granular, by key of the catalogue
-OPTIONS = {
-    f"lammps-{name}{limit}": (spring, damping, " limit_damping" if limit else "")
-    for name, spring, damping in (
-        ("coeff-restitution-hertz", "hertz", "coeff_restitution"),
-        ("coeff-restitution-hooke", "hooke", "coeff_restitution"),
-        ("tsuji", "hertz", "tsuji"),
-        ("tsuji-hooke", "hooke", "tsuji"),
-        ("tsuji-without-root", "hertz", "tsuji"),
-        ("tsuji-hooke-without-root", "hooke", "tsuji"),
-        ("velocity-hertz", "hertz", "velocity"),
-        ("velocity-hooke", "hooke", "velocity"),
-        ("mass-velocity-hertz", "hertz", "mass_velocity"),
-        ("mass-velocity-hooke", "hooke", "mass_velocity"),
-        ("viscoelastic-hertz", "hertz", "viscoelastic"),
-        ("viscoelastic-hooke", "hooke", "viscoelastic"),
-    )
-    for limit in ("", "-limit")
-}
+
+def words_of(key: str) -> tuple[str, str, str]:
+    """Find the normal model, the damping model and the option that a key names; tsuji alone is of hertz.
+
+    >>> words_of("lammps-mass-velocity-hooke-limit"), words_of("lammps-tsuji-without-root")
+    (('hooke', 'mass_velocity', ' limit_damping'), ('hertz', 'tsuji', ''))
+    """
+    damping = re.sub("^lammps-|-(hertz|hooke|without-root|limit)", "", key).replace("-", "_")
+    return "hooke" if "-hooke" in key else "hertz", damping, " limit_damping" if key.endswith("-limit") else ""
+
+
+OPTIONS = {law.key: words_of(law.key) for law in LAMMPS_MODELS}
 # pull request 5113 with the factor √2 was last discussed on this day; releases since then have it
 ROOT_SINCE = "20260729"
 # the first releases with coeff_restitution and with limit_damping, by month
@@ -48,14 +43,7 @@ DATES = (
     (r"^(\d{4})[.-](\d{1,2})[.-](\d{1,2})", "%Y %m %d"),
 )
 # tangential model of pair style granular, by key of the catalogue
-FRICTIONS = {
-    "lammps-linear-history": "linear_history",
-    "lammps-linear-nohistory": "linear_nohistory",
-    "lammps-mindlin": "mindlin",
-    "lammps-mindlin-force": "mindlin/force",
-    "lammps-mindlin-rescale": "mindlin_rescale",
-    "lammps-mindlin-rescale-force": "mindlin_rescale/force",
-}
+FRICTIONS = {law.key: law.title.removeprefix("LAMMPS ") for law in (*LAMMPS_LINEAR, *LAMMPS_MINDLIN)}
 # of LAMMPS and LIGGGHTS; the normal is along x, the tangent along y, so that spins are about z. A compute has a
 # value after the run if it was printed at the last step
 RUN = """\

@@ -37,7 +37,7 @@ DAMPING_SOURCE = "lammps/lammps, src/GRANULAR/gran_sub_mod_damping.cpp @07b704ca
 DAMPING_SOURCE_2024 = "LAMMPS release of 29 August 2024, src/GRANULAR/gran_sub_mod_damping.cpp"
 # limit_damping: pull request 2698, first in patch_8Apr2021
 LIMIT_YEAR = 2021
-MASS_VELOCITY = (damping("gamma", "1/s", "damping γ per effective mass"),)
+MASS_VELOCITY = LEE_HERRMANN_1993.parameters
 VISCOELASTIC = (damping("eta", "1/m/s", "damping η per effective mass and contact radius"),)
 
 # (key, release="gap" or "force", fields of ForceModel) -> law that ends at zero indentation or at zero force
@@ -99,14 +99,7 @@ def mass_velocity_hertz(key: str, *, release: str, **about: Any) -> ForceModel:
     """Make the law F = K δ^(3/2) + γ m δ̇; with release "force" it is that of Lee and Herrmann."""
     if release == "force":
         return same_law(LEE_HERRMANN_1993, key, **about)
-    return drag(
-        key,
-        c=lambda gamma, m: gamma * m,
-        q=0.0,
-        release="gap",
-        parameters=MASS_VELOCITY,
-        **about,
-    )
+    return replace(LEE_HERRMANN_1993, key=key, release="gap", doi="", **about)
 
 
 def tsuji(root: float, exponent: float) -> MakeLaw:
@@ -149,10 +142,32 @@ WITHOUT_ROOT: dict[str, Any] = {
 COEFF_RESTITUTION: dict[str, Any] = {"since": "since June 2024", "year": 2024, "source": DAMPING_SOURCE}
 
 LAMMPS_MODELS: tuple[ForceModel, ...] = (
-    *with_and_without_limit("velocity, hooke", "C δ̇", renamed(KELVIN_VOIGT, KELVIN_VOIGT_NO_TENSION)),
+    *with_and_without_limit(
+        "coeff_restitution, hertz", f"α √(m K) δ^(1/4) δ̇,  α = √5 ζ,  ζ = {LOGARITHM}",
+        renamed(TSUJI_1992, TSUJI_1992_NO_TENSION), **COEFF_RESTITUTION,
+    ),
+    *with_and_without_limit(
+        "coeff_restitution, hooke", f"2 ζ √(m K) δ̇,  ζ = {LOGARITHM}",
+        renamed(ANAGNOSTOPOULOS_1988, ANAGNOSTOPOULOS_1988_NO_TENSION), **COEFF_RESTITUTION,
+    ),
+    *with_and_without_limit(
+        "tsuji, hertz", "α √(m K) δ^(1/4) δ̇,  α = √2 p(e), p of degree six", tsuji(np.sqrt(2.0), 1.5),
+        key="lammps-tsuji", **WITH_ROOT,
+    ),
+    *with_and_without_limit("tsuji, hooke", "α √(m K) δ̇,  α = √2 p(e)", tsuji(np.sqrt(2.0), 1.0), **WITH_ROOT),
+    *with_and_without_limit(
+        "tsuji, hertz", "α √(m K) δ^(1/4) δ̇,  α = p(e), p of degree six", tsuji(1.0, 1.5),
+        key="lammps-tsuji-without-root", **WITHOUT_ROOT,
+    ),
+    *with_and_without_limit(
+        "tsuji, hooke", "α √(m K) δ̇,  α = p(e)", tsuji(1.0, 1.0),
+        key="lammps-tsuji-hooke-without-root", **WITHOUT_ROOT,
+    ),
     *with_and_without_limit(
         "velocity, hertz", "C δ̇", partial(drag, c=lambda C: C, q=0.0, parameters=DASHPOT_CONSTANT),
     ),
+    *with_and_without_limit("velocity, hooke", "C δ̇", renamed(KELVIN_VOIGT, KELVIN_VOIGT_NO_TENSION)),
+    *with_and_without_limit("mass_velocity, hertz", "γ m δ̇", mass_velocity_hertz, since="since 2019"),
     *with_and_without_limit(
         "mass_velocity, hooke", "γ m δ̇",
         partial(
@@ -160,30 +175,8 @@ LAMMPS_MODELS: tuple[ForceModel, ...] = (
         ),
         since="since 2019",
     ),
-    *with_and_without_limit("mass_velocity, hertz", "γ m δ̇", mass_velocity_hertz, since="since 2019"),
-    *with_and_without_limit("viscoelastic, hooke", "η m √(R* δ) δ̇", viscoelastic(1.0)),
     *with_and_without_limit(
         "viscoelastic, hertz", "η m √(R* δ) δ̇", viscoelastic(1.5), note="pair style gran/hertz/history has it too",
     ),
-    *with_and_without_limit("tsuji, hooke", "α √(m K) δ̇,  α = √2 p(e)", tsuji(np.sqrt(2.0), 1.0), **WITH_ROOT),
-    *with_and_without_limit(
-        "tsuji, hooke", "α √(m K) δ̇,  α = p(e)", tsuji(1.0, 1.0),
-        key="lammps-tsuji-hooke-without-root", **WITHOUT_ROOT,
-    ),
-    *with_and_without_limit(
-        "tsuji, hertz", "α √(m K) δ^(1/4) δ̇,  α = √2 p(e), p of degree six", tsuji(np.sqrt(2.0), 1.5),
-        key="lammps-tsuji", **WITH_ROOT,
-    ),
-    *with_and_without_limit(
-        "tsuji, hertz", "α √(m K) δ^(1/4) δ̇,  α = p(e), p of degree six", tsuji(1.0, 1.5),
-        key="lammps-tsuji-without-root", **WITHOUT_ROOT,
-    ),
-    *with_and_without_limit(
-        "coeff_restitution, hooke", f"2 ζ √(m K) δ̇,  ζ = {LOGARITHM}",
-        renamed(ANAGNOSTOPOULOS_1988, ANAGNOSTOPOULOS_1988_NO_TENSION), **COEFF_RESTITUTION,
-    ),
-    *with_and_without_limit(
-        "coeff_restitution, hertz", f"α √(m K) δ^(1/4) δ̇,  α = √5 ζ,  ζ = {LOGARITHM}",
-        renamed(TSUJI_1992, TSUJI_1992_NO_TENSION), **COEFF_RESTITUTION,
-    ),
+    *with_and_without_limit("viscoelastic, hooke", "η m √(R* δ) δ̇", viscoelastic(1.0)),
 )  # fmt: skip
