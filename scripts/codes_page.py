@@ -9,8 +9,7 @@ from impact.contact.fixed_step import SCHEMES
 from impact.errors import UsageError
 from impact.exporters.code import Code
 from impact.exporters.problem import ExportProblem, prepare_export
-from impact.exporters.registry import CODES
-from impact.exporters.releases import has_law
+from impact.exporters.registry import CODES, has_law
 from impact.inverse.timestep import timestep_rows
 from models_tables import cell, table
 

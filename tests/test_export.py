@@ -20,8 +20,7 @@ from impact.errors import ConfigError, UsageError
 from impact.exporters.code import Code
 from impact.exporters.export import comment_lines
 from impact.exporters.programs import run_program
-from impact.exporters.registry import CODES
-from impact.exporters.releases import first_law, installed_version
+from impact.exporters.registry import CODES, first_law, installed_version
 from impact.exporters.verification import Verification, extrapolate
 
 from .conftest import Run, assert_refused, assert_same_output, default_law, examples_of, write_program

@@ -21,8 +21,7 @@ from impact.errors import UsageError
 from impact.exporters.code import Code, Collision, Parameters
 from impact.exporters.problem import ExportProblem, prepare_export
 from impact.exporters.programs import run_program
-from impact.exporters.registry import CODES
-from impact.exporters.releases import choose_version, law_of_code
+from impact.exporters.registry import CODES, choose_version, law_of_code
 from impact.exporters.verification import Verification, run_script, verify_scripts
 
 from .conftest import Run, default_law

@@ -147,7 +147,7 @@ class Code:
     law_for_version : the entry of the catalogue that holds in a version, from the key of another one and the
         version; raises a UsageError where the version has none
     read_version : converts a version as the user or the program writes it to the form in which versions are
-        compared; raises a UsageError for any other text, see `impact.exporters.releases.read_release`
+        compared; raises a UsageError for any other text, see `impact.exporters.registry.read_release`
     comment : what begins and ends a comment among the lines
     notes : remarks on a law: mixing of two materials, thresholds, clamps, versions
     warnings : what a user has to know before using the lines

@@ -13,8 +13,7 @@ from .._version import __version__
 from ..contact.numba.dispatch import is_installed
 from ..display import Block, Displayed, Table
 from .programs import find_program, package_version
-from .registry import CODES
-from .releases import installed_version
+from .registry import CODES, installed_version
 
 DISTRIBUTION = "impact-sweep"
 # a package that users of the program may need: its name, unless an extra for development requires it

@@ -21,8 +21,7 @@ from ..inverse import timestep
 from ..results.single_impact import ConfigSource
 from .code import Collision, Parameters
 from .problem import ExportProblem, prepare_export
-from .registry import CODES, find_code
-from .releases import choose_version, installed_version
+from .registry import CODES, choose_version, find_code, installed_version
 from .verification import Verification, verify_scripts
 
 # steps per contact if no time step is given

@@ -23,7 +23,7 @@ from ..inverse.timestep import FixedStepLaw, ObliqueLaw, fixed_step_law
 from ..results.calibration import position_of_law, unidentified_notes
 from ..results.single_impact import Calibration, ConfigSource, PointSource, open_source
 from .code import Code, Collision
-from .releases import first_law, has_law, law_of_code
+from .registry import first_law, has_law, law_of_code
 
 # phases over which the mean, the least and the largest restitution are taken
 PHASES = 400
