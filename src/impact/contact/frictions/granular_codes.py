@@ -11,7 +11,7 @@ from ..fixed_step import KICK_DRIFT
 from ..friction import FrictionLaw
 from ..model import Parameter
 from ..models.cited_sources import KRATOS, LIGGGHTS, YADE_2025
-from .textbook import CONSTANT_STIFFNESS, KT_OVER_KN, MINDLIN_STIFFNESS, XT, choice, limit
+from .textbook import CONSTANT_STIFFNESS, KT_OVER_KN, MINDLIN_STIFFNESS, XT, choice, limit, stiffness
 
 # ---- LAMMPS
 
@@ -82,9 +82,7 @@ LAMMPS_CLASSIC = replace(
         "release of 22 July 2025",
     ),
     parameters=(
-        Parameter(
-            "k_t", "N/m^2", "stiffness over the radius of the contact, K_t of the code", least=1e-9, optional=True
-        ),
+        stiffness("k_t", "N/m^2", "stiffness over the radius of the contact, K_t of the code"),
         replace(XT, default=0.5),
         limit("abs"),
     ),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 from ..evidence import not_verified, seen
 from ..friction import FrictionLaw
@@ -23,19 +24,12 @@ def limit(default: str) -> Parameter:
 
 
 XT = Parameter("xt", "1", "tangential damping over the damping of the contact force", default=1.0, least=0.0)
-KT_OVER_KN = Parameter(
-    "kt_over_kn",
-    "1",
-    "stiffness over that of the contact at the same indentation, n K δⁿ⁻¹",
-    least=1e-9,
-    optional=True,
-)
+stiffness = partial(Parameter, least=1e-9, optional=True)
+KT_OVER_KN = stiffness("kt_over_kn", "1", "stiffness over that of the contact at the same indentation, n K δⁿ⁻¹")
 # one of the two has to be set, or 8 G* a is taken
-CONSTANT_STIFFNESS = (Parameter("k_t", "N/m", "tangential stiffness", least=1e-9, optional=True), KT_OVER_KN)
+CONSTANT_STIFFNESS = (stiffness("k_t", "N/m", "tangential stiffness"), KT_OVER_KN)
 MINDLIN_STIFFNESS = (
-    Parameter(
-        "k_t", "N/m^1.5", "tangential stiffness over √δ, in the place of 8 G* √R*", least=1e-9, optional=True
-    ),
+    stiffness("k_t", "N/m^1.5", "tangential stiffness over √δ, in the place of 8 G* √R*"),
     KT_OVER_KN,
 )
 
