@@ -157,7 +157,10 @@ def verify_scripts(problem: ExportProblem, program: str, dt: float, n_phases: in
     code, phases = problem.code, (np.arange(n_phases) + 0.5) / n_phases
     tolerance = code.uncertainty.get(problem.model.key, ROUNDING)
     steps = np.array([dt] if code.scheme is not None else [dt, dt / 2, dt / 4])
-    runs = [[_measure(problem, program, dt, phase) for phase in phases.tolist()] for dt in steps.tolist()]
+    runs = []
+    for dt in steps.tolist():
+        collisions = [problem.collision(dt, phase) for phase in phases.tolist()]
+        runs.append([run_script(code, program, code.script(c, code.parameters(c))) for c in collisions])
     measured = np.array([[run["e_out"] for run in row] for row in runs])
     if code.scheme is None and np.isfinite(measured).all():
         value, uncertainty = extrapolate(measured)
@@ -228,9 +231,3 @@ def extrapolate(restitutions: Array) -> tuple[float, float]:
     first, second = 2.0 * middle - coarse, 2.0 * fine - middle
     uncertainty = max(abs(fine - middle), abs(second - first)) + np.ptp(restitutions[2]) / 2.0
     return float(second), float(uncertainty)
-
-
-def _measure(problem: ExportProblem, program: str, dt: float, phase: float) -> dict[str, float]:
-    """Run the script of a collision that begins at a phase of a step dt [s], and return what it prints."""
-    code, collision = problem.code, problem.collision(dt, phase)
-    return run_script(code, program, code.script(collision, code.parameters(collision)))

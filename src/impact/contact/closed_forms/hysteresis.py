@@ -84,15 +84,6 @@ def exact_damping_ratio(e: Array | float) -> Array:
     return chi
 
 
-def _work_to_peak(chi: Array) -> Array:
-    """xₘ^(n+1)/(n+1), the elastic work up to the peak over m v₀²: (χ − ln(1 + χ))/χ²."""
-    small = chi < WORK_SERIES_BELOW_CHI
-    safe = np.where(small | np.isinf(chi), 1.0, chi)
-    series = np.polyval((-1 / 9, 1 / 8, -1 / 7, 1 / 6, -1 / 5, 1 / 4, -1 / 3, 1 / 2), np.where(small, chi, 0.0))
-    integral = np.where(small, series, (safe - np.log1p(safe)) / integer_power(safe, 2))
-    return np.where(np.isinf(chi), 0.0, integral)
-
-
 def approach_damped_restitution(chi: Array | float) -> Array:
     """The restitution delivered where F = K δⁿ (1 + χ δ̇/v₀) on approach only, and F = K δⁿ on restitution.
 
@@ -101,4 +92,9 @@ def approach_damped_restitution(chi: Array | float) -> Array:
     >>> approach_damped_restitution(np.array([0.0, 1.0])).round(9)
     array([1.        , 0.78339367])
     """
-    return np.asarray(np.sqrt(2.0 * _work_to_peak(np.asarray(chi, dtype=float))))
+    chi = np.asarray(chi, dtype=float)
+    small = chi < WORK_SERIES_BELOW_CHI
+    safe = np.where(small | np.isinf(chi), 1.0, chi)
+    series = np.polyval((-1 / 9, 1 / 8, -1 / 7, 1 / 6, -1 / 5, 1 / 4, -1 / 3, 1 / 2), np.where(small, chi, 0.0))
+    work = np.where(small, series, (safe - np.log1p(safe)) / integer_power(safe, 2))
+    return np.asarray(np.sqrt(2.0 * np.where(np.isinf(chi), 0.0, work)))

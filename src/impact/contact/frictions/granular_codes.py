@@ -16,8 +16,6 @@ from .textbook import CONSTANT_STIFFNESS, KT_OVER_KN, MINDLIN_STIFFNESS, XT, cho
 # ---- LAMMPS
 
 LAMMPS = "lammps/lammps, src/GRANULAR/gran_sub_mod_tangential.cpp @079d233c (2026)"
-LAMMPS_REFERENCE = "LAMMPS, pair style granular, tangential"
-YEAR_NOT_SEEN = "its first year was not seen"
 LAMMPS_LIMIT = "|f| ≤ μ |F|, where it slips the spring takes what the dashpot leaves"
 
 
@@ -30,8 +28,8 @@ def lammps(
         title=f"LAMMPS {option}",
         year=2019,
         equation=equation,
-        reference=f"{LAMMPS_REFERENCE} {option}{hint}",
-        evidence=seen(source, note=YEAR_NOT_SEEN),
+        reference=f"LAMMPS, pair style granular, tangential {option}{hint}",
+        evidence=seen(source, note="its first year was not seen"),
         damping="xt",
         parameters=(*stiffness, XT, limit("abs")),
         **fields,

@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from ...array_types import Array
 from ..evidence import seen
 from ..model import ForceModel
 from .aliases import same_law
@@ -30,7 +29,7 @@ from .dashpot import (
 )
 from .viscoelastic import LEE_HERRMANN_1993, drag
 
-# of the polynomial of α that LAMMPS calls tsuji and credits to Marshall (2009), equation 53, in powers of e
+# of the polynomial p(e) of α that LAMMPS calls tsuji and credits to Marshall (2009), equation 53, in powers of e
 TSUJI_POLYNOMIAL = (1.2728, -4.2783, 11.087, -22.348, 27.467, -18.022, 4.8218)
 DAMPING_KERNEL_SOURCE = "lammps/lammps, src/GRANULAR/gran_sub_mod_damping_kernel.h @07b704ca (2026)"
 DAMPING_SOURCE = "lammps/lammps, src/GRANULAR/gran_sub_mod_damping.cpp @07b704ca (2026)"
@@ -42,11 +41,6 @@ VISCOELASTIC = (damping("eta", "1/m/s", "damping η per effective mass and conta
 
 # (key, release="gap" or "force", fields of ForceModel) -> law that ends at zero indentation or at zero force
 MakeLaw = Callable[..., ForceModel]
-
-
-def tsuji_polynomial(e: Array) -> Array:
-    """Compute the polynomial p(e) by which LAMMPS computes α [-], without the factor √2; e of any shape."""
-    return np.polyval(TSUJI_POLYNOMIAL[::-1], e)
 
 
 def renamed(pulling: ForceModel, limited: ForceModel) -> MakeLaw:
@@ -105,7 +99,7 @@ def mass_velocity_hertz(key: str, *, release: str, **about: Any) -> ForceModel:
 def tsuji(root: float, exponent: float) -> MakeLaw:
     """Makes the dashpot α √(m K) δ^((n−1)/2) δ̇ with α = root p(e)."""
     scale = root / np.sqrt(2 * (exponent + 1))
-    return partial(dashpot, zeta=lambda e: scale * tsuji_polynomial(e), exponent=exponent)
+    return partial(dashpot, zeta=lambda e: scale * np.polyval(TSUJI_POLYNOMIAL[::-1], e), exponent=exponent)
 
 
 def viscoelastic(exponent: float) -> MakeLaw:
