@@ -7,7 +7,7 @@ the kind is needed.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -109,7 +109,6 @@ class Look:
 class Kind:
     """A kind of picture: a constant of its module, with the name of the kind in capitals."""
 
-    name: str
     caption: str  # a sentence for reports and the gallery
     # from a result, or, of the source "history", from the time histories of one impact
     data: Callable[[Any, Choice], PlotData]
@@ -119,6 +118,7 @@ class Kind:
     source: str = "sweep"  # what it shows, see `source_of`; the first kind in KINDS of a source is its default
     in_report: bool = True
     of_friction: bool = False  # it shows pairs of a model and a friction law
+    name: str = ""  # entered by `find_kind`
 
     def inputs_along(self, x: str | None, y: str | None) -> tuple[str, ...]:
         """List the inputs that it draws along; others have a value.
@@ -174,7 +174,7 @@ def find_kind(name: str) -> Kind:
     require_known([name], KINDS, f"{argument('kind')}: no kind")
     module = import_module(f".{KINDS[name]}", __package__)
     kind: Kind = getattr(module, name.upper().replace("-", "_"))
-    return kind
+    return replace(kind, name=name)
 
 
 def source_of(dataset: xr.Dataset) -> str:

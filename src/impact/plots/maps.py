@@ -387,10 +387,9 @@ def _failed() -> dict[str, Any]:
 
 _over_plane = partial(Kind, default=choose_plane, along=("x", "y"))
 MAP = _over_plane(
-    "map",
     "Error of the restitution, or beta of oblique impacts, over two axes; a panel for each model or pair.",
     field_map,
 )
 VALIDITY = _over_plane(
-    "validity", "Model with the smallest error, or several with equal errors, and that error.", validity_map
+    "Model with the smallest error, or several with equal errors, and that error.", validity_map
 )

@@ -264,9 +264,7 @@ def choose_point(dataset: xr.Dataset, keys: Sequence[str]) -> Choice | None:
 
 # a kind of picture of one impact
 motion = partial(Kind, default=choose_point, along=(), source="history")
-LOOP = motion("loop", "Force over indentation at one point: the area of a loop is the energy loss.", loop_curves)
-HISTORY = motion("history", "Indentation, its rate and the force over time.", history_curves, in_report=False)
-IMPULSE = motion("impulse", "Velocities over the impulse at one point.", impulse_curves, in_report=False)
-ANIMATION = motion(
-    "animation", "Both balls of an impact, force over time and loop.", animation_data, in_report=False
-)
+LOOP = motion("Force over indentation at one point: the area of a loop is the energy loss.", loop_curves)
+HISTORY = motion("Indentation, its rate and the force over time.", history_curves, in_report=False)
+IMPULSE = motion("Velocities over the impulse at one point.", impulse_curves, in_report=False)
+ANIMATION = motion("Both balls of an impact, force over time and loop.", animation_data, in_report=False)

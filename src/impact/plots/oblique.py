@@ -186,24 +186,18 @@ def choose_loop(dataset: xr.Dataset, keys: Sequence[str]) -> Choice | None:
     return choice and replace(choice, x=_first_axis(dataset, Choice()), models=few)
 
 
-def _of_pairs(name: str, caption: str, data: Callable[[xr.Dataset, Choice], CurveData], needed: str) -> Kind:
-    return Kind(name, caption, data, partial(choose_pairs, needed=needed), of_friction=True)
+def _of_pairs(caption: str, data: Callable[[xr.Dataset, Choice], CurveData], needed: str) -> Kind:
+    return Kind(caption, data, partial(choose_pairs, needed=needed), of_friction=True)
 
 
-BETA = _of_pairs("beta", "Tangential restitution of the contact points of each pair.", beta_curves, "beta")
-E_T = _of_pairs("e-t", "Tangential restitution of the centres, as it is measured.", e_t_curves, "e_t")
+BETA = _of_pairs("Tangential restitution of the contact points of each pair.", beta_curves, "beta")
+E_T = _of_pairs("Tangential restitution of the centres, as it is measured.", e_t_curves, "e_t")
 IMPULSE_RATIO = _of_pairs(
-    "impulse-ratio",
-    "Tangential over normal impulse, and the coefficient of friction.",
-    impulse_ratio_curves,
-    "impulse_ratio",
+    "Tangential over normal impulse, and the coefficient of friction.", impulse_ratio_curves, "impulse_ratio"
 )
-SPIN = _of_pairs("spin", "Spins of the balls after the impact.", spin_curves, "omega1_post")
-PSI = _of_pairs(
-    "psi", "Slip after over slip before the impact, as Maw, Barber and Fawcett draw it.", psi_curves, "psi1"
-)
+SPIN = _of_pairs("Spins of the balls after the impact.", spin_curves, "omega1_post")
+PSI = _of_pairs("Slip after over slip before the impact, as Maw, Barber and Fawcett draw it.", psi_curves, "psi1")
 FRICTION_LOOP = motion(
-    "friction-loop",
     "Friction over the slip displacement of one impact: the area is the energy lost.",
     friction_loop_curves,
     default=choose_loop,

@@ -245,20 +245,16 @@ def choose_axis(dataset: xr.Dataset, keys: Sequence[str]) -> Choice:
 
 
 _over_line = partial(Kind, default=choose_line)
-FINAL_VELOCITIES = _over_line(
-    "final-velocities", "Velocities after the impact, and the impulse-momentum solution.", velocity_curves
-)
-RESTITUTION = _over_line("restitution", "Delivered over requested restitution.", restitution_curves)
-ERROR = _over_line("error", "Error of the restitution: signed above, absolute below.", error_curves)
+FINAL_VELOCITIES = _over_line("Velocities after the impact, and the impulse-momentum solution.", velocity_curves)
+RESTITUTION = _over_line("Delivered over requested restitution.", restitution_curves)
+ERROR = _over_line("Error of the restitution: signed above, absolute below.", error_curves)
 TIMESTEP = Kind(
-    "timestep",
     "Restitution at fixed steps: mean, least and largest over the phase.",
     timestep_curves,
     choose_steps,
     along=(*STEP_AXES, "phase", "e"),
 )
 UNCERTAINTY = Kind(
-    "uncertainty",
     "Delivered restitution: median, and 5 to 95 % of the samples of uncertain inputs.",
     uncertainty_curves,
     choose_axis,

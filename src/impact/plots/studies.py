@@ -281,7 +281,6 @@ def sensitivity_bars(dataset: xr.Dataset, choice: Choice) -> BarData:
 
 
 CALIBRATION = Kind(
-    "calibration",
     "Measured values, the laws that fit them with their bands of 95 %, and residuals.",
     calibration_curves,
     lambda dataset, keys: Choice(),
@@ -289,7 +288,6 @@ CALIBRATION = Kind(
     source="calibration",
 )
 SENSITIVITY = Kind(
-    "sensitivity",
     "First-order and total Sobol indices of the uncertain inputs, with intervals of 95 %.",
     sensitivity_bars,
     lambda dataset, keys: Choice(models=keys),
