@@ -178,8 +178,7 @@ class CurveData(PlotData):
             _draw_bands(axes, panel)
             axes.set(xscale="log" if panel.x_log else "linear", yscale="log" if panel.y_log else "linear")
             for curve in panel.curves:
-                chosen_name = labels.get(curve.law or "reference")
-                name = chosen_name or pretty_conditions(curve.label)
+                name = labels.get(curve.law or "reference") or pretty_conditions(curve.label)
                 y = curve.y if panel.y_floor is None else np.maximum(curve.y, panel.y_floor)
                 (line,) = axes.plot(curve.x, y, label=f"_{name}", **_line_style(curve, panel, styles))
                 if name:

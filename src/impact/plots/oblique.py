@@ -22,7 +22,6 @@ from .motions import choose_point, curves_over, motion
 from .restitution import complete, read_line
 from .slices import Line, numeric_axes
 
-NEEDS_FRICTION = "this result has no friction; sweep a config with frictions = [...]"
 # pairs that are drawn where no friction law is chosen: more curves cannot be told apart
 MAX_PAIRS = 8
 # a picture of slips ends at this multiple of the largest one that is stopped or reversed
@@ -117,7 +116,7 @@ def _pairs_along(dataset: xr.Dataset, choice: Choice, *names: str) -> tuple[Line
     The line is over the angle by default, else over the first axis of numbers. What is left out is in the line.
     """
     if "friction" not in dataset.dims:
-        raise UsageError(NEEDS_FRICTION)
+        raise UsageError("this result has no friction; sweep a config with frictions = [...]")
     line = read_line(
         dataset, replace(choice, x=choice.x or _first_axis(dataset, choice)), *names, keep=("friction",)
     )

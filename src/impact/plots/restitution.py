@@ -33,8 +33,6 @@ NEEDS_STEPS = 'timestep needs an axis steps_per_contact or dt, with solver.integ
 MAX_RESTITUTIONS = 8
 # ends of the band, and points of a distribution function that are drawn
 BAND, MAX_DRAWN_PROBABILITIES = (0.05, 0.95), 401
-BAND_NAME = "5 to 95 % of the samples"
-NEEDS_SAMPLES = "this result has no samples; sweep a config with distributions and a table [design]"
 
 
 def velocity_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
@@ -175,7 +173,7 @@ def choose_steps(dataset: xr.Dataset, keys: Sequence[str]) -> Choice | None:
 def uncertainty_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     """Compute an output's median and band over an axis, or, without one, its distribution function."""
     if SAMPLE not in dataset.dims:
-        raise UsageError(NEEDS_SAMPLES)
+        raise UsageError("this result has no samples; sweep a config with distributions and a table [design]")
     name = choice.variable or "e_out"
     if name not in dataset.data_vars:
         raise UsageError(f'no variable "{name}" in this result')
@@ -215,7 +213,7 @@ def uncertainty_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
             curves=(*requested, *curves),
             y_unit=OUTPUTS[name].unit,
             y_name=name,
-            band_name=BAND_NAME,
+            band_name="5 to 95 % of the samples",
             **x_axis_fields(line[x]),
         )
     title = safe_text(str(dataset.attrs.get("title", "")), 140)

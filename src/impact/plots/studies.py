@@ -40,7 +40,6 @@ from .style import is_geometric, tint
 
 # laws that are drawn unless the user names them
 MAX_LAWS = 5
-BAND_NAME = "Band of 95 %"
 # standard deviations that are shaded among the residuals
 SHADED_RESIDUAL = 2.0
 # height of the panel of residuals over that of the values
@@ -103,7 +102,7 @@ def _panels(data: xr.Dataset, name: str, varied: str, choice: Choice) -> tuple[P
         curves=tuple(curves),
         y_unit=OUTPUTS[name].unit,
         y_name=name,
-        band_name=BAND_NAME,
+        band_name="Band of 95 %",
         **axis,
     )
     residual = Panel(

@@ -33,7 +33,6 @@ COLOURS = ("#7F4F24", "#009E73", "#56B4E9", "#CC79A7", "#D55E00", "#E69F00", "#0
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "*", "p")
 DASHES = ("-", (0, (6, 1.5)), (0, (3, 1.2)), (0, (6, 1.5, 1, 1.5)), (0, (1.2, 1.2)))
 HATCHES = ("", "////", "....", "\\\\\\\\", "xxxx", "----", "oo", "||||")
-STYLE_SHEET = files(__package__) / "impact.mplstyle"
 # without dates in the metadata a picture has the same bytes each time
 METADATA: dict[str, dict[str, None]] = {
     "png": {},
@@ -55,7 +54,7 @@ DRAWING = threading.RLock()
 @contextlib.contextmanager
 def styled(style: str | Path | None = None) -> Iterator[None]:
     """Draw with the style sheet of this package; settings that the user changed, and `style`, override it."""
-    ours = rc_params_from_file(str(STYLE_SHEET), use_default_template=False)
+    ours = rc_params_from_file(str(files(__package__) / "impact.mplstyle"), use_default_template=False)
     with DRAWING:
         unchanged = {key: value for key, value in ours.items() if rcParams[key] == rcParamsDefault[key]}
         with matplotlib.rc_context({**unchanged, **_style_of(style)}):
