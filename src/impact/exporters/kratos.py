@@ -175,14 +175,9 @@ def lines(collision: Collision, parameters: Parameters) -> Lines:
     for i in ("1", "2"):
         material = {name: parameters.get(f"{name}{i}", parameters[name]) for name in elastic}
         yield f"material{i} = {json.dumps(material)}"
-    relation = {
-        "COEFFICIENT_OF_RESTITUTION": parameters["COEFFICIENT_OF_RESTITUTION"],
-        "DEM_DISCONTINUUM_CONSTITUTIVE_LAW_NAME": parameters["DEM_DISCONTINUUM_CONSTITUTIVE_LAW_NAME"],
-        "STATIC_FRICTION": parameters.get("STATIC_FRICTION", 0.0),
-        "DYNAMIC_FRICTION": parameters.get("DYNAMIC_FRICTION", 0.0),
-        "FRICTION_DECAY": 500.0,
-        "ROLLING_FRICTION": 0.0,
-    }
+    law = ("COEFFICIENT_OF_RESTITUTION", "DEM_DISCONTINUUM_CONSTITUTIVE_LAW_NAME")
+    relation = {name: parameters.get(name, 0.0) for name in (*law, "STATIC_FRICTION", "DYNAMIC_FRICTION")}
+    relation |= {"FRICTION_DECAY": 500.0, "ROLLING_FRICTION": 0.0}
     yield "relation = {"
     yield from (f"    {json.dumps(name)}: {json.dumps(value)}," for name, value in relation.items())
     yield "}"
