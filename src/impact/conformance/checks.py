@@ -240,19 +240,13 @@ def step(fine: Rebound, middle: Rebound, coarse: Rebound) -> Delivered:
 
 # of checks that compare answers: how many of the chain, the first of which `repeat` compares when asked again
 CHAIN_LENGTHS: Mapping[str, int] = {**dict.fromkeys(RELATIONS, 2), "step": 3, "repeat": 1}
+FUNCTIONS: tuple[Callable[..., Delivered], ...] = (
+    *(finite, momentum, angular_momentum, energy, separates, restitution, friction, friction_bound, spin),
+    *(step, repeat),
+)
 CHECK_OF: Mapping[str, Callable[..., Delivered]] = {
-    "finite": finite,
-    "momentum": momentum,
-    "angular_momentum": angular_momentum,
-    "energy": energy,
-    "separates": separates,
-    "restitution": restitution,
-    "friction": friction,
-    "friction_bound": friction_bound,
-    "spin": spin,
     **dict.fromkeys(RELATIONS, related),
-    "step": step,
-    "repeat": repeat,
+    **{function.__name__: function for function in FUNCTIONS},
 }
 # judged exactly, and to rounding whatever the engine is
 EXACT, CONSERVED = ("finite", "repeat"), ("momentum", "energy", "separates")

@@ -21,11 +21,9 @@ Relation = Literal["", "frame", "mirror", "exchange", "scale", "step"]
 
 DEFAULT_SUITE = "conformance-1"
 # in the order of the protocol
-QUESTION_KEYS = (
-    *("id", "m1", "m2", "R1", "R2", "inertia1", "inertia2", "v1", "v2", "u1", "u2", "omega1", "omega2"),
-    *("e", "mu", "contact_time", "dt"),
-)
 ANSWER_KEYS = ("v1", "v2", "u1", "u2", "omega1", "omega2")
+BODY_KEYS = ("m1", "m2", "R1", "R2", "inertia1", "inertia2")
+QUESTION_KEYS = ("id", *BODY_KEYS, *ANSWER_KEYS, "e", "mu", "contact_time", "dt")
 OTHER_BALL = str.maketrans("12", "21")
 RELATIONS: tuple[Relation, ...] = get_args(Relation)[1:]
 
