@@ -194,7 +194,10 @@ class CurveData(PlotData):
                 axes.set_ylim(limits_of(*axes.get_ylim()))
             _label_bands(axes, panel)
             _label_floor(axes, panel)
-            _label_axes(axes, panel, labels, last=axes is all_axes[-1] or len(all_axes) == 1)
+            label_axis(axes.xaxis, panel.x_label, panel.x_name, panel.x_unit, labels, log=panel.x_log)
+            label_axis(axes.yaxis, panel.y_label, panel.y_name, panel.y_unit, labels, log=panel.y_log)
+            if axes is not all_axes[-1]:
+                axes.set_xlabel("")
             for mark in panel.marks:
                 _draw_mark(axes, mark)
             _label_curve_ends(axes, panel.curves, labels)
@@ -326,17 +329,6 @@ def _label_floor(axes: Axes, panel: Panel) -> None:
     floor = panel.y_floor
     if floor is not None and any(y < floor for curve in panel.curves for y in curve.y):
         annotate_right_edge(axes, f"≤ $10^{{{math.log10(floor):.0f}}}$", floor, 3)
-
-
-def _label_axes(axes: Axes, panel: Panel, labels: Mapping[str, str], *, last: bool) -> None:
-    """Write the labels of both axes, each with one prefix of its unit."""
-    for axis, meaning, name, unit, limits, log in (
-        (axes.xaxis, panel.x_label, panel.x_name, panel.x_unit, axes.get_xlim(), panel.x_log),
-        (axes.yaxis, panel.y_label, panel.y_name, panel.y_unit, axes.get_ylim(), panel.y_log),
-    ):
-        label_axis(axis, meaning, name, unit, max(map(abs, limits)), labels, log=log)
-    if not last:
-        axes.set_xlabel("")
 
 
 def _draw_mark(axes: Axes, mark: Mark) -> None:

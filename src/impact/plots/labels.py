@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
 from typing import Any
@@ -277,11 +277,12 @@ def annotate_right_edge(axes: Axes, text: str, y: float, dx: float, dy: float = 
 
 
 def label_axis(
-    axis: Axis, meaning: str, name: str, unit: str, largest: float, labels: Mapping[str, str], *, log: bool
+    axis: Axis, text: str, name: str, unit: str, labels: Mapping[str, str], log: bool, values: Sequence[float] = ()
 ) -> None:
-    """Write the label of an axis, and its numbers with one prefix of the unit for all of them."""
-    size, shown = (1.0, unit) if log else scaled_unit(unit, largest)
-    axis.set_label_text(axis_text(meaning, name, shown, labels))
+    """Write the label of an axis, and its numbers with the prefix of the unit for the largest value, or limit."""
+    largest = max(map(abs, values or axis.get_view_interval()))
+    size, scaled = (1.0, unit) if log else scaled_unit(unit, largest)
+    axis.set_label_text(axis_text(text, name, scaled, labels))
     if words := InputName.parse(name).words:
         axis.set_ticks(range(len(words)), words)
     else:

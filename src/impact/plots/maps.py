@@ -170,12 +170,8 @@ class MapData(PlotData):
             axes.grid(False)
             axes.set(xscale="log" if self.x_log else "linear", yscale="log" if self.y_log else "linear")
             axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
-            for axis, index, name, values, log in (
-                (axes.xaxis, 0, self.x, self.x_values, self.x_log),
-                (axes.yaxis, 1, self.y, self.y_values, self.y_log),
-            ):
-                largest = max(map(abs, values))
-                label_axis(axis, self.labels[index], name, self.units[index], largest, labels, log=log)
+            label_axis(axes.xaxis, self.labels[0], self.x, self.units[0], labels, self.x_log, self.x_values)
+            label_axis(axes.yaxis, self.labels[1], self.y, self.units[1], labels, self.y_log, self.y_values)
         if len(all_axes) > 1 and isinstance(figure, Picture):
             figure.share_labels(all_axes[0].get_xlabel(), all_axes[0].get_ylabel())
             for axes in all_axes:
@@ -188,8 +184,7 @@ class MapData(PlotData):
         if self.closest:
             number_axis(bar.ax.yaxis, log=True)
         else:
-            largest = max(map(abs, mesh.get_clim()))
-            label_axis(bar.ax.yaxis, self.labels[2], self.variable, self.units[2], largest, labels, log=False)
+            label_axis(bar.ax.yaxis, self.labels[2], self.variable, self.units[2], labels, log=False)
         return entries
 
     def _draw_fields(self, axes: Sequence[Axes]) -> tuple[QuadMesh, LegendEntries]:

@@ -142,7 +142,7 @@ class AnimationData(CurveData):
         low, high = min(surfaces.curves[0].y) - 2.1 * sizes[0], max(surfaces.curves[1].y) + 2.1 * sizes[1]
         scene.set(xlim=(low, high), ylim=(-1.05 * max(sizes), 1.05 * max(sizes)), yticks=[], aspect="equal")
         scene.spines["left"].set_visible(False)
-        label_axis(scene.xaxis, surfaces.y_label, "x", "m", max(-low, high), labels, log=False)
+        label_axis(scene.xaxis, surfaces.y_label, "x", "m", labels, log=False)
         # a method, so that a figure can be pickled
         show_frame = partial(self.show_frame, balls, lines)
         show_frame(FRAMES - 1)
