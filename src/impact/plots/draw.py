@@ -176,35 +176,34 @@ def draw(
     labels = _labels(plot_data, look)
     if points is not None and not isinstance(plot_data, CurveData):
         raise UsageError(f"{points.source}: measured points are drawn over curves only")
-    heading = labels.get("title", escape_mathtext(plot_data.title))
     if all_axes:
         entries = _draw_panels(plot_data, all_axes, labels, points, look)
         if look.title:
-            all_axes[0].set_title(heading)
+            all_axes[0].set_title(labels["title"])
         if entries and look.legend != "none":
             # outside of the layout, in which it would take room from the axes
             all_axes[0].legend(*zip(*entries, strict=True), fontsize="small").set_in_layout(False)
         figure = all_axes[0].get_figure(root=True)
         assert figure is not None
         return figure
-    picture = _picture_with_room(plot_data, look, points, heading)
+    picture = _picture_with_room(plot_data, look, points)
     with styled(look.style):
         picture.check_panels()
     return picture
 
 
-def _picture_with_room(plot_data: PlotData, look: Look, points: Points | None, heading: str) -> Picture:
+def _picture_with_room(plot_data: PlotData, look: Look, points: Points | None) -> Picture:
     """Draw a picture in a new figure, with the longest names with which the legend has room if none are chosen."""
     if look.legend is not None or not plot_data.laws:
-        return _new_picture(plot_data, look, points, heading)
+        return _new_picture(plot_data, look, points)
     shares = {}
     for legend in DEFAULT_LEGENDS:
-        picture = _new_picture(plot_data, replace(look, legend=legend), points, heading)
+        picture = _new_picture(plot_data, replace(look, legend=legend), points)
         if picture.legend_share <= LEGEND_PART:
             return picture
         shares[legend] = picture.legend_share
     smallest = replace(look, legend=min(shares, key=shares.__getitem__))
-    return _new_picture(plot_data, smallest, points, heading, legend_rows=True)
+    return _new_picture(plot_data, smallest, points, legend_rows=True)
 
 
 def _legend_for(axes: Axes, plot_data: PlotData, look: Look) -> str:
@@ -220,13 +219,12 @@ def _legend_for(axes: Axes, plot_data: PlotData, look: Look) -> str:
 
 
 def _labels(plot_data: PlotData, look: Look) -> dict[str, str]:
-    """The texts of names: those of the user, else of laws those of the legend."""
-    return {**legend_labels(plot_data.laws, look.legend or "full"), **(look.labels or {})}
+    """The texts of names: those of the user, else the title, and of laws those of the legend."""
+    of_legend = legend_labels(plot_data.laws, look.legend or "full")
+    return {"title": escape_mathtext(plot_data.title), **of_legend, **(look.labels or {})}
 
 
-def _new_picture(
-    plot_data: PlotData, look: Look, points: Points | None, heading: str, *, legend_rows: bool = False
-) -> Picture:
+def _new_picture(plot_data: PlotData, look: Look, points: Points | None, *, legend_rows: bool = False) -> Picture:
     """Draw a picture in a new figure, with the names of its legend in columns or one after the other in rows."""
     with styled(look.style):
         (width, height), (default_width, default_height) = look.size, default_size()
@@ -235,7 +233,7 @@ def _new_picture(
         # names with parameters are those of the legend alone
         parameters = parameters_of_laws(plot_data.laws, names) if look.legend not in (None, "full") else ""
         conditions = ", ".join(filter(None, (pretty_conditions(plot_data.conditions), parameters)))
-        texts = (heading, conditions) if look.title else ()
+        texts = (names["title"], conditions) if look.title else ()
         picture = Picture(width, *texts)
         picture.has_legend_rows = legend_rows
         all_axes, panels_height = plot_data.place_panels(picture, width)
