@@ -111,14 +111,11 @@ def _check_tolerances(tol: float | Mapping[str, float] | None) -> dict[str, floa
     requested = dict(tol) if isinstance(tol, Mapping) else {} if tol is None else {"all": tol}
     known = ["all", *(name for name in CHECKS if name not in checks.EXACT)]
     for name, value in requested.items():
+        origin = argument("tol", key=str(name))
         if name not in known:
-            raise UsageError(
-                f"{argument('tol', key=str(name))}: not a check with a tolerance; {did_you_mean(str(name), known)}"
-            )
+            raise UsageError(f"{origin}: not a check with a tolerance; {did_you_mean(str(name), known)}")
         if not 0.0 <= value < float("inf"):
-            raise UsageError(
-                f"{argument('tol', key=str(name))}: got {value}, expected a number >= 0, such as 1e-6"
-            )
+            raise UsageError(f"{origin}: got {value}, expected a number >= 0, such as 1e-6")
     return {name: float(value) for name, value in requested.items()}
 
 

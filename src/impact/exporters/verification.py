@@ -119,6 +119,7 @@ class Verification(Displayed):
 
 def run_script(code: Code, program: str, script: str) -> dict[str, float]:
     """Run a script in an empty folder, and return the numbers that it prints by name; the last one is e_out."""
+    origin = f"{argument('verify')}: {code.title}"
     with tempfile.TemporaryDirectory(prefix="impact-export-") as folder:
         file = f"two_balls{code.suffix}"
         Path(folder, file).write_text(script, encoding="utf-8")
@@ -126,14 +127,12 @@ def run_script(code: Code, program: str, script: str) -> dict[str, float]:
             assert code.program is not None
             done = run_program(code.program.command(program, file), folder, TIMEOUT_S)
         except (OSError, subprocess.SubprocessError) as error:
-            raise UsageError(f"{argument('verify')}: {code.title}: {error}") from None
+            raise UsageError(f"{origin}: {error}") from None
     printed = done.stdout.strip().splitlines() or [""]
     if done.returncode or "e_out" not in _number_in(printed[-1]):
         lines = (done.stderr.strip() or done.stdout.strip() or "no output").splitlines()
         error_lines = [line for line in lines if "error" in line.lower()] or lines[-1:]
-        raise UsageError(
-            f"{argument('verify')}: {code.title} ended with exit code {done.returncode}: {error_lines[0]}"
-        )
+        raise UsageError(f"{origin} ended with exit code {done.returncode}: {error_lines[0]}")
     return {name: value for line in printed for name, value in _number_in(line).items()}
 
 
