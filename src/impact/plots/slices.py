@@ -198,22 +198,18 @@ def x_axis(dataset: xr.Dataset, x: str | None) -> str:
         for name, coord in dataset.coords.items()
         if coord.ndim == 1 and coord.dims != ("model",) and coord.dtype.kind in "fiu"
     ]
-    if x is not None:
-        if x not in lines:
-            if x in dataset.coords and dataset[x].ndim > 1:
-                dims = ", ".join(str(dim) for dim in dataset[x].dims)
-                raise UsageError(
-                    f"cannot draw over {x}, which varies over {dims}; select one with {argument('sel')}"
-                )
-            raise UsageError(f'cannot draw over "{x}"; {did_you_mean(x, lines)}')
+    if x is not None and x in lines:
         return x
+    if x is not None:
+        if x in dataset.coords and dataset[x].ndim > 1:
+            dims = ", ".join(map(str, dataset[x].dims))
+            raise UsageError(f"cannot draw over {x}, which varies over {dims}; select one with {argument('sel')}")
+        raise UsageError(f'cannot draw over "{x}"; {did_you_mean(x, lines)}')
     # prefer floats: an integer axis only numbers the points; axes come before parameters of single laws
     floats = [name for name in lines if dataset[name].dtype.kind == "f"]
-    for name in ("e", *map(str, dataset.sizes), *floats):
-        if name in floats:
-            return name
+    preferred = [name for name in ("e", *map(str, dataset.sizes)) if name in floats]
     if lines:
-        return lines[0]
+        return (preferred or floats or lines)[0]
     raise UsageError(
         "this result has no numeric axis left to draw over; sweep one, such as e, or draw a point with "
         f"{argument('kind', 'loop')}"
