@@ -53,7 +53,7 @@ class Engine:
         """Make the command of the adapter, for the requested or the installed program, and find its version."""
         path, version = self.program.find(program)
         if path is None and program is not None:
-            raise _no_program(program)
+            raise UsageError(f'{argument("program")}: no program "{program}"')
         if path is None or version is None:
             place = "on the path" if path is None else f"in {path}" if self.is_package else f"as {path}"
             missing = f"{self.name}: {self.title} is not installed {place}"
@@ -86,10 +86,6 @@ ENGINES: Mapping[str, Engine] = {
         Engine("newton", "Newton", python_package("newton")),
     )
 }
-
-
-def _no_program(program: str | None) -> UsageError:
-    return UsageError(f'{argument("program")}: no program "{program}"')
 
 
 def find_engine(name: str) -> Engine:
@@ -157,5 +153,5 @@ def conform_engines(program: str | None = None) -> Engines:
     'pip install pymunk'
     """
     if find_program("python", program) is None:
-        raise _no_program(program)
+        raise UsageError(f'{argument("program")}: no program "{program}"')
     return Engines(program)
