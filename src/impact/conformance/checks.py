@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 
@@ -21,13 +21,8 @@ Answer = Mapping[str, float]
 # reads a velocity or spin, before or after the impact
 Read = Callable[[str], float]
 Kind = Literal["impulse", "compliant"]
-
-
-class Delivered(NamedTuple):
-    """What is asked for, and what was delivered."""
-
-    asked: float
-    delivered: float
+# what is asked for, and what was delivered
+Delivered = tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -121,7 +116,7 @@ def balls_of(question: Question) -> str:
 def finite(rebound: Rebound) -> Delivered:
     """Count the numbers of the answer that are finite."""
     values = [rebound.after(f"{name}{ball}") for name in ("v", "u", "omega") for ball in rebound.balls]
-    return Delivered(float(len(values)), float(sum(map(math.isfinite, values))))
+    return float(len(values)), float(sum(map(math.isfinite, values)))
 
 
 def momentum(rebound: Rebound) -> Delivered:
@@ -134,7 +129,7 @@ def momentum(rebound: Rebound) -> Delivered:
         return abs(rebound.change(lambda read, ball: rebound.before(f"m{ball}") * read(f"{name}{ball}")))
 
     scale = rebound.total(rebound.before, size) or rebound.m * rebound.speed
-    return Delivered(0.0, float(np.max([change("v"), change("u")])) / scale)
+    return 0.0, float(np.max([change("v"), change("u")])) / scale
 
 
 def angular_momentum(rebound: Rebound) -> Delivered:
@@ -154,7 +149,7 @@ def angular_momentum(rebound: Rebound) -> Delivered:
         return spinning + rebound.before(f"R{ball}") * moving
 
     scale = rebound.total(rebound.before, size) or rebound.before("R1") * rebound.m * rebound.speed
-    return Delivered(0.0, abs(rebound.change(part)) / scale)
+    return 0.0, abs(rebound.change(part)) / scale
 
 
 def energy(rebound: Rebound) -> Delivered:
@@ -166,19 +161,19 @@ def energy(rebound: Rebound) -> Delivered:
         return rebound.before(f"m{ball}") * (v * v + u * u) + rebound.before(f"inertia{ball}") * (omega * omega)
 
     scale = rebound.total(rebound.before, part) or rebound.m * rebound.speed * rebound.speed
-    return Delivered(1.0, 1.0 + rebound.change(part) / scale)
+    return 1.0, 1.0 + rebound.change(part) / scale
 
 
 def separates(rebound: Rebound) -> Delivered:
     """Give the speed of separation; a negative one is that of balls that go through each other."""
-    return Delivered(0.0, rebound.separation / rebound.speed)
+    return 0.0, rebound.separation / rebound.speed
 
 
 def restitution(rebound: Rebound) -> Delivered:
     """Give e and the speed of separation over the closing speed; balls at rest relative to each other stay so."""
     if rebound.v0 == 0.0:
-        return Delivered(0.0, rebound.separation / rebound.speed)
-    return Delivered(rebound.before("e"), rebound.separation / rebound.v0)
+        return 0.0, rebound.separation / rebound.speed
+    return rebound.before("e"), rebound.separation / rebound.v0
 
 
 def friction(rebound: Rebound, beta: float | None = None) -> Delivered:
@@ -187,15 +182,15 @@ def friction(rebound: Rebound, beta: float | None = None) -> Delivered:
     if beta is None:
         bound = rebound.before("mu") * max(rebound.normal_impulse, 0.0)
         beta = min(bound / (rebound.m_t * abs(g0)), 1.0) - 1.0
-    return Delivered(beta, -rebound.slip(rebound.after) / g0)
+    return beta, -rebound.slip(rebound.after) / g0
 
 
 def friction_bound(rebound: Rebound) -> Delivered:
     """Give |P|/(mu P_n), which is at most 1; |P| over m (v0 + |g0|) where the bound is 0."""
     impulse, bound = abs(rebound.tangential_impulse()), rebound.before("mu") * rebound.normal_impulse
     if bound <= 0.0:
-        return Delivered(0.0, impulse / (rebound.m * rebound.speed))
-    return Delivered(1.0, impulse / bound)
+        return 0.0, impulse / (rebound.m * rebound.speed)
+    return 1.0, impulse / bound
 
 
 def spin(rebound: Rebound) -> Delivered:
@@ -209,7 +204,7 @@ def spin(rebound: Rebound) -> Delivered:
         impulse = rebound.before(f"inertia{ball}") * change / rebound.before(f"R{ball}")
         return abs(impulse + rebound.tangential_impulse(ball))
 
-    return Delivered(0.0, float(np.max([*map(difference, rebound.balls)])) / (rebound.m * rebound.speed))
+    return 0.0, float(np.max([*map(difference, rebound.balls)])) / (rebound.m * rebound.speed)
 
 
 def related(rebound: Rebound, base: Rebound) -> Delivered:
@@ -223,19 +218,19 @@ def related(rebound: Rebound, base: Rebound) -> Delivered:
         length = rebound.before(f"R{name[-1]}") if name.startswith("omega") else 1.0
         return length * abs(rebound.answer[name] - expected[name])
 
-    return Delivered(0.0, float(np.max([*map(difference, rebound.answer)])) / rebound.speed)
+    return 0.0, float(np.max([*map(difference, rebound.answer)])) / rebound.speed
 
 
 def repeat(rebound: Rebound, again: Answer) -> Delivered:
     """Count the numbers that differ in any bit, or are missing, if the same question is asked again."""
     # the text of a NaN is always the same
     differ = (repr(value) != repr(again.get(name)) for name, value in rebound.answer.items())
-    return Delivered(0.0, float(sum(differ)))
+    return 0.0, float(sum(differ))
 
 
 def step(fine: Rebound, middle: Rebound, coarse: Rebound) -> Delivered:
     """Give how much the answer changes from h to h/2, and from h/2 to h/4, which is asked to be less."""
-    return Delivered(related(middle, coarse).delivered, related(fine, middle).delivered)
+    return related(middle, coarse)[1], related(fine, middle)[1]
 
 
 # of checks that compare answers: how many of the chain, the first of which `repeat` compares when asked again

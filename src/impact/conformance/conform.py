@@ -173,7 +173,7 @@ def _judge(
             word, delivered = "not_supported", float("nan")
             # what is asked for is independent of the answer, but for friction
             silent = checks.Rebound(trial, dict.fromkeys(ANSWER_KEYS, delivered))
-            asked = delivered if name in checks.CHAIN_LENGTHS else checks.CHECK_OF[name](silent).asked
+            asked = delivered if name in checks.CHAIN_LENGTHS else checks.CHECK_OF[name](silent)[0]
         rows.append((asked, delivered, tolerance[name], CHECK_STATUSES[word]))
     return EngineChecks(facts.engine, facts.version, facts.kind, *zip(*rows, strict=True))
 
