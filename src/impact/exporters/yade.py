@@ -16,6 +16,8 @@ HISTORY = (
     (("", "yade-betan-pulling"), ("2013.09", "yade-betan")),
     (("", "yade-viscoelastic-pulling"), ("2014.01", "yade-viscoelastic")),
 )
+# the first release in which it was seen that a wall can be hertzian
+HERTZIAN_SINCE = "2023.02a"
 # radius of a wall in R*, in radii of the ball: without and with hertzian=True
 WALL_RADII = (1.0, 1e8)
 # the normal is along x, the tangent along y, so that spins are about z
@@ -107,11 +109,6 @@ def parameters(c: Collision) -> dict[str, float | str]:
     return values | angle
 
 
-def is_hertzian(version: str) -> bool:
-    """Return whether a wall can be hertzian; seen in 2023.02a."""
-    return version >= "2023.02a"
-
-
 def lines(collision: Collision, parameters: Parameters) -> Lines:
     remaining = dict(parameters)
     angle = {"frictionAngle": remaining.pop("frictionAngle", 0)}
@@ -131,7 +128,7 @@ def lines(collision: Collision, parameters: Parameters) -> Lines:
     bounds, geometries = "Bo1_Sphere_Aabb()", "Ig2_Sphere_Sphere_ScGeom()"
     if collision.has_wall:
         bounds += ", Bo1_Wall_Aabb()"
-        geometries += f", Ig2_Wall_Sphere_ScGeom({'hertzian=True' if is_hertzian(collision.version) else ''})"
+        geometries += f", Ig2_Wall_Sphere_ScGeom({'hertzian=True' if collision.version >= HERTZIAN_SINCE else ''})"
     yield "O.engines = ["
     yield "    ForceResetter(),"
     yield f"    InsertionSortCollider([{bounds}]),"
@@ -152,7 +149,7 @@ def notes(collision: Collision) -> Lines:
         yield "the force is never negative (since January 2014)"
         return
     if collision.has_wall:
-        by_default = "hertzian=True: by default " if is_hertzian(collision.version) else ""
+        by_default = "hertzian=True: by default " if collision.version >= HERTZIAN_SINCE else ""
         yield f"{by_default}a wall has R* = R1/2, 0.7071 of a plane's K, and 1.149 of its contact time"
     yield "two materials: 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2; en and betan are set for each pair by MatchMaker"
     yield "set en or betan, not both; en of 2023.02a is by Thornton and others, before that by Tsuji and others"
@@ -198,6 +195,6 @@ CODE = Code(
     # betas is ignored beside en
     has_friction=lambda key, friction: key.startswith(LAWS_WITH[friction]),
     shortens_arms=True,
-    wall_inputs=lambda key, version, values: {"R2": WALL_RADII[is_hertzian(version)] * values["R1"]},
+    wall_inputs=lambda key, version, values: {"R2": WALL_RADII[version >= HERTZIAN_SINCE] * values["R1"]},
     program=PROGRAM,
 )
