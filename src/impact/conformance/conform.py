@@ -95,7 +95,9 @@ def conform(
             ask = stack.enter_context(open_adapter(command, timeout, folder))
             facts, answers, again = _ask_all(ask, judged)
         # an adapter may name its engine; names are labels of the board
-        label = _unique(facts.engine or name, [engine.engine for engine in engines])
+        label = facts.engine or name
+        alike = sum(other.engine == label or other.engine.startswith(f"{label} #") for other in engines)
+        label += f" #{alike + 1}" if alike else ""
         facts = replace(facts, engine=label, version=facts.version or version)
         engines.append(_judge(facts, checked, answers, again, requested))
     board = Board(board_dataset(suite, [(trial.id, name) for trial, name in checked], engines))
@@ -124,12 +126,6 @@ def _adapter_name(word: object) -> str:
     if isinstance(word, str):
         return re.sub(r"[^\s'\"]*/", "", word)
     return str(getattr(word, "__name__", type(word).__name__))
-
-
-def _unique(name: str, others: Sequence[str]) -> str:
-    """Number an engine of a name that others have."""
-    count = sum(other == name or other.startswith(f"{name} #") for other in others)
-    return f"{name} #{count + 1}" if count else name
 
 
 def _ask_all(
