@@ -36,9 +36,8 @@ from .style import DRAWING, is_geometric
 if TYPE_CHECKING:
     from ipywidgets import VBox
 
-# of a picture whose texts are legible at half of its size, on a phone; the largest width on a page
+# of a picture whose texts are legible at half of its size, on a phone; also the largest width on a page
 WIDTH_INCHES, DPI = 4.5, 160
-MAX_PICTURE_WIDTH = f"{WIDTH_INCHES * DPI:.0f}px"
 # a change is drawn after this time without another one
 DELAY_S = 0.1
 COMPUTING = "<b>computing …</b>"
@@ -113,7 +112,7 @@ def explore(
     require_known(sel or {}, swept, "sel: no axis", " to select along")
     sliders = {name: _slider(dataset, name, name not in reasons, (sel or {}).get(name)) for name in swept}
     picture = ipywidgets.Image(
-        format="png", layout={"width": "100%", "max_width": MAX_PICTURE_WIDTH, "margin": "0"}
+        format="png", layout={"width": "100%", "max_width": f"{WIDTH_INCHES * DPI:.0f}px", "margin": "0"}
     )
     message = ipywidgets.HTML(layout={"min_height": "2em"})
 
