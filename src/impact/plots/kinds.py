@@ -30,7 +30,7 @@ KINDS = {
         ("motions", "loop history impulse animation"),
         ("oblique", "beta e-t impulse-ratio spin psi friction-loop"),
         ("studies", "calibration"),
-        ("restitution", "uncertainty"),
+        ("uncertainty", "uncertainty"),
         ("studies", "sensitivity"),
     )
     for name in names.split()
