@@ -23,17 +23,25 @@ if TYPE_CHECKING:
 
 # the module of each kind
 KINDS = {
-    name: module
-    for module, names in (
-        ("restitution", "final-velocities restitution error timestep"),
-        ("maps", "map validity"),
-        ("motions", "loop history impulse animation"),
-        ("oblique", "beta e-t impulse-ratio spin psi friction-loop"),
-        ("studies", "calibration"),
-        ("uncertainty", "uncertainty"),
-        ("studies", "sensitivity"),
-    )
-    for name in names.split()
+    "final-velocities": "restitution",
+    "restitution": "restitution",
+    "error": "restitution",
+    "timestep": "restitution",
+    "map": "maps",
+    "validity": "maps",
+    "loop": "motions",
+    "history": "motions",
+    "impulse": "motions",
+    "animation": "motions",
+    "beta": "oblique",
+    "e-t": "oblique",
+    "impulse-ratio": "oblique",
+    "spin": "oblique",
+    "psi": "oblique",
+    "friction-loop": "oblique",
+    "calibration": "studies",
+    "uncertainty": "uncertainty",
+    "sensitivity": "studies",
 }
 # sources, see `source_of`, that have a picture of their own and no other
 STUDIES = ("calibration", "sensitivity study")
