@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import suppress
 from importlib import import_module
-from typing import Any
 
 import typer
 
@@ -18,7 +17,7 @@ import impact
 
 def complete_model() -> list[str]:
     """The keys of models, of those in installed packages too."""
-    return list(_models())
+    return list(impact.models())
 
 
 def complete_friction() -> list[str]:
@@ -76,16 +75,9 @@ def complete_setting() -> list[str]:
     return [*(f"{key}=" for key in keys), "materials.", "model.", "friction."]
 
 
-def _models() -> dict[str, Any]:
-    from ..contact.models import catalogue
-    from ..engine.plugins import read_plugins
-
-    return dict(catalogue(read_plugins([]).models))
-
-
 def _parameters(context: typer.Context) -> list[str]:
     keys = context.params.get("model")
-    models = _models()
+    models = impact.models()
     names = {
         parameter.name
         for key in ([keys] if isinstance(keys, str) else keys or ())

@@ -10,7 +10,7 @@ import typer
 
 import impact
 
-from ..display import Table, dump, print_blocks, show
+from ..display import Displayed, Table, dump, print_blocks, show
 from ..errors import UsageError, require_known
 from . import exits, options
 from .completion import complete_family, complete_model
@@ -58,25 +58,25 @@ def models(
         of_file = [model for name, model in with_file.items() if name not in others and key in (None, name)]
         _check_contract(of_file or [with_file.find(str(key))], as_json=as_json)
         return
+    shown: Displayed
     if key is not None and search is None and not (key.startswith("family:") or {*"*?["} & {*key}):
         laws: Frictions | Models = impact.frictions() if frictions else impact.models(plugins or ())
         if key not in laws and key in impact.frictions():
             laws = impact.frictions()
-        description = impact.describe(laws.find(key))
-        if as_json:
-            print(dump([description]))
-        else:
-            show(description)
-        return
-    pattern = key or "*"
-    if frictions:
-        chosen: Frictions | Models = impact.frictions(pattern=pattern, search=search)
+        shown = impact.describe(laws.find(key))
+    elif frictions:
+        shown = impact.frictions(pattern=key or "*", search=search)
     else:
-        chosen = impact.models(plugins or (), pattern=pattern, family=family, search=search)
+        shown = impact.models(plugins or (), pattern=key or "*", family=family, search=search)
+    _show_records(shown, as_json=as_json)
+
+
+def _show_records(shown: Displayed, *, as_json: bool) -> None:
+    """Print a result, or the list of its records as JSON."""
     if as_json:
-        print(dump(chosen.records()))
+        print(dump(shown.records()))
     else:
-        show(chosen)
+        show(shown)
 
 
 def _check_contract(models: Sequence[ForceModel], *, as_json: bool) -> None:
@@ -131,8 +131,4 @@ def cite(
     as_json: options.Json = False,
 ) -> None:
     """Write BibTeX of laws, from their references, with the evidence for their formulas."""
-    citations = impact.cite(*laws, plugins=plugins or ())
-    if as_json:
-        print(dump(citations.as_list()))
-    else:
-        show(citations)
+    _show_records(impact.cite(*laws, plugins=plugins or ()), as_json=as_json)

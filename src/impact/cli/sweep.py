@@ -91,18 +91,10 @@ def merge(
     as_json: options.Json = False,
 ) -> None:
     """Join the shards of a sweep into its result; the work folders are not deleted."""
-    with (
-        exits.catch_signals() as should_stop,
-        impact.progress_bar(exits.print_line, quiet=quiet) as on_progress,
-    ):
-        outcome = impact.merge(
-            folders,
-            output,
-            plugins=plugins or (),
-            overwrite=overwrite,
-            on_progress=on_progress,
-            should_stop=should_stop,
-        )
+    with execution(quiet) as keywords:
+        # nothing is integrated
+        del keywords["backend"]
+        outcome = impact.merge(folders, output, plugins=plugins or (), overwrite=overwrite, **keywords)
     if outcome.repeated_blocks and not quiet:
         exits.print_line(f"{outcome.repeated_blocks:,} blocks were in more than one folder, with the same bits")
     print_summary_and_exit(outcome, quiet=quiet, as_json=as_json, allow_failed=allow_failed)
