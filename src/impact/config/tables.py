@@ -71,8 +71,7 @@ Noise = Literal["given", "scale", "excess"]
 # how a residual counts, see `scipy.optimize.least_squares`
 Loss = Literal["linear", "huber", "cauchy"]
 NOISES, LOSSES = get_args(Noise), get_args(Loss)
-Missing = Literal["skip", "error"]
-MISSING_ROWS = get_args(Missing)
+MISSING_ROWS = ("skip", "error")
 # m/s^2, as scipy.constants.g
 STANDARD_GRAVITY = 9.80665
 GRAVITY = Quantity("m/s^2", "acceleration that turns heights and flight times into velocities", 0, above=True)
@@ -348,9 +347,9 @@ class Data(Table):
     )
     separator: SeparatorKey = Field(None, description="of the columns of the file, where it is not recognised")
     decimal: DecimalKey = Field(None, description="sign of the file, where it is not recognised")
-    missing: Annotated[Any, read_as(Missing), known_name("what becomes of rows", lambda info: MISSING_ROWS)] = (
-        Field(None, description="a row without a value is left out (skip, the default), or an error")
-    )
+    missing: Annotated[
+        Any, read_as(Literal[MISSING_ROWS]), known_name("what becomes of rows", lambda info: MISSING_ROWS)
+    ] = Field(None, description="a row without a value is left out (skip, the default), or an error")
     g: Annotated[float, GRAVITY] = STANDARD_GRAVITY
     fit: Annotated[
         bool,
@@ -601,30 +600,22 @@ def expand_laws(
     selected: dict[str, L] = {}
     problems: list[ConfigProblem] = []
     for index, word in enumerate([selection] if isinstance(selection, str) else selection):
+        path = () if isinstance(selection, str) else (index,)
+        is_exclusion = isinstance(word, str) and word.startswith("!")
         try:
-            if isinstance(word, str) and word.startswith("!"):
-                _leave_out(selected, word, laws, what)
-            else:
-                selected |= _laws_matching(word, laws, what)
+            matching = _laws_matching(str(word)[1:] if is_exclusion else word, laws, what)
         except PydanticCustomError as error:
-            problems.append((() if isinstance(selection, str) else (index,), error.message()))
-            if len(problems) >= MAX_PROBLEMS:
-                break
+            problems.append((path, f"{'after !: ' * is_exclusion}{error.message()}"))
+        else:
+            if is_exclusion and selected.keys().isdisjoint(matching):
+                problems.append((path, mismatch_error(word, f"{what}s to exclude from those before it").message()))
+            kept = {key: law for key, law in selected.items() if key not in matching}
+            selected = kept if is_exclusion else selected | matching
+        if len(problems) >= MAX_PROBLEMS:
+            break
     if not selected and not problems:
         problems.append(((), mismatch_error(selection, f"{what}s that are not all left out again").message()))
     return list(selected.values()), problems
-
-
-def _leave_out(selected: dict[str, L], word: str, laws: Mapping[str, L], what: str) -> None:
-    """Remove the laws of "!..." from those selected before it."""
-    try:
-        excluded = _laws_matching(word[1:], laws, what)
-    except PydanticCustomError as error:
-        raise value_error(f"after !: {error.message()}") from None
-    if selected.keys().isdisjoint(excluded):
-        raise mismatch_error(word, f"{what}s to exclude from those before it")
-    for key in excluded:
-        selected.pop(key, None)
 
 
 def _laws_matching(word: object, laws: Mapping[str, L], what: str) -> dict[str, L]:
