@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property, lru_cache, partial
 from typing import Literal, TypeAlias, TypeVar
 
 import numpy as np
@@ -279,23 +279,19 @@ def minimize(
         (values,) = problem.residuals(evaluate, start[None, :], excess)
         loss, *_ = LOSS_DERIVATIVES[problem.data.loss](values)
         return Estimate(start, float(loss.sum()), excess, True)
-    known: dict[bytes, Array] = {}
 
-    def residuals(free_u: Array) -> Array:
-        values, slopes = problem.residuals_and_slopes(evaluate, full(free_u), free, excess)
-        known.clear()
-        known[free_u.tobytes()] = slopes
-        return values
+    @lru_cache(maxsize=1)
+    def both(free_u: bytes) -> tuple[Array, Array]:
+        return problem.residuals_and_slopes(evaluate, full(np.frombuffer(free_u)), free, excess)
 
-    def slopes(free_u: Array) -> Array:
-        if free_u.tobytes() not in known:
-            residuals(free_u)
-        return known[free_u.tobytes()]
+    def one_of_both(number: int, free_u: Array) -> Array:
+        # the solver scales in place what it gets
+        return both(free_u.tobytes())[number].copy()
 
     result = least_squares(
-        residuals,
+        partial(one_of_both, 0),
         start[free],
-        jac=slopes,
+        jac=partial(one_of_both, 1),
         bounds=(0.0, 1.0),
         xtol=tolerance,
         ftol=tolerance,
@@ -398,15 +394,6 @@ def degrees_of_freedom(variance: Array, deviation: Array) -> Array:
 def t_quantile(freedom: Array) -> Array:
     """Find the distance of an end of an interval of 95 % from the estimate, in standard deviations."""
     return np.asarray(t.ppf(0.5 + CONFIDENCE / 2, freedom))
-
-
-def half_widths(covariance: Array, covariance_deviation: Array, directions: Array) -> Array:
-    """Find the half-widths of intervals of 95 % of functions with gradients `directions`, shape (k, p) to (k,)."""
-    variance, deviation = (
-        np.maximum(np.einsum("kp,pq,kq->k", directions, matrix, directions), 0.0)
-        for matrix in (covariance, covariance_deviation)
-    )
-    return np.asarray(t_quantile(degrees_of_freedom(variance, deviation)) * np.sqrt(variance))
 
 
 def best_of(estimates: Sequence[Estimate]) -> Estimate:
@@ -618,7 +605,11 @@ class _Minimum:
         jacobian, other_slopes = np.split(self.all_slopes / slope, [data.values.size])
         half_width = np.full(len(other_slopes), np.nan)
         if np.isfinite(covariance).all() and problem.is_determined:
-            half_width = half_widths(covariance, deviation, other_slopes)
+            variance, spread = (
+                np.maximum(np.einsum("kp,pq,kq->k", other_slopes, matrix, other_slopes), 0.0)
+                for matrix in (covariance, deviation)
+            )
+            half_width = t_quantile(degrees_of_freedom(variance, spread)) * np.sqrt(variance)
         left_out = (data.values - np.array(predictions)) / data.sigma if predictions else np.array([np.nan])
         return Fit(
             status=self._status(),
