@@ -166,7 +166,6 @@ def _is_out_of_memory(error: BaseException) -> bool:
 
 
 def _usage_message(error: TyperException) -> str:
-    """One line about a wrong option or argument."""
     context = getattr(error, "ctx", None)
     at = context.command_path if context else "impact"
     message = " ".join(safe_text(error.format_message(), 1000).split())

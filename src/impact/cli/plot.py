@@ -153,7 +153,6 @@ def plot(
 
 
 def _parse_labels(words: list[str] | None) -> dict[str, str]:
-    """KEY=TEXT options."""
     labels: dict[str, str] = {}
     for word in words or ():
         key, equals, text = word.partition("=")

@@ -296,7 +296,6 @@ def _derived_problems(
 def _read_column(
     columns: Columns, column: _Column, header: str, unit: str, n: float | None
 ) -> tuple[Sequence[object], Sequence[_CellProblem]]:
-    """Read a column."""
     cells = columns.cells[header]
     if column.kind == SPECIMEN:
         return [cell if isinstance(cell, str) else number(cell) for cell in cells], []

@@ -64,7 +64,6 @@ def describe_error(key: str, error: ModelError) -> tuple[str, str]:
 
 
 def _read_only(value: Array | float) -> Array | float:
-    """Return the value; an array as a view that cannot be written to."""
     if not isinstance(value, np.ndarray):
         return value
     view = value.view()

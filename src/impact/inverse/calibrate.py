@@ -314,7 +314,6 @@ def _exponents(config: Config, model: ForceModel) -> Iterator[dict[str, float]]:
 
 
 def _fraction(power: float) -> Fraction:
-    """Find the simple fraction that an exponent is."""
     return Fraction(float(power)).limit_denominator(MAX_DENOMINATOR)
 
 

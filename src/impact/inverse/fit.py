@@ -443,7 +443,6 @@ class _Minimum:
 
     @cached_property
     def unidentified(self) -> Array:
-        """See `Fit`."""
         bounds, u = self.problem.bounds, self.best.u
         # by the logarithm of each parameter, or by itself where it may be zero
         slope = np.where(bounds.lower > 0.0, bounds.values(u) / bounds.slope(u), 1.0)
@@ -519,7 +518,6 @@ class _Minimum:
 
     @cached_property
     def taken(self) -> Array | None:
-        """See `ExcessLikelihood`."""
         if self.problem.data.noise != "excess":
             return None
         left, sizes, _ = np.linalg.svd(self.scaled_jacobian, full_matrices=False)
