@@ -55,9 +55,6 @@ CSV_KEYS = {"separator": ("", *SEPARATORS), "decimal": ("", *DECIMALS)}
 # what cells without a value contain
 MISSING = ("", "na", "n/a", "nan", "none", "null", "<na>")
 
-# values in SI units or names of materials, and problems: the index of a cell and a message
-Cells = tuple[list[float | str], list[tuple[int, str]]]
-
 
 @dataclass(frozen=True)
 class Columns:
@@ -127,10 +124,11 @@ class Columns:
 
 def read_cells(
     cells: Iterable[object], quantity: Quantity | None, n: float | None, unit: str = "", *, is_text: bool = False
-) -> Cells:
+) -> tuple[list[float | str], list[tuple[int, str]]]:
     """Convert cells to SI units or to names of materials; text without a unit is a number only with `is_text`.
 
-    Cells that are wrong for one reason are one problem, that of the first.
+    Returns also problems: the index of a cell, and a message. Cells that are wrong for one reason are one, that of
+    the first.
     """
     values: list[float | str] = []
     problems: dict[str, tuple[int, str]] = {}

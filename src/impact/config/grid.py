@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -172,19 +172,19 @@ def _build_axes(
 
 def chunk_problems(
     chunks: Mapping[str, int], axes: Sequence[Axis], n_models: int, n_variables: int
-) -> list[ConfigProblem]:
+) -> Iterator[ConfigProblem]:
     """Check the lengths of chunks along axes: for unknown axes, and for too many or too large chunks."""
     sizes, path = {axis.name: axis.size for axis in axes}, ("output", "chunks")
     unknown = [name for name in chunks if name not in sizes]
+    yield from (((*path, name), f"no axis of this sweep; {did_you_mean(name, list(sizes))}") for name in unknown)
     if unknown or not chunks:
-        return [((*path, name), f"no axis of this sweep; {did_you_mean(name, list(sizes))}") for name in unknown]
+        return
     size = math.prod(min(chunks.get(name, length), length) for name, length in sizes.items())
     count = math.prod(-(-length // chunks.get(name, length)) for name, length in sizes.items())
     count *= n_models * n_variables
     if size > MAX_CHUNK_POINTS or count > MAX_STORED_CHUNKS:
         expected = f"expected at most {MAX_STORED_CHUNKS:,} of at most {MAX_CHUNK_POINTS:,}"
-        return [(path, f"got {count:,} chunks of {size:,} points, {expected}")]
-    return []
+        yield path, f"got {count:,} chunks of {size:,} points, {expected}"
 
 
 def _zip_groups(
@@ -230,15 +230,14 @@ def _repetition_problems(name: str, values: AxisValues, words: Sequence[str]) ->
     return []
 
 
-def design_problems(data: Mapping[str, Any]) -> list[ConfigProblem]:
+def design_problems(data: Mapping[str, Any]) -> Iterator[ConfigProblem]:
     """Check that distributions have a [design], and that a [design] has distributions."""
     paths = paths_with(data, DISTRIBUTION_FORMS)
     if paths and "design" not in data:
-        return [(paths[0], "got a distribution, expected a table [design] as well, such as n = 1024")]
+        yield paths[0], "got a distribution, expected a table [design] as well, such as n = 1024"
     if not paths and "design" in data:
         expected = "at least one, such as v1 = { normal = [1.0, 0.05] }"
-        return [(("design",), f"got a design without an uncertain input, expected {expected}")]
-    return []
+        yield ("design",), f"got a design without an uncertain input, expected {expected}"
 
 
 def unit_samples(design: Design, dimensions: int) -> Array:

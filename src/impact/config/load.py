@@ -273,15 +273,13 @@ def _fit_bounds(
     """Find the bounds of the parameters to fit; NaN for those that the size of the contact gives."""
     fits: dict[str, tuple[float, float]] = {}
     problems: list[ConfigProblem] = []
-    for name, value in values.items():
-        if not isinstance(value, FitRange):
+    for name, bounds in ((name, value.fit) for name, value in values.items() if isinstance(value, FitRange)):
+        if bounds is not True:
+            fits[name] = bounds
             continue
         parsed = InputName.parse(name)
         quantity = parsed.quantity(draft.known_models)
         assert quantity is not None
-        if value.fit is not True:
-            fits[name] = value.fit
-            continue
         is_bounded = math.isfinite(quantity.least) and math.isfinite(quantity.most)
         fits[name] = (float(quantity.least), float(quantity.most)) if is_bounded else (math.nan, math.nan)
         if not is_bounded and parsed.table not in ("model", "friction") and name not in ("K", "mu"):

@@ -571,7 +571,7 @@ def count_problems(
     fits: Mapping[str, tuple[float, float]],
     models: Sequence[ForceModel],
     frictions: Sequence[FrictionLaw] = (),
-) -> list[ConfigProblem]:
+) -> Iterator[ConfigProblem]:
     """Check that there are as many measured values as parameters of a law."""
     n_values = len(measurements.lines) * len(measurements.outputs)
     counts = {
@@ -580,8 +580,7 @@ def count_problems(
         for friction in frictions or (None,)
     }
     key = max(counts, key=lambda name: counts[name])
-    if counts[key] <= n_values:
-        return []
-    got = f"{n_values} measured value{'s' * (n_values != 1)}"
-    expected = f"at least {counts[key]}, the number of parameters to fit of {key}"
-    return [(("data", "file" if measurements.file else "columns"), f"got {got}, expected {expected}")]
+    if counts[key] > n_values:
+        got = f"{n_values} measured value{'s' * (n_values != 1)}"
+        expected = f"at least {counts[key]}, the number of parameters to fit of {key}"
+        yield ("data", "file" if measurements.file else "columns"), f"got {got}, expected {expected}"
