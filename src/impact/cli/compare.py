@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 # the formats of a verdict on stdout
 Format = Literal["table", "json", "junit", "markdown", "github"]
 NewArgument = Annotated[Path, typer.Argument(help="The new result.")]
-BaselineArgument = Annotated[Path, typer.Argument(help="The result to compare with.")]
 SubsetOption = Annotated[
     bool, typer.Option("--subset", help="Compare only the variables and points that both results have.")
 ]
@@ -34,7 +33,7 @@ PlotOption = Annotated[Path | None, options.value("FILE", "Draw where the result
 
 def compare(
     new: NewArgument,
-    baseline: BaselineArgument,
+    baseline: Annotated[Path, typer.Argument(help="The result to compare with.")],
     tol: options.Tolerance = None,
     subset: SubsetOption = False,
     format: FormatOption = "table",

@@ -157,9 +157,7 @@ class Draft:
     @cached_property
     def frictions(self) -> Sequence[FrictionLaw]:
         """The selected friction laws, without those that are unknown; none for central impacts."""
-        if "frictions" not in self.data:
-            return ()
-        return expand_laws(self.data["frictions"], frictions(), "friction law")[0]
+        return expand_laws(self.data.get("frictions"), frictions(), "friction law")[0]
 
     @property
     def laws(self) -> dict[str, Sequence[ForceModel | FrictionLaw]]:

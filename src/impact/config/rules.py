@@ -159,15 +159,14 @@ def _material_problems(draft: Draft) -> Iterable[ConfigProblem]:
 
 
 def _yield_strength_problems(draft: Draft) -> Iterable[ConfigProblem]:
-    reported: set[str] = set()
+    users_of: dict[str, str] = {}
     for ball in ("1", "2"):
         users = _models_using(draft, f"yield_strength{ball}")
         for name in _materials_without(draft, ball, "yield_strength") if users else ():
-            if name not in reported:
-                reported.add(name)
-                expected = MATERIAL_QUANTITIES["yield_strength"].expected
-                expected = f"missing, expected {expected} (used by {users}), or other models"
-                yield ("materials", name, "yield_strength"), expected
+            users_of.setdefault(name, users)
+    expected = f"missing, expected {MATERIAL_QUANTITIES['yield_strength'].expected}"
+    for name, users in users_of.items():
+        yield ("materials", name, "yield_strength"), f"{expected} (used by {users}), or other models"
 
 
 def _mass_problems(draft: Draft) -> Iterable[ConfigProblem]:
