@@ -137,8 +137,8 @@ class Draft:
     def zip_groups(self) -> list[list[str]]:
         """The names of each group of axes that vary together."""
         groups = self.table("sweep").get("zip")
-        lists = filter(lambda group: isinstance(group, list), groups if isinstance(groups, list) else [])
-        return [[name for name in group if isinstance(name, str)] for group in lists]
+        lists = groups if isinstance(groups, list) else []
+        return [listed_names(group) for group in lists if isinstance(group, list)]
 
     @cached_property
     def exponent(self) -> float | None:

@@ -66,11 +66,10 @@ def _exclusion_hint(draft: Draft, model: ForceModel) -> str:
 
 def _vary_together(draft: Draft, *names: str) -> bool:
     """Whether inputs of [sweep] are members of one zip group, of the cases or of the measurements."""
-    groups: list[Iterable[object]] = [*draft.zip_groups]
-    groups.append([str(InputName.of_path(path)) for path in draft.cases])
-    groups.append(as_table(draft.table("sweep").get("cases")))
-    groups.append(draft.measurements.inputs if draft.measurements is not None else [])
-    return any(set(names) <= set(filter(lambda name: isinstance(name, str), group)) for group in groups)
+    cases = [str(InputName.of_path(path)) for path in draft.cases]
+    measured = draft.measurements.inputs if draft.measurements is not None else ()
+    groups = (*draft.zip_groups, cases, as_table(draft.table("sweep").get("cases")), measured)
+    return any({*names} <= {*group} for group in groups)
 
 
 def _numbers(draft: Draft, name: str) -> Sequence[float]:
