@@ -90,9 +90,8 @@ def history_of(recorded: RecordedMotion, impacts: Impacts, times: int | Array | 
     problem, steps = motion.restitution_problem(back_law), phases.restitution.recorded
     restitution, tau_r, W_r = _phase(back_law, problem, steps, back_params, restitution_times)
 
-    unit_t = impacts.length / impacts.v0
     restitution[:2] += [phases.approach.state[2, :1], phases.residual[:1]]
-    units = [unit_t, impacts.length, impacts.v0, impacts.m * impacts.v0 / unit_t]
+    units = [impacts.time, impacts.length, impacts.v0, impacts.m * impacts.v0 / impacts.time]
     t, delta, v, force = np.hstack([approach, restitution]) * units
     # the phases meet at the peak, and the last step can be shorter than rounding: each time appears once
     next_times = np.append(np.minimum.accumulate(t[::-1])[::-1][1:], np.inf)
@@ -149,7 +148,7 @@ def _all_steps(recorded: Sequence[RecordedSlip]) -> list[Step]:
 def _slip_history(history: History, oblique: ObliqueImpacts, recorded: Sequence[RecordedSlip]) -> SlipHistory:
     """Find slip and friction of an impact over the times of its history, from the steps of the joint motion."""
     impacts, g0 = oblique.impacts, oblique.slip.item()
-    unit_t = (impacts.length / impacts.v0).item()
+    unit_t = impacts.time.item()
     numbers, fractions = _fractions_at(_all_steps(recorded), history.t / unit_t, TIME_ROW)
     rows: list[Array] = []
     first = 0

@@ -215,10 +215,8 @@ def fit_laws(config: Config) -> dict[str, Fit]:
     """Fit all laws of a config, evaluated together in this process."""
     assert config.data is not None
     data = config.data
-    values = np.concatenate([np.asarray(column, float) for column in data.outputs.values()])
-    sigma = np.concatenate(
-        [np.asarray(data.sigma.get(name, np.ones(len(column))), float) for name, column in data.outputs.items()]
-    )
+    values = np.concatenate([*data.outputs.values()])
+    sigma = np.concatenate([data.sigma.get(name, np.ones(len(column))) for name, column in data.outputs.items()])
     specimens = np.unique(data.specimens, return_inverse=True)[1] if data.specimens else None
     points = DataPoints(values, sigma, data.noise, specimens, data.loss)
     laws = laws_to_fit(config)
