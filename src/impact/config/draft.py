@@ -184,20 +184,14 @@ class Draft:
         settings = list(settings)
         if not settings:
             return self
+        paths = [setting.path for setting in settings if setting.path[:1] == ("materials",)]
+        changed = dict.fromkeys(str(path[1]) for path in paths if len(path) > 2 and path[:2] not in paths)
+        added = [name for name in changed if name in library() and name not in self.table("materials")]
         draft = self
-        for setting in (*self._library_settings(settings), *settings):
+        for setting in (*map(_library_setting, added), *settings):
             draft = draft._with_setting(setting)
         data, problems = to_plain_data(draft.data)
         return replace(draft, data=data).with_problems(problems)
-
-    def _library_settings(self, settings: Iterable[Setting]) -> list[Setting]:
-        paths = [setting.path for setting in settings if setting.path[:1] == ("materials",)]
-        names = dict.fromkeys(str(path[1]) for path in paths if len(path) > 2)
-        return [
-            _library_setting(name)
-            for name in names
-            if ("materials", name) not in paths and name in library() and name not in self.table("materials")
-        ]
 
     def _with_setting(self, setting: Setting) -> Draft:
         path, data = setting.path, self.data
