@@ -120,11 +120,6 @@ def collide(
 # ---- outputs; the arguments of each function are names of FORMULAS
 
 
-def _energy_residual(result: CollisionResult, undefined: Mask) -> Array:
-    work = result.approach_work + result.restitution_work
-    return replace_where(work - (1.0 - result.e_out * result.e_out), undefined, np.nan)
-
-
 def _energetic(result: CollisionResult, undefined: Mask) -> Array:
     """sqrt(-W_r/W_c), equation (3), from the integrated works; 0 where the balls stay together."""
     e = np.sqrt(np.maximum(-result.restitution_work, 0.0) / result.approach_work)
@@ -154,14 +149,6 @@ def _separation_time(
 # ---- outputs of friction; G is the slip in units of mu v0 m/m_t, positive before the impact
 
 
-def _friction_status(
-    tangential: TangentialResult, status: NDArray[np.int8], not_integrated: Mask
-) -> NDArray[np.int8]:
-    """Status of the tangential motion: that of the normal motion where it has none of its own."""
-    slip_status = replace_where(tangential.status, tangential.status == STATUS_OK, status)
-    return replace_where(slip_status, not_integrated, status)
-
-
 def _share(name: str) -> Callable[..., Array]:
     """Make the formula of G1/G0 from the "slip" of the tangential motion, or from the "exact" one.
 
@@ -185,30 +172,20 @@ def _share(name: str) -> Callable[..., Array]:
     return share
 
 
-def _impulse(oblique: ObliqueImpacts, slip_share: Array, friction_status: NDArray[np.int8]) -> Array:
-    """P [N s], 0 without a slip."""
-    impulse = oblique.m_t * oblique.slip * (1.0 - slip_share)
-    return replace_where(impulse, _without_slip(oblique, friction_status), 0.0)
-
-
-def _without_slip(oblique: ObliqueImpacts, friction_status: NDArray[np.int8]) -> Mask:
-    """Impacts that have an answer and no slip before it."""
-    return np.asarray((oblique.slip == 0.0) & (friction_status < FIRST_FAILURE))
-
-
 def _contact_regime(
     oblique: ObliqueImpacts,
     tangential: TangentialResult,
     kind: str,
     friction_status: NDArray[np.int8],
     missed: Mask,
+    without_slip: Mask,
 ) -> NDArray[np.int8]:
     """Whether the contact sticks (1), slides (2) or does both (3); 0 where that is not defined."""
     regime = tangential.regime
     if kind == "coulomb":
         regime = np.where(np.abs(oblique.G0) >= tangential.sliding_impulse, SLIDES, STICKS | SLIDES)
     regime = replace_where(regime, oblique.mu == 0.0, SLIDES)
-    regime = replace_where(regime, _without_slip(oblique, friction_status), STICKS)
+    regime = replace_where(regime, without_slip, STICKS)
     return np.where((friction_status >= FIRST_FAILURE) | missed, np.int8(0), regime).astype(np.int8)
 
 
@@ -270,7 +247,9 @@ FORMULAS: dict[str, Callable[..., Any]] = {
     "damping_ratio": lambda result, not_integrated: replace_where(
         replace_where(result.chi, not_integrated, np.nan), np.isinf(result.chi), np.nan
     ),
-    "energy_residual": _energy_residual,
+    "energy_residual": lambda result, undefined: replace_where(
+        result.approach_work + result.restitution_work - (1.0 - result.e_out * result.e_out), undefined, np.nan
+    ),
     "closed_form_error": lambda e_out, result: e_out - result.exact,
     "status": lambda result, not_integrated, checked: replace_where(result.status, not_integrated, checked),
     "in_domain": _in_domain,
@@ -282,10 +261,18 @@ FORMULAS: dict[str, Callable[..., Any]] = {
     "lambda": lambda damping_ratio, stiffness, impacts: damping_ratio * stiffness / impacts.v0,
     "separation_time": _separation_time,
     # of friction
-    "friction_status": _friction_status,
+    # that of the normal motion where the tangential motion has none of its own
+    "friction_status": lambda tangential, status, not_integrated: replace_where(
+        replace_where(tangential.status, tangential.status == STATUS_OK, status), not_integrated, status
+    ),
     "slip_share": _share("slip"),
     "exact_share": _share("exact"),
-    "impulse": _impulse,
+    # impacts that have an answer and no slip before it
+    "without_slip": lambda oblique, friction_status: (oblique.slip == 0.0) & (friction_status < FIRST_FAILURE),
+    # P [N s]
+    "impulse": lambda oblique, slip_share, without_slip: replace_where(
+        oblique.m_t * oblique.slip * (1.0 - slip_share), without_slip, 0.0
+    ),
     # impacts with a slip, friction and a complete tangential motion
     "has_works": lambda slip_share, oblique, missed: np.isfinite(slip_share) & (oblique.mu > 0.0) & ~missed,
     "u1_post": lambda oblique, impulse: oblique.u1 - impulse / oblique.impacts.m1,
