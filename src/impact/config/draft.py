@@ -220,9 +220,14 @@ class Draft:
     def error(self) -> ConfigError:
         """Build the exception with all problems: those of the file by line, then those of the settings."""
         key_line = {} if self.text.lstrip().startswith("{") else key_lines(self.text)
+        measured = self.measurements.inputs if self.measurements is not None else ()
+        columns = {InputName.parse(name).path: ("data", "columns", name) for name in measured} | dict(self.cases)
         ranked: list[tuple[tuple[int, int], str]] = []
         for path, message in self.problems:
-            path = self._written_path(path)
+            for end in range(len(path), 0, -1):
+                if path[:end] in columns:
+                    path = (*columns[path[:end]], *path[end:])
+                    break
             rank, location = self._locate(path, key_line)
             ranked.append((rank, ": ".join(part for part in (location, path_text(path), message) if part)))
         lines = [line for _, line in sorted(ranked, key=lambda ranked_line: ranked_line[0])]
@@ -230,15 +235,6 @@ class Draft:
             lines[MAX_PROBLEM_LINES:] = [f"and {len(lines) - MAX_PROBLEM_LINES} more"]
         kind_of_error = MissingFileError if self.misses_file else ConfigError
         return kind_of_error(*lines, *self.lines)
-
-    def _written_path(self, path: KeyPath) -> KeyPath:
-        """Find the path in the source of a path that may be a column of cases or of measurements."""
-        measured = self.measurements.inputs if self.measurements is not None else ()
-        columns = {InputName.parse(name).path: ("data", "columns", name) for name in measured} | dict(self.cases)
-        for end in range(len(path), 0, -1):
-            if path[:end] in columns:
-                return (*columns[path[:end]], *path[end:])
-        return path
 
     def _locate(self, path: KeyPath, key_line: Mapping[KeyPath, int]) -> tuple[tuple[int, int], str]:
         """Find the value at a path: a sort key, by line and then by setting, and the text of its location."""

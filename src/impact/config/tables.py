@@ -504,7 +504,9 @@ def document_type(
     for name in LAW_TABLES:
         laws = laws_of(name, models)
         keys = laws if with_tables is None else [key for key in with_tables[name] if key in laws]
-        names.append(_law_names(laws))
+        families = {f"family:{m.family}" for m in laws.values() if isinstance(m, ForceModel) and not m.same_as}
+        # the words that choose laws
+        names.append((*laws, "all", *sorted(families)))
         tables.append(tuple((key, _parameter_table(laws[key])) for key in keys))
     return _document_type(tuple(names), tuple(tables))
 
@@ -572,12 +574,6 @@ def schema(output: str | Path | None = None, *, overwrite: bool = False) -> dict
         text = json.dumps(content, indent=2, ensure_ascii=False) + "\n"
         write_file(Path(output), text.encode(), overwrite=overwrite)
     return content
-
-
-def _law_names(laws: Mapping[str, ForceModel | FrictionLaw]) -> tuple[str, ...]:
-    """List the words that choose laws: keys, "all" and families."""
-    families = {f"family:{law.family}" for law in laws.values() if isinstance(law, ForceModel) and not law.same_as}
-    return (*laws, "all", *sorted(families))
 
 
 def _selection_type(words: tuple[str, ...]) -> Any:
