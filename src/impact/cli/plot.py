@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -16,9 +16,6 @@ from ..formatting import safe_text
 from ..plots.kinds import KINDS, WIDTHS
 from . import exits, options
 from .completion import complete_axis, complete_kind, complete_output
-
-if TYPE_CHECKING:
-    from ..plots.data import PlotData
 
 
 def plot(
@@ -145,11 +142,15 @@ def plot(
         plugins=plugin or (),
     )
     for name, picture in files.pictures.items():
-        exits.print_line(_summary_line(picture, files.plot_data[name]))
+        plot_data = files.plot_data[name]
+        conditions = plot_data.conditions.replace("\N{NO-BREAK SPACE}", " ")
+        without = f"; without {', '.join(plot_data.not_drawn)}" if plot_data.not_drawn else ""
+        line = f"{picture}: {plot_data.title}" + (f", {conditions}" if conditions else "") + without
+        exits.print_line(safe_text(line, 1000))
     for name, reason in files.left_out.items():
         exits.print_line(f"{name} is not drawn: {reason}")
     if as_json:
-        print(dump({name: asdict(plot_data) for name, plot_data in files.plot_data.items()}))
+        print(dump({name: asdict(data_of_kind) for name, data_of_kind in files.plot_data.items()}))
 
 
 def _parse_labels(words: list[str] | None) -> dict[str, str]:
@@ -160,9 +161,3 @@ def _parse_labels(words: list[str] | None) -> dict[str, str]:
             raise UsageError(f"--label: got {word}, expected KEY=TEXT, such as e='Restitution $e$'")
         labels[key] = text
     return labels
-
-
-def _summary_line(picture: Path, plot_data: PlotData) -> str:
-    conditions = plot_data.conditions.replace("\N{NO-BREAK SPACE}", " ")
-    without = f"; without {', '.join(plot_data.not_drawn)}" if plot_data.not_drawn else ""
-    return safe_text(f"{picture}: {plot_data.title}" + (f", {conditions}" if conditions else "") + without, 1000)

@@ -95,7 +95,10 @@ def key_lines(text: str) -> dict[KeyPath, int]:
         started, path = 0, base
         while token.text != end:
             if token.text not in ("[", "."):
-                started, path = started or token.line, (*path, _unquoted(token.text))
+                # without quotes and escapes
+                is_quoted = token.text.startswith(("'", '"'))
+                part = next(iter(tomllib.loads(f"{token.text} = 0"))) if is_quoted else token.text
+                started, path = started or token.line, (*path, part)
                 lines.setdefault(path, started)
             token = next(tokens)
         return path
@@ -143,14 +146,6 @@ def _tokens(text: str) -> Iterator[_Token]:
         if match["skip"] is None and (match[0] != "\n" or depth == 0):
             yield _Token(match[0], line)
         line += match[0].count("\n")
-
-
-def _unquoted(token: str) -> str:
-    """Remove the quotes and escapes of a part of a key."""
-    if not token.startswith(("'", '"')):
-        return token
-    (part,) = tomllib.loads(f"{token} = 0")
-    return part
 
 
 def validation_problems(error: ValidationError, models: Mapping[str, ForceModel]) -> Iterable[ConfigProblem]:

@@ -134,18 +134,16 @@ class CasesFile(Table):
     decimal: DecimalKey = Field(None, description="sign, where it is not recognised")
 
 
-def _cases_form(value: object) -> str:
-    if not isinstance(value, dict):
-        return SCALAR
-    return COLUMN if isinstance(value.get("file"), str) else RANGE
-
-
 CaseLists: Any = _lists_by_name(float | str)
 CasesTable = Annotated[
     Annotated[str, expected(CASES_EXPECTED), Tag(SCALAR)]
     | Annotated[CaseLists, expected(CASES_EXPECTED), Tag(RANGE)]
     | Annotated[CasesFile, Tag(COLUMN)],
-    Discriminator(_cases_form),
+    Discriminator(
+        lambda value: (
+            (COLUMN if isinstance(value.get("file"), str) else RANGE) if isinstance(value, dict) else SCALAR
+        )
+    ),
 ]
 
 
