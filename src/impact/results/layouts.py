@@ -13,7 +13,7 @@ import math
 import operator
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -39,21 +39,15 @@ from ..formatting import number, safe_text
 from .attributes import LawRecord, PairRecord, SummaryRecord, read_attribute
 from .netcdf import RegionValues, stored_array
 from .schema import SLIP_INPUTS, attributes_of, count_points, derived_names, scale_of, stored_variables
-from .summary import Summary, add_slab, summarize_table, summary_record
 from .trajectory_table import (
     MAX_STIFFNESS_VALUES,
-    ExpandedSlab,
     TrajectoryRows,
     TrajectoryTable,
     expand,
-    expanded_slabs,
     lazy_dataset,
     whole_stiffness,
 )
 from .validation import FACTORED_ATTRIBUTES, TABLE_VARIABLES, is_quantity
-
-# a factored result of more points has their summary in its file: a reader would take long to compute it
-NO_SUMMARY_POINTS = 2**20
 
 N_WITNESSES = 1_000
 # tolerance of a witness, relative to the scale that `compare` uses for its variable
@@ -72,63 +66,11 @@ WITNESSES = {False: ("witness", "witness_index"), True: ("pair_witness", "witnes
 # reads some values of a variable of the table, by its name; and the parts of some lengths that it consists of
 ReadVariable = Callable[[str, slice | NDArray[np.intp]], NDArray[Any]]
 ReadParts = Callable[[str, Sequence[int]], Iterator[NDArray[Any]]]
-# replaces some values of a slab
-FillSlab = Callable[[ExpandedSlab], None]
-
-
-class Contents(NamedTuple):
-    """A result and what its file holds; the summary of a full one is complete when its values are written."""
-
-    result: xr.Dataset
-    template: xr.Dataset
-    values: Iterator[RegionValues]
-    summary: Summary
 
 
 def file_template(result: xr.Dataset, plan: Plan, table: TrajectoryTable) -> xr.Dataset:
     """Build the dataset of the file, with placeholder values, from that of the result."""
     return table_template(result, table, stored_variables(plan)) if plan.layout == "factored" else result
-
-
-def file_contents(
-    result: xr.Dataset,
-    plan: Plan,
-    table: TrajectoryTable,
-    on_slab: Callable[[int, int], None],
-    fill: FillSlab | None,
-) -> Contents:
-    """Compute what the file holds, from the trajectory table and the values that `fill` replaces in a full one.
-
-    `on_slab` is called with the numbers of stored and of failed points.
-    """
-    variables, summary, chunks = stored_variables(plan), Summary(), plan.config.output.chunks
-    template, is_factored = file_template(result, plan, table), plan.layout == "factored"
-    if is_factored:
-        result = lazy_dataset(result, table, variables)
-        if plan.stored_points > NO_SUMMARY_POINTS:
-            summary, extremes = summarize_table(result, table)
-            record = summary_record(summary, extremes, result)
-            template = template.assign_attrs(summary=record.model_dump_json(exclude_defaults=True))
-        else:
-            for slab in expanded_slabs(table, variables):
-                add_slab(summary, table, slab)
-
-    def values_of_points() -> Iterator[RegionValues]:
-        lengths = [chunks.get(axis.name, axis.size) for axis in plan.config.axes] if chunks else []
-        for slab in expanded_slabs(table, variables, lengths):
-            if fill:
-                fill(slab)
-            for name, array in slab.values.items():
-                yield name, slab.region_in(result[name].dims), array
-            add_slab(summary, table, slab)
-            on_slab(summary.points, summary.failed)
-
-    def values_of_table() -> Iterator[RegionValues]:
-        for stored in table_values(table, variables):
-            yield stored
-            on_slab(0, summary.failed)
-
-    return Contents(result, template, values_of_table() if is_factored else values_of_points(), summary)
 
 
 def read_layout(variables: Mapping[str, xr.Variable], attributes: Mapping[str, object]) -> tuple[str, xr.Dataset]:

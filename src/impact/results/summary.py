@@ -233,8 +233,8 @@ def _distinct_parts(dataset: xr.Dataset, name: str) -> list[tuple[xr.Variable, i
     return None if evaluations > MAX_SUMMARY_POINTS else parts
 
 
-def summarize_table(dataset: xr.Dataset, table: TrajectoryTable) -> tuple[Summary, dict[str, Extremes | None]]:
-    """Summarize a lazy result and find its extremes; variables along the same axes are evaluated together."""
+def summarize_table(dataset: xr.Dataset, table: TrajectoryTable) -> tuple[Summary, SummaryRecord]:
+    """Summarize a lazy result, also for its file; variables along the same axes are evaluated together."""
     summary, extremes = Summary(), dict[str, Extremes | None]()
     axes = [axis.name for axis in table.inputs.axes]
     # by model and by the sizes of the axes along which they vary: the weight of a point, and names of variables
@@ -265,15 +265,8 @@ def summarize_table(dataset: xr.Dataset, table: TrajectoryTable) -> tuple[Summar
                 extremes[name] = so_far and so_far.add(values[name], weight)
             start = [part.start for part in region]
             summary.add(values, table.keys(position)[0], table.place(position), start, weight)
-    return summary, extremes
-
-
-def summary_record(
-    summary: Summary, extremes: Mapping[str, Extremes | None], dataset: xr.Dataset
-) -> SummaryRecord:
-    """Convert the summary of a result to the form in which it is stored."""
-    keys = dataset["model"].values.tolist()
-    return SummaryRecord(
+    keys = [law.key for law in table.laws]
+    return summary, SummaryRecord(
         status=counts_by_name(summary.counts),
         not_evaluated=summary.not_counted,
         worst=summary.worst,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import shutil
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
@@ -31,12 +31,19 @@ from ..engine.run import DEFAULT_RUN, ProgressCallback, ProgressCounter, Run, ig
 from ..engine.trajectories import RANGE_TRAJECTORIES, TrajectoryRange
 from ..errors import ResultError, StoreError, UnfinishedError, UsageError, warn
 from ..formatting import argument
-from .layouts import FillSlab, file_contents, stiffness_to_store
-from .netcdf import MAX_LABEL_BYTES, encode_text, is_text
+from .layouts import file_template, stiffness_to_store, table_values
+from .netcdf import MAX_LABEL_BYTES, RegionValues, encode_text, is_text
 from .plausibility import input_notes, with_depths
 from .schema import dataset_template, plan_coordinates, stored_variables
-from .summary import SweepOutcome, result_notes, summarize
-from .trajectory_table import TrajectoryTable, in_memory, lazy_dataset, table_of_ranges
+from .summary import Summary, SweepOutcome, add_slab, result_notes, summarize, summarize_table
+from .trajectory_table import (
+    ExpandedSlab,
+    TrajectoryTable,
+    expanded_slabs,
+    in_memory,
+    lazy_dataset,
+    table_of_ranges,
+)
 from .validation import is_name
 from .xarray_backend import MAX_LOADED_BYTES, load, open_result, write_sealed
 
@@ -44,6 +51,8 @@ from .xarray_backend import MAX_LOADED_BYTES, load, open_result, write_sealed
 OVERHEAD_BYTES = 2**16
 # smaller sweeps of one range have no checkpoint: they are repeated faster than read
 NO_CHECKPOINT_POINTS = 2**20
+# a factored result of more points has their summary in its file: a reader would take long to compute it
+NO_SUMMARY_POINTS = 2**20
 
 
 @dataclass(frozen=True)
@@ -60,7 +69,7 @@ class Extension:
 
     seal: str = ""
     note: str = ""
-    fill: FillSlab | None = None
+    fill: Callable[[ExpandedSlab], None] | None = None
     replaces: bool = False
 
 
@@ -412,16 +421,41 @@ def store_result(
     part: Path | None = None,
 ) -> SweepOutcome:
     """Write the result of a trajectory table in the layout of its plan; `part` is the temporary name."""
-    progress, result = counter.progress, dataset_template(plan)
+    progress, result, summary = counter.progress, dataset_template(plan), Summary()
     if extension.note:
         result = result.assign_attrs(extended=extension.note)
+    template, variables = file_template(result, plan, table), stored_variables(plan)
+    if plan.layout == "factored":
+        result = lazy_dataset(result, table, variables)
+        if plan.stored_points > NO_SUMMARY_POINTS:
+            summary, record = summarize_table(result, table)
+            template = template.assign_attrs(summary=record.model_dump_json(exclude_defaults=True))
+        else:
+            for slab in expanded_slabs(table, variables):
+                add_slab(summary, table, slab)
 
-    def on_slab(points: int, failed: int) -> None:
-        run.on_progress(replace(progress, points=points, failed=max(failed, progress.failed)))
+    def report(points: int) -> None:
+        run.on_progress(replace(progress, points=points, failed=max(summary.failed, progress.failed)))
         run.check_stop()
 
-    contents = file_contents(result, plan, table, on_slab, extension.fill)
+    def values_of_points() -> Iterator[RegionValues]:
+        chunks = plan.config.output.chunks
+        lengths = [chunks.get(axis.name, axis.size) for axis in plan.config.axes] if chunks else []
+        for slab in expanded_slabs(table, variables, lengths):
+            if extension.fill:
+                extension.fill(slab)
+            for name, array in slab.values.items():
+                yield name, slab.region_in(result[name].dims), array
+            add_slab(summary, table, slab)
+            report(summary.points)
+
+    def values_of_table() -> Iterator[RegionValues]:
+        for stored in table_values(table, variables):
+            yield stored
+            report(0)
+
+    values = values_of_table() if plan.layout == "factored" else values_of_points()
     with atomic_write(output, overwrite=run.overwrite or extension.replaces, part=part) as sink:
-        seal = write_sealed(sink, output, contents.template, contents.values, plan.config.output)
-    contents.result.encoding = {"source": str(output), "seal": seal, "layout": plan.layout}
-    return SweepOutcome(contents.result, contents.summary, progress.of_trajectories, output=output)
+        seal = write_sealed(sink, output, template, values, plan.config.output)
+    result.encoding = {"source": str(output), "seal": seal, "layout": plan.layout}
+    return SweepOutcome(result, summary, progress.of_trajectories, output=output)
