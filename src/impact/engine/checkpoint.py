@@ -83,10 +83,10 @@ class WorkFolder:
 
 
 @contextlib.contextmanager
-def open_work_folder(folder: Path, plan: Plan, run: Run, extends: str = "") -> Iterator[WorkFolder]:
-    """Create or reopen the work folder of a plan, and lock it; `extends` is the seal of an extended result."""
+def open_work_folder(folder: Path, plan: Plan, run: Run) -> Iterator[WorkFolder]:
+    """Create or reopen the work folder of a plan, and lock it."""
     _check_is_work_folder(folder)
-    record = _sweep_record(plan, extends)
+    record = _sweep_record(plan)
     with _locked(folder):
         _prepare_folder(folder, record, run)
         yield WorkFolder(folder, _record_digest(record))
@@ -174,7 +174,7 @@ def _prepare_folder(folder: Path, record: Mapping[str, Any], run: Run) -> None:
         raise StoreError(f"{folder}: {error.strerror}") from error
 
 
-def _sweep_record(plan: Plan, extends: str = "") -> dict[str, Any]:
+def _sweep_record(plan: Plan) -> dict[str, Any]:
     """Collect everything that the finished ranges of a sweep depend on."""
     solver = plan.solver
     return {
@@ -184,7 +184,7 @@ def _sweep_record(plan: Plan, extends: str = "") -> dict[str, Any]:
         "collapse": solver.collapse,
         "core": solver.core,
         "physics": plan.physics,
-        **({"extends": extends} if extends else {}),
+        **({"extends": plan.extends} if plan.extends else {}),
     }
 
 

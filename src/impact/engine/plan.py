@@ -7,7 +7,7 @@ import json
 import math
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -53,6 +53,10 @@ class Plan:
 
     config: Config
     plugins: Plugins = field(default_factory=Plugins)
+    # of an extended result: the seal of the old one, the attribute `extended`, and whether the new one replaces it
+    extends: str = field(default="", kw_only=True)
+    history: str = field(default="", kw_only=True)
+    replaces: bool = field(default=False, kw_only=True)
 
     @property
     def models(self) -> tuple[ForceModel, ...]:
@@ -124,6 +128,9 @@ class Plan:
     def reused(self, trajectory_range: TrajectoryRange) -> ReusedPart:
         """Find the trajectories of a range that are not integrated; see `impact.results.extend.ExtendedPlan`."""
         return np.zeros(trajectory_range.size, bool), trajectory_range.record.blank(0)
+
+    def fill(self, slab: Any) -> None:
+        """Replace the values of a slab that are not computed, none here."""
 
     def check_count(self, most: int, name: str) -> None:
         """Refuse too many trajectories before any array is allocated; `name` is that of the config."""

@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -37,7 +37,7 @@ from .provenance import stored_config
 from .schema import require_sweep
 from .selection import IndexArray, match_labels
 from .summary import SweepOutcome
-from .sweep import Extension, sweep_into
+from .sweep import sweep_into
 from .trajectory_table import ExpandedSlab, TrajectoryTable, table_of_result
 from .xarray_backend import load, open_result
 
@@ -143,18 +143,24 @@ def extend_to_file(
         if before.attrs.get("core") in CORES:
             # the existing trajectories were integrated by this core
             config = replace(config, solver=replace(config.solver, core=str(before.attrs["core"])))
-        new = ExtendedPlan(config, plugin_set.of(config.models), old=old, table=table, name=name)
+        seal = str(before.encoding["seal"])
+        record = {"seal": seal, "set": [setting.override for setting in changes]}
+        history = json.dumps([*read_attribute(before.attrs, "extended", name), record])
+        new = ExtendedPlan(
+            config,
+            plugin_set.of(config.models),
+            old=old,
+            before=before,
+            table=table,
+            name=name,
+            extends=seal,
+            history=history,
+            replaces=target == source,
+        )
         _check_changes(old, new, name)
         new.check_count(max_points, name)
         _check_none_lost(new)
-        seal = str(before.encoding["seal"])
-        record = {"seal": seal, "set": [setting.override for setting in changes]}
-        history = [*read_attribute(before.attrs, "extended", name), record]
-        # a full result has no trajectories, only the values of its points: those of all new points are integrated,
-        # also where a point of the result had the same one
-        fill = partial(new.fill, before) if table is None and new.layout == "full" else None
-        extension = Extension(seal, json.dumps(history), fill, replaces=target == source)
-        outcome = sweep_into(target, new, connected, extension)
+        outcome = sweep_into(target, new, connected)
     run.check_stop(f"{target} is complete")
     layout = "full" if table is None else "factored"
     return replace(outcome, integrated=sum(new.integrated.values()), extended_layout=layout)
@@ -287,13 +293,14 @@ class ExtendedPlan(Plan):
 
     Parameters
     ----------
-    old : the plan of the smaller result
+    old, before : the plan of the smaller result, and its dataset
     table : its trajectories; None if it has only the values of its points
     name : of its file, in messages
     integrated : how many trajectories of each range are not reused, by its number
     """
 
     old: Plan
+    before: xr.Dataset
     table: TrajectoryTable | None
     name: str
     integrated: dict[int, int] = field(default_factory=dict)
@@ -384,10 +391,13 @@ class ExtendedPlan(Plan):
         rows = old_map.rows(tuple(index)) if index else np.zeros(cells.shape, np.intp)
         return np.where(self._is_old(trajectory_map, cells), rows, -1)
 
-    def fill(self, before: xr.Dataset, slab: ExpandedSlab) -> None:
-        """Copy the values of the old result into the values of a slab."""
-        names = [axis.name for axis in self.old.config.axes]
-        if self.old_law(slab.number) is None:
+    def fill(self, slab: ExpandedSlab) -> None:
+        """Copy the values of an old result without trajectories into the values of a slab.
+
+        The trajectories of all new points are integrated, also where a point of the old result had the same one.
+        """
+        names, before = [axis.name for axis in self.old.config.axes], self.before
+        if self.table is not None or self.old_law(slab.number) is None:
             return
         of_law = dict(zip(("model", "friction"), keys_of(self.laws[slab.number]), strict=False))
         old_positions = [axis.positions[part] for axis, part in zip(self.positions, slab.region, strict=True)]

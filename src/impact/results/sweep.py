@@ -8,7 +8,7 @@ import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -37,7 +37,6 @@ from .plausibility import input_notes, with_depths
 from .schema import dataset_template, plan_coordinates, stored_variables
 from .summary import Summary, SweepOutcome, add_slab, result_notes, summarize, summarize_table
 from .trajectory_table import (
-    ExpandedSlab,
     TrajectoryTable,
     expanded_slabs,
     in_memory,
@@ -53,27 +52,6 @@ OVERHEAD_BYTES = 2**16
 NO_CHECKPOINT_POINTS = 2**20
 # a factored result of more points has their summary in its file: a reader would take long to compute it
 NO_SUMMARY_POINTS = 2**20
-
-
-@dataclass(frozen=True)
-class Extension:
-    """What a sweep takes over from an old result, see `impact.results.extend`; by default nothing.
-
-    Parameters
-    ----------
-    seal : of the old result
-    note : JSON text for the attribute `extended` of the new result
-    fill : copies old values into a slab; None if all values are computed from trajectories
-    replaces : whether the new result replaces the old one
-    """
-
-    seal: str = ""
-    note: str = ""
-    fill: Callable[[ExpandedSlab], None] | None = None
-    replaces: bool = False
-
-
-NO_EXTENSION = Extension()
 
 
 def sweep(
@@ -270,11 +248,9 @@ def sweep_in_memory(plan: Plan, run: Run = DEFAULT_RUN) -> xr.Dataset:
     return in_memory(dataset) if dataset.nbytes <= MAX_LOADED_BYTES else dataset
 
 
-def sweep_into(
-    output: Path, plan: Plan, run: Run = DEFAULT_RUN, extension: Extension = NO_EXTENSION
-) -> SweepOutcome:
+def sweep_into(output: Path, plan: Plan, run: Run = DEFAULT_RUN) -> SweepOutcome:
     """Run a plan, and store its result; raises what `sweep_to_file` does."""
-    may_replace = run.overwrite or extension.replaces
+    may_replace = run.overwrite or plan.replaces
     check_output(output, overwrite=may_replace)
     check_storable(plan)
     few = plan.stored_points <= NO_CHECKPOINT_POINTS or plan.layout == "factored"
@@ -285,25 +261,23 @@ def sweep_into(
         # so short that it is neither stopped nor reported
         table, counter = _integrate_in_memory(plan, DEFAULT_RUN)
         try:
-            return store_result(output, plan, table, counter, run, extension)
+            return store_result(output, plan, table, counter, run)
         except UnfinishedError:
             raise UnfinishedError("nothing was written") from None
 
     counter = ProgressCounter.start(plan.ranges, plan.points, run)
-    with checkpoint.open_work_folder(folder, plan, run, extension.seal) as work_folder:
+    with checkpoint.open_work_folder(folder, plan, run) as work_folder:
         # another process may have stored it in the meantime
         check_output(output, overwrite=may_replace)
         # without --overwrite, an existing result would be refused
-        replaces = os.path.lexists(output) and not extension.seal
+        replaces = os.path.lexists(output) and not plan.extends
         again = " ".join(argument(name, True) for name in ("resume", "overwrite")[: 1 + replaces])
         with report_kept_ranges(
             folder, counter, again, lambda error: _missing_space(error, output, plan, counter)
         ):
             complete_ranges(work_folder, plan, plan.ranges, counter, run)
             table = table_of_ranges(plan, partial(reload_range, work_folder))
-            outcome = store_result(
-                output, plan, table, counter, run, extension, checkpoint.partial_file_of(output)
-            )
+            outcome = store_result(output, plan, table, counter, run, checkpoint.partial_file_of(output))
         checkpoint.remove_work_folder(folder)
     return outcome
 
@@ -417,13 +391,12 @@ def store_result(
     table: TrajectoryTable,
     counter: ProgressCounter,
     run: Run,
-    extension: Extension = NO_EXTENSION,
     part: Path | None = None,
 ) -> SweepOutcome:
     """Write the result of a trajectory table in the layout of its plan; `part` is the temporary name."""
     progress, result, summary = counter.progress, dataset_template(plan), Summary()
-    if extension.note:
-        result = result.assign_attrs(extended=extension.note)
+    if plan.history:
+        result = result.assign_attrs(extended=plan.history)
     template, variables = file_template(result, plan, table), stored_variables(plan)
     if plan.layout == "factored":
         result = lazy_dataset(result, table, variables)
@@ -442,8 +415,7 @@ def store_result(
         chunks = plan.config.output.chunks
         lengths = [chunks.get(axis.name, axis.size) for axis in plan.config.axes] if chunks else []
         for slab in expanded_slabs(table, variables, lengths):
-            if extension.fill:
-                extension.fill(slab)
+            plan.fill(slab)
             for name, array in slab.values.items():
                 yield name, slab.region_in(result[name].dims), array
             add_slab(summary, table, slab)
@@ -455,7 +427,7 @@ def store_result(
             report(0)
 
     values = values_of_table() if plan.layout == "factored" else values_of_points()
-    with atomic_write(output, overwrite=run.overwrite or extension.replaces, part=part) as sink:
+    with atomic_write(output, overwrite=run.overwrite or plan.replaces, part=part) as sink:
         seal = write_sealed(sink, output, template, values, plan.config.output)
     result.encoding = {"source": str(output), "seal": seal, "layout": plan.layout}
     return SweepOutcome(result, summary, progress.of_trajectories, output=output)
