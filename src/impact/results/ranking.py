@@ -25,7 +25,7 @@ from ..display import Block, Displayed, Table, html_of
 from ..errors import UsageError, did_you_mean
 from ..formatting import argument, law_name, percentage, prefixed, safe_text
 from .replay_command import describe_point
-from .schema import columns_along, plain_unit, require_sweep, squeezed_laws
+from .schema import columns_along, parts_of_laws, plain_unit, require_sweep
 from .selection import as_keys, require_outputs, select, select_laws
 from .slabs import Slab, distinct_points, is_computed, over_varying_dims, slabs, varying_dims
 from .xarray_backend import result_of
@@ -362,7 +362,7 @@ def rank_laws(
     """Rank the laws of a result; refuse one that lacks a target, or has too many points to rank or none."""
     _check_rankable(dataset, criterion)
     selected = select_laws(select(dataset[list(criterion.names)], sel or {}), models, frictions)
-    parts = list(squeezed_laws(selected, selected.dims))
+    parts = [part for _, part in parts_of_laws(selected, selected.dims, first=0)]
     evaluated = [
         _reduce_dims(part, criterion)[0] for part in parts if is_computed(part.variables[criterion.names[0]])
     ]

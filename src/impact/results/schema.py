@@ -443,32 +443,21 @@ def columns_along(dataset: xr.Dataset, dim: Hashable) -> list[str]:
     return [name for name in along if is_input(name) and name not in derived]
 
 
-def places_of_laws(
-    dataset: xr.Dataset, dims: Iterable[Hashable]
-) -> Iterator[tuple[tuple[int, ...], dict[Hashable, int | slice]]]:
-    """Find the position of each model, or each pair, of variables with some dimensions, and how to select it.
+def parts_of_laws(
+    dataset: xr.Dataset, dims: Iterable[Hashable], first: int | slice = slice(0, 1)
+) -> Iterator[tuple[tuple[int, ...], xr.Dataset]]:
+    """Select each model, or each pair, of variables with some dimensions; yield also its position.
 
-    Each is at the first position along the parameters of other laws; without the dimension of models it is all.
+    Each is at the first position along the parameters of other laws: on axes of length one, or with `first` = 0
+    without these axes. Without the dimension of models it is all.
     """
     law_dims = [dim for dim in LAW_DIMS if dim in dims] if "model" in dims else []
     keys = [dataset[dim].values.tolist() for dim in law_dims]
     columns = {dim: columns_along(dataset, dim) for dim in (dataset.dims if law_dims else ())}
     for place in np.ndindex(*map(len, keys)):
         names = [str(of_dim[position]) for of_dim, position in zip(keys, place, strict=True)]
-        first = {dim: slice(0, 1) for dim, along in columns.items() if is_foreign(along, *names)}
-        yield place, {**dict(zip(law_dims, place, strict=True)), **first}
-
-
-def parts_of_laws(dataset: xr.Dataset, dims: Iterable[Hashable]) -> Iterator[tuple[tuple[int, ...], xr.Dataset]]:
-    """Select each of `places_of_laws`."""
-    for place, selection in places_of_laws(dataset, dims):
-        yield place, dataset.isel(selection)
-
-
-def squeezed_laws(dataset: xr.Dataset, dims: Iterable[Hashable]) -> Iterator[xr.Dataset]:
-    """Select each of `places_of_laws`, without the axes of the parameters of other laws."""
-    for _, selection in places_of_laws(dataset, dims):
-        yield dataset.isel({dim: 0 if isinstance(part, slice) else part for dim, part in selection.items()})
+        others = {dim: first for dim, along in columns.items() if is_foreign(along, *names)}
+        yield place, dataset.isel({**dict(zip(law_dims, place, strict=True)), **others})
 
 
 def count_points(dataset: xr.Dataset) -> int:

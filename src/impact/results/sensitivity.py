@@ -18,7 +18,7 @@ from ..engine.plan import Plan
 from ..formatting import NO_BREAK, decimals, number, safe_text, scaled_unit
 from .attributes import read_attribute
 from .replay_command import describe_point
-from .schema import SENSITIVITY, plan_coordinates, provenance_attributes, squeezed_laws, template
+from .schema import SENSITIVITY, parts_of_laws, plan_coordinates, provenance_attributes, template
 
 # probabilities of the quantiles
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
@@ -77,7 +77,7 @@ def describe_design(dataset: xr.Dataset) -> str:
 def iterate_studies(dataset: xr.Dataset) -> Iterator[tuple[dict[str, float | str], xr.Dataset]]:
     """Yield the model and the point of each study, and the study; once along parameters of other laws."""
     dims = list(map(str, dataset["mean"].dims))
-    for law in squeezed_laws(dataset, dims):
+    for _, law in parts_of_laws(dataset, dims, first=0):
         axes = [dim for dim in dims if dim in law.dims]
         for index in np.ndindex(*(law.sizes[dim] for dim in axes)):
             study = law.isel(dict(zip(axes, index, strict=True)))

@@ -18,7 +18,7 @@ from ..display import Block, Displayed, Table, Wrapped
 from ..formatting import label, number
 from .attributes import SummaryRecord
 from .replay_command import command_start, inputs_at, replay_command
-from .schema import parts_of_laws, places_of_laws
+from .schema import parts_of_laws
 from .slabs import MAX_SUMMARY_POINTS, distinct_points, is_computed, slabs
 from .trajectory_table import ExpandedSlab, TrajectoryTable, computed_array, expand, table_of_result
 
@@ -225,11 +225,9 @@ def extremes_of(dataset: xr.Dataset, name: str) -> Extremes | None:
 def _distinct_parts(dataset: xr.Dataset, name: str) -> list[tuple[xr.Variable, int]] | None:
     """List the distinct points of a variable of each model, and their weights; None if they are too many."""
     whole = dataset.variables[name]
-    if not is_computed(whole):
-        places = (place for _, place in places_of_laws(dataset, whole.dims))
-        return [(whole.isel({dim: place[dim] for dim in whole.dims if dim in place}), 1) for place in places]
-    parts = [distinct_points(part, name) for _, part in parts_of_laws(dataset, whole.dims)]
-    evaluations = sum(variable.size for variable, _ in parts)
+    # a variable that is only read may have any size
+    parts = [distinct_points(part, name) for _, part in parts_of_laws(dataset[[name]], whole.dims)]
+    evaluations = sum(variable.size for variable, _ in parts) if is_computed(whole) else 0
     return None if evaluations > MAX_SUMMARY_POINTS else parts
 
 
