@@ -119,7 +119,7 @@ class Board(Displayed):
         engine = self.dataset.isel(engine=position)
         columns = [engine[name].values.tolist() for name in ("collision", "criterion", *NUMBERS, "check_status")]
         checks = [
-            dict(zip(("id", "check", *NUMBERS), values, strict=True)) | {"status": STATUS_WORDS[status]}
+            dict(zip(("id", "check", *NUMBERS), values, strict=True)) | {"status": [*COUNTED][status]}
             for *values, status in zip(*columns, strict=True)
         ]
         return {
@@ -153,14 +153,12 @@ class Board(Displayed):
             yield engine_headline(engine)
             yield ""
             yield Table(check_rows(engine), BOARD_HEADINGS, text=(0, 4))
-            lines = failure_lines(engine)
-            if lines:
+            if lines := failure_lines(engine):
                 yield ""
                 yield from lines
 
 
 NUMBERS = ("asked", "delivered", "tolerance")
-STATUS_WORDS = list(schema.CHECK_STATUSES)
 # the words of a summary, by status
 COUNTED = {"pass": "passed", "fail": "failed", "not_supported": "not_supported"}
 
@@ -189,24 +187,23 @@ def excess_of(name: str, asked: float, delivered: float) -> float:
     return abs(difference)
 
 
-def _worst(checks: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
-    """Choose the check that misses by most, one that is not a number before all."""
-    judged = [check for check in checks if check["status"] != "not_supported"]
-    excess = [excess_of(check["check"], check["asked"], check["delivered"]) for check in judged]
-    return judged[int(np.argmax(excess))] if judged else None
+def _checks_by_name(engine: Mapping[str, Any]) -> Iterator[tuple[str, list[Mapping[str, Any]]]]:
+    """Yield the checks of each name that an engine has, in the order of a board."""
+    for name in CHECKS:
+        if checks := [check for check in engine["checks"] if check["check"] == name]:
+            yield name, checks
 
 
 def check_rows(engine: Mapping[str, Any]) -> list[tuple[str, ...]]:
     """Write a row for each check, with its worst collision, under BOARD_HEADINGS."""
     rows = []
-    for name in CHECKS:
-        checks = [check for check in engine["checks"] if check["check"] == name]
-        if not checks:
-            continue
+    for name, checks in _checks_by_name(engine):
         counts = (str(sum(check["status"] == status for check in checks)) for status in COUNTED)
-        worst = _worst(checks)
-        place = ("–",) * 4
-        if worst is not None:
+        judged, place = [check for check in checks if check["status"] != "not_supported"], ("–",) * 4
+        if judged:
+            # the one that misses by most; one that is not a number before all
+            excess = [excess_of(name, check["asked"], check["delivered"]) for check in judged]
+            worst = judged[int(np.argmax(excess))]
             place = (worst["id"], *(number(worst[key], 6 if key != "tolerance" else 2) for key in NUMBERS))
         rows.append((name, *counts, *place))
     return rows
@@ -215,24 +212,22 @@ def check_rows(engine: Mapping[str, Any]) -> list[tuple[str, ...]]:
 def board_rows(engines: Sequence[Mapping[str, Any]]) -> list[tuple[str, ...]]:
     """Write a row for each check, with the numbers of passed and of judged collisions of each engine."""
 
-    def cell(engine: Mapping[str, Any], name: str) -> str:
-        statuses = [check["status"] for check in engine["checks"] if check["check"] == name]
+    def cell(checks: Sequence[Mapping[str, Any]]) -> str:
+        statuses = [check["status"] for check in checks]
         judged = len(statuses) - statuses.count("not_supported")
         mark = " ✗" if "fail" in statuses else ""
         return f"{statuses.count('pass')}/{judged}{mark}" if judged else "–"
 
-    names = {check["check"] for check in engines[0]["checks"]}
     facts = [(key, *(engine[key] for engine in engines)) for key in ("version", "kind")]
-    return facts + [(name, *(cell(engine, name) for engine in engines)) for name in CHECKS if name in names]
+    by_engine = [dict(_checks_by_name(engine)) for engine in engines]
+    return facts + [(name, *(cell(checks.get(name, ())) for checks in by_engine)) for name in by_engine[0]]
 
 
 def failure_lines(engine: Mapping[str, Any]) -> list[str]:
     """Name the collisions at which each check failed."""
     lines = []
-    for name in CHECKS:
-        failed = [
-            check["id"] for check in engine["checks"] if check["check"] == name and check["status"] == "fail"
-        ]
+    for name, checks in _checks_by_name(engine):
+        failed = [check["id"] for check in checks if check["status"] == "fail"]
         more = f" and {len(failed) - MAX_NAMED} more" if len(failed) > MAX_NAMED else ""
         if failed:
             lines.append(f"{name} failed at {', '.join(failed[:MAX_NAMED])}{more}")
