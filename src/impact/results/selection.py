@@ -94,14 +94,22 @@ def select(dataset: xr.Dataset, sel: Mapping[str, object]) -> xr.Dataset:
         if not isinstance(plain, float | int | str):
             raise UsageError(f"{argument('sel', {name: plain})}: got no single value, expected one")
         number = in_si(dataset[name], plain)
-        same = _matches_value(values, number)
+        if values.dtype.kind in NUMBER_DTYPE_KINDS:
+            same = np.isclose(values, _as_number(number), rtol=SELECTION_RTOL, atol=0.0)
+        else:
+            same = values.astype(str) == str(number)
         if dim in masks and same.any():
             same &= masks[dim]
         if not same.any():
             shown = safe_text(_nearest_values(dataset[name], number))
             raise UsageError(f"no {name} = {plain} in this result; {shown}")
         masks[dim] = same
-    return dataset.isel({dim: _matching_positions(dataset[dim], same) for dim, same in masks.items()})
+    positions: dict[Hashable, int | IndexArray] = {dim: int(np.argmax(same)) for dim, same in masks.items()}
+    for dim, same in masks.items():
+        # several numbered points may match
+        if dataset[dim].dtype.kind in "iu" and np.count_nonzero(same) > 1:
+            positions[dim] = np.flatnonzero(same)
+    return dataset.isel(positions)
 
 
 def in_si(coordinate: xr.DataArray, value: float | str) -> float | str:
@@ -113,19 +121,6 @@ def in_si(coordinate: xr.DataArray, value: float | str) -> float | str:
         return value
     number = number_in(plain_unit(str(unit)), value)
     return value if number is None else number
-
-
-def _matching_positions(labels: xr.DataArray, same: Mask) -> int | IndexArray:
-    """Find the selected position; on an axis with numbered points all positions that match."""
-    is_numbered = labels.dtype.kind in "iu" and np.count_nonzero(same) > 1
-    return np.flatnonzero(same) if is_numbered else int(np.argmax(same))
-
-
-def _matches_value(values: np.ndarray, value: float | str) -> Mask:
-    """Mark the values that equal a value."""
-    if values.dtype.kind not in NUMBER_DTYPE_KINDS:
-        return np.asarray(values.astype(str) == str(value))
-    return np.asarray(np.isclose(values, _as_number(value), rtol=SELECTION_RTOL, atol=0.0))
 
 
 def _nearest_values(coordinate: xr.DataArray, value: float | str) -> str:
@@ -154,7 +149,8 @@ def _as_number(value: float | str) -> float:
 def match_labels(new: Sequence[Labels], baseline: Sequence[Labels]) -> tuple[IndexArray, IndexArray]:
     """Find the positions of equal labels of an axis in two results, in the order of the baseline."""
     pairs = list(zip(new, baseline, strict=True))
-    if all(np.array_equal(a, b) for a, b in pairs) and any(_is_increasing(a) for a, _ in pairs):
+    numeric = (a for a, _ in pairs if a.dtype.kind in NUMBER_DTYPE_KINDS)
+    if all(np.array_equal(a, b) for a, b in pairs) and any((a[1:] > a[:-1]).all() for a in numeric):
         # the usual case; sorting a long axis takes ten times its memory
         positions = np.arange(len(new[0]))
         return positions, positions
@@ -170,10 +166,6 @@ def match_labels(new: Sequence[Labels], baseline: Sequence[Labels]) -> tuple[Ind
     _, new_positions, baseline_positions = np.intersect1d(new_rows, baseline_rows, return_indices=True)
     order = np.argsort(baseline_positions, kind="stable")
     return new_positions[order], baseline_positions[order]
-
-
-def _is_increasing(values: Labels) -> bool:
-    return values.dtype.kind in NUMBER_DTYPE_KINDS and bool((values[1:] > values[:-1]).all())
 
 
 def _number_labels(new: Labels, baseline: Labels, rounding: float) -> IndexArray:
