@@ -6,8 +6,9 @@ import math
 import operator
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from enum import IntEnum
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -33,7 +34,6 @@ ERROR_HEADINGS = {
 MAX_FAILED_AT = 3
 # limit of small indentations, as a fraction of the smaller radius
 MAX_SMALL_INDENTATION = 0.1
-S = TypeVar("S", Status, FrictionStatus)
 
 
 @dataclass
@@ -106,10 +106,20 @@ class Summary:
         """
         if "status" in values:
             self.points += weight * values["status"].size
-            self._count(values["status"], Status, self.counts, self.failed_at, place, start, weight)
-        if "friction_status" in values:
-            tally = self.friction_counts, self.friction_failed_at
-            self._count(values["friction_status"], FrictionStatus, *tally, place, start, weight)
+        tallies: Sequence[tuple[str, type[IntEnum], dict[Any, int], list[Any]]] = (
+            ("status", Status, self.counts, self.failed_at),
+            ("friction_status", FrictionStatus, self.friction_counts, self.friction_failed_at),
+        )
+        for name, statuses, counts, failed_at in (tally for tally in tallies if tally[0] in values):
+            array, n_more = values[name], self.max_failed_at - len(failed_at)
+            times = np.bincount(array.reshape(-1))
+            for code in np.flatnonzero(times).tolist():
+                counts[statuses(code)] = counts.get(statuses(code), 0) + weight * int(times[code])
+            if n_more > 0 and times[FIRST_FAILURE:].any():
+                failed = (array >= FIRST_FAILURE) & (array != FrictionStatus.NOT_COMBINABLE)
+                for offsets in np.argwhere(failed)[:n_more].tolist():
+                    index = tuple(map(operator.add, start, offsets))
+                    failed_at.append((statuses(int(array[tuple(offsets)])), place, index))
         for name in (name for name in ERROR_HEADINGS if name in values):
             largest = float(np.fmax.reduce(np.abs(values[name]), axis=None, initial=np.nan))
             by_model = self.worst.setdefault(name, {})
@@ -121,28 +131,6 @@ class Summary:
             share = indentation / (radius if indentation.shape else radius.reshape(()))
             self.deep += weight * int(np.count_nonzero(share > MAX_SMALL_INDENTATION))
             self.deepest = float(np.fmax.reduce(share, axis=None, initial=self.deepest))
-
-    def _count(
-        self,
-        array: NDArray[np.int8],
-        statuses: type[S],
-        counts: dict[S, int],
-        failed_at: list[tuple[S, tuple[int, ...], tuple[int, ...]]],
-        place: tuple[int, ...],
-        start: Sequence[int],
-        weight: int,
-    ) -> None:
-        """Count points by their status, and list the first that failed."""
-        times = np.bincount(array.reshape(-1))
-        for code in np.flatnonzero(times).tolist():
-            status = statuses(code)
-            counts[status] = counts.get(status, 0) + weight * int(times[code])
-        n_more = self.max_failed_at - len(failed_at)
-        if n_more > 0 and times[FIRST_FAILURE:].any():
-            failed = (array >= FIRST_FAILURE) & (array != FrictionStatus.NOT_COMBINABLE)
-            for offsets in np.argwhere(failed)[:n_more].tolist():
-                index = tuple(map(operator.add, start, offsets))
-                failed_at.append((statuses(int(array[tuple(offsets)])), place, index))
 
 
 def add_slab(summary: Summary, table: TrajectoryTable, slab: ExpandedSlab) -> None:
