@@ -38,30 +38,27 @@ def representative_regions(variables: Sequence[Variable], aligned: Alignment) ->
     """Choose by variable the regions whose points represent all common points; see `compare` for the rule."""
     results = (aligned.new, aligned.baseline)
     known = [v.name for v in variables if any(slabs.is_computed(r.variables[v.name]) for r in results)]
-    models = range(aligned.baseline.sizes["model"] if known else 0)
+    sizes = aligned.baseline.sizes
+    models = range(sizes["model"] if known else 0)
     datasets_by_model = [[result.isel(model=slice(model, model + 1)) for result in results] for model in models]
     regions: dict[str, list[Region]] = {}
     for variable in variables:
         dims = aligned.dims[variable.name]
-        if variable.name not in known:
-            parts = [_region(dims, aligned.baseline.sizes, slice(None))]
-        elif "model" in dims:
+        whole = {dim: slice(0, sizes[dim]) for dim in dims}
+        parts: list[Region] = [whole]
+        if variable.name in known and "model" in dims:
             dims_by_model = [_representative_dims(variable, aligned, datasets) for datasets in datasets_by_model]
-            parts = [_region(d, aligned.baseline.sizes, slice(m, m + 1)) for m, d in enumerate(dims_by_model)]
-        else:
-            dims = _representative_dims(variable, aligned, results)
-            parts = [_region(dims, aligned.baseline.sizes, slice(None))]
+            parts = [
+                {d: whole[d] for d in dims} | {"model": slice(m, m + 1)} for m, dims in enumerate(dims_by_model)
+            ]
+        elif variable.name in known:
+            parts = [{dim: whole[dim] for dim in _representative_dims(variable, aligned, results)}]
         points = sum(math.prod(part.stop - part.start for part in region.values()) for region in parts)
         if points > MAX_COMPARED_POINTS:
             expected = f"expected at most {MAX_COMPARED_POINTS:,}; select a part of the results"
             raise UsageError(f"{variable.name}: got {points:,} points to compare, {expected}")
         regions[variable.name] = parts
     return regions
-
-
-def _region(dims: Iterable[str], sizes: Mapping[Hashable, int], models: slice) -> Region:
-    """Take some models and all points along the other dimensions."""
-    return {dim: slice(*(models if dim == "model" else slice(None)).indices(sizes[dim])[:2]) for dim in dims}
 
 
 def _representative_dims(
@@ -129,7 +126,12 @@ def compare_values(
             different += int(np.count_nonzero(ratio > 1.0)) * weight
             if not ratio.max():
                 continue
-            worst = max(worst, _worst_of_slab(variable, part, ratio, difference, a, b))
+            # the largest ratio, then the largest difference (except of flags), then the first point
+            sizes = np.ones_like(ratio) if variable.scale == "exact" else np.nan_to_num(difference, nan=np.inf)
+            index = np.unravel_index(int(np.argmax(np.where(ratio == ratio.max(), sizes, -1.0))), ratio.shape)
+            place = tuple(-part[dim].start - int(offset) for dim, offset in zip(dims, index, strict=True))
+            values = (float(array[index]) for array in (difference, a, b))
+            worst = max(worst, Worst(float(ratio[index]), float(sizes[index]), place, *values))
             for axis, dim in enumerate(dims):
                 maxima = ratio.max(axis=tuple(other for other in range(len(dims)) if other != axis))
                 if dim in slab:
@@ -229,27 +231,6 @@ def _may_be_missing(variable: Variable, aligned: Alignment, region: Region) -> N
     new, baseline = (read_values(result, variable.status, region) for result in results)
     is_explained = (new == baseline) & (baseline != Status.OK)
     return np.asarray(is_explained | (variable.may_be_nan & (np.maximum(new, baseline) < FIRST_FAILURE)))
-
-
-def _worst_of_slab(
-    variable: Variable,
-    slab: Region,
-    ratio: NDArray[Any],
-    difference: NDArray[Any],
-    a: NDArray[Any],
-    b: NDArray[Any],
-) -> Worst:
-    """Find the point with the largest ratio, then the largest difference (except of flags), then the first."""
-    sizes = np.ones_like(ratio) if variable.scale == "exact" else np.nan_to_num(difference, nan=np.inf)
-    index = np.unravel_index(int(np.argmax(np.where(ratio == ratio.max(), sizes, -1.0))), ratio.shape)
-    return Worst(
-        float(ratio[index]),
-        float(sizes[index]),
-        tuple(-part.start - int(offset) for part, offset in zip(slab.values(), index, strict=True)),
-        float(difference[index]),
-        float(a[index]),
-        float(b[index]),
-    )
 
 
 def _inputs_of_point(coords: xr.Dataset, dims: Sequence[str], place: Sequence[int]) -> dict[str, float | str]:
