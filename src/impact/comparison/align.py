@@ -6,7 +6,7 @@ by check.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -130,7 +130,11 @@ def _comparable_coordinates(result: xr.Dataset, other: xr.Dataset) -> xr.Dataset
     for axis in map(str, dict.fromkeys((*LAW_DIMS, *other.dims))):
         if axis not in coords.dims and axis in coords and coords[axis].ndim == 0:
             along = [name for name in other.coords if axis in other.variables[name].dims]
-            coords = _with_axis(coords, axis, MODEL_COORDINATES if axis == "model" else [axis, *along])
+            names = MODEL_COORDINATES if axis == "model" else (axis, *along)
+            variables = {name: coords.variables[name] for name in names if name in coords}
+            coords = coords.assign_coords(
+                {n: xr.Variable((axis, *v.dims), v.values[np.newaxis], v.attrs) for n, v in variables.items()}
+            )
     # an input that varies with a zip group in the other result only: repeat it along their common axis
     repeated = {
         name: (
@@ -153,14 +157,6 @@ def _with_materials(coords: xr.Dataset, materials: Mapping[str, Any], other: xr.
         if isinstance(value, float):
             coords = coords.assign_coords({name: xr.Variable((), value, other.variables[name].attrs)})
     return coords
-
-
-def _with_axis(coords: xr.Dataset, axis: str, names: Iterable[Hashable]) -> xr.Dataset:
-    """Give some coordinates an additional axis of length one."""
-    variables = {name: coords.variables[name] for name in names if name in coords}
-    return coords.assign_coords(
-        {n: xr.Variable((axis, *v.dims), v.values[np.newaxis], v.attrs) for n, v in variables.items()}
-    )
 
 
 def _axes_of_both(name: str, result: xr.Dataset, other: xr.Dataset) -> tuple[str, ...]:

@@ -230,7 +230,12 @@ def _sweep_notes(new: xr.Dataset, baseline: xr.Dataset, aligned: Alignment) -> I
     changed = (key for key in sorted(a.keys() & b.keys()) if a[key] != b[key])
     yield from (f"the code of {safe_text(key, 60)} changed" for key in changed)
     yield from _attribute_notes(a, b, dict.fromkeys(sorted(a.keys() ^ b.keys())))
-    yield from _model_metadata_notes(aligned.new, aligned.baseline)
+    for name in MODEL_METADATA:
+        if name in aligned.new.coords and name in aligned.baseline.coords:
+            of_models = aligned.baseline["model"], aligned.new[name], aligned.baseline[name]
+            for key, x, y in zip(*map(np.ravel, of_models), strict=True):
+                if x != y:
+                    yield safe_text(f"the {name} of {key} reads {x}, in BASELINE {y}", 600)
 
 
 def _attribute_notes(
@@ -246,13 +251,3 @@ def _attribute_notes(
 def _attributes_equal(a: Any, b: Any) -> bool:
     """Return whether two attributes, which may be arrays, are equal."""
     return bool(np.array_equal(a, b))
-
-
-def _model_metadata_notes(new: xr.Dataset, baseline: xr.Dataset) -> Iterator[str]:
-    """List the metadata of models that differ."""
-    for name in MODEL_METADATA:
-        if name in new.coords and name in baseline.coords:
-            columns = (np.ravel(column) for column in (baseline["model"], new[name], baseline[name]))
-            for key, a, b in zip(*columns, strict=True):
-                if a != b:
-                    yield safe_text(f"the {name} of {key} reads {a}, in BASELINE {b}", 600)

@@ -135,24 +135,18 @@ def _tables(result: xr.Dataset, name: str, description: Mapping[str, Any]) -> li
     if description["not_evaluated"]:
         rows["not evaluated"] = f"the status of {description['not_evaluated']:,} points"
     headings = ("variable", "unit", "dimensions", "smallest", "largest", "missing")
-    variables = [_variable_row(key, variable) for key, variable in description["variables"].items()]
+    variables = []
+    for key, variable in description["variables"].items():
+        numbers: tuple[object, ...] = ("–",) * 3
+        if variable["missing"] is not None:
+            numbers = (variable["smallest"], variable["largest"], f"{variable['missing']:,}")
+        variables.append((key, variable["units"] or "", ", ".join(variable["dims"]), *numbers))
     tables: list[Block] = [Table(list(rows.items())), "", Table(variables, headings)]
     if description["worst"]:
         tables += ["", error_table(description["worst"])]
     if kind_of(result) in STUDIES:
         tables += ["", *describe(result).sections(PIPE_WIDTH)]
     return tables
-
-
-def _variable_row(name: str, variable: Mapping[str, Any]) -> tuple[object, ...]:
-    evaluated = variable["missing"] is not None
-    return (
-        name,
-        variable["units"] or "",
-        ", ".join(variable["dims"]),
-        *(variable[end] if evaluated else "–" for end in ("smallest", "largest")),
-        f"{variable['missing']:,}" if evaluated else "–",
-    )
 
 
 def _values_text(dataset: xr.Dataset, name: str) -> str:
