@@ -50,15 +50,6 @@ class Alignment:
     scales: Mapping[str, Array] = field(default_factory=dict)
 
 
-def read_values(result: xr.Dataset, name: str, region: Mapping[str, slice]) -> Labels:
-    """Read values at some points of an aligned result, of length one along axes that the variable lacks."""
-    variable = result.variables[name]
-    # loaded before it is transposed: a transposed lazy array would be read point by point
-    part = variable.isel({dim: region[str(dim)] for dim in variable.dims}).load()
-    values = part.transpose(*(dim for dim in region if dim in part.dims)).values
-    return np.expand_dims(values, [axis for axis, dim in enumerate(region) if dim not in part.dims])
-
-
 def align_sweeps(new: xr.Dataset, baseline: xr.Dataset, *, subset: bool) -> Alignment:
     """Align two results of sweeps by their coordinates; values of variables are not read."""
     new, baseline = _drop_foreign_axes(new, baseline), _drop_foreign_axes(baseline, new)

@@ -20,7 +20,7 @@ from ..errors import UsageError
 from ..results import slabs
 from ..results.replay_command import inputs_of_model
 from ..results.schema import columns_along, inputs_of_scale, is_case, scale_of
-from .align import Alignment, read_values
+from .align import Alignment
 from .verdict import VariableComparison
 
 # slices of the common points, by axis; along axes that are not in it, the first point represents all
@@ -119,7 +119,7 @@ def compare_values(
         weight = math.prod(aligned.baseline.sizes[dim] for dim in dims if dim not in region)
         for slab in _slabs(variable.name, aligned, region):
             part = {dim: slab.get(dim, slice(0, 1)) for dim in dims}
-            a, b = (read_values(result, variable.name, part) for result in (aligned.new, aligned.baseline))
+            a, b = (slabs.read_slab(result, variable.name, part) for result in (aligned.new, aligned.baseline))
             if np.array_equal(a, b):
                 continue
             ratio, difference = _ratio(variable, aligned, part, a, b, tol)
@@ -219,7 +219,7 @@ def _scale(variable: Variable, aligned: Alignment, region: Region, shape: tuple[
     if aligned.scales:
         return aligned.scales[variable.name][tuple(region.values())]
     has_peak = "peak_indentation" in aligned.baseline
-    scale = scale_of(variable, lambda name: read_values(aligned.baseline, name, region), has_peak=has_peak)
+    scale = scale_of(variable, lambda name: slabs.read_slab(aligned.baseline, name, region), has_peak=has_peak)
     return np.broadcast_to(scale, shape)
 
 
@@ -228,7 +228,7 @@ def _may_be_missing(variable: Variable, aligned: Alignment, region: Region) -> N
     results = (aligned.new, aligned.baseline)
     if not variable.per_model or not all(variable.status in result for result in results):
         return True
-    new, baseline = (read_values(result, variable.status, region) for result in results)
+    new, baseline = (slabs.read_slab(result, variable.status, region) for result in results)
     is_explained = (new == baseline) & (baseline != Status.OK)
     return np.asarray(is_explained | (variable.may_be_nan & (np.maximum(new, baseline) < FIRST_FAILURE)))
 

@@ -27,7 +27,7 @@ from ..formatting import argument, law_name, percentage, prefixed, safe_text
 from .replay_command import describe_point
 from .schema import columns_along, parts_of_laws, plain_unit, require_sweep
 from .selection import as_keys, require_outputs, select, select_laws
-from .slabs import Slab, distinct_points, is_computed, over_varying_dims, slabs, varying_dims
+from .slabs import Slab, distinct_points, is_computed, over_varying_dims, read_slab, slabs, varying_dims
 from .xarray_backend import result_of
 
 # lazy results with more points are not ranked; this many take some minutes
@@ -456,10 +456,10 @@ def _judged_slabs(
 ) -> Iterator[tuple[Slab, _JudgedSlab]]:
     """Judge all points, slab by slab, with the dimensions in the order of `sizes`."""
     for slab in slabs(sizes):
-        values, status = (_read_slab(evaluated.variables[name], slab, sizes) for name in criterion.names)
+        values, status = (read_slab(evaluated, name, slab) for name in criterion.names)
         values = np.asarray(values, float)
         if criterion.target is None:
-            target = _read_slab(evaluated.variables["e"], slab, sizes)
+            target = read_slab(evaluated, "e", slab)
             output, distance, has_target = target + values, np.abs(values), ~np.isnan(target)
         else:
             # an answer without this output, such as beta without a slip, has no target
@@ -575,13 +575,6 @@ def _rank_law(law_data: xr.Dataset, tol: float, criterion: Criterion) -> Ranked:
         along,
         {path: unit for path, unit in units.items() if not names_in(unit)},
     )
-
-
-def _read_slab(variable: xr.Variable, slab: Slab, sizes: Mapping[Hashable, int]) -> NDArray[Any]:
-    """Read the values of a slab, with all dimensions in the order of `sizes`."""
-    part = variable.isel({dim: slab[dim] for dim in variable.dims})
-    shape = {dim: slab[dim].stop - slab[dim].start for dim in sizes}
-    return np.asarray(xr.Variable(part.dims, part.values).set_dims(shape).values)  # type: ignore[no-untyped-call]
 
 
 def _exact_sum(values: Sequence[float]) -> Fraction:

@@ -10,9 +10,11 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Hashable, Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 # points of a slab: enough to amortize Python's overhead, few enough to fit in cache
 SLAB_POINTS = 2**17
@@ -93,3 +95,12 @@ def over_varying_dims(dataset: xr.Dataset, names: Sequence[str], *more: Hashable
     fixed = [dim for dim in dims if dim not in varying]
     weight = math.prod(dataset.sizes[dim] for dim in fixed)
     return dataset[list(names)].isel(dict.fromkeys(fixed, 0)), weight
+
+
+def read_slab(dataset: xr.Dataset, name: str, slab: Mapping[Any, slice]) -> NDArray[Any]:
+    """Read the values of a variable in a slab, along its dimensions; of length one along those that it lacks."""
+    variable = dataset.variables[name]
+    # loaded before it is transposed: a transposed lazy array would be read point by point
+    part = variable.isel({dim: slab[dim] for dim in variable.dims}).load()
+    values = part.transpose(*(dim for dim in slab if dim in part.dims)).values
+    return np.expand_dims(values, [axis for axis, dim in enumerate(slab) if dim not in part.dims])
