@@ -87,19 +87,17 @@ def open_work_folder(folder: Path, plan: Plan, run: Run) -> Iterator[WorkFolder]
     """Create or reopen the work folder of a plan, and lock it."""
     _check_is_work_folder(folder)
     record = _sweep_record(plan)
-    with _locked(folder):
+    with _locked(folder, record) as work_folder:
         _prepare_folder(folder, record, run)
-        yield WorkFolder(folder, _record_digest(record))
+        yield work_folder
 
 
-@contextlib.contextmanager
-def lock_work_folder(folder: Path, plan: Plan) -> Iterator[WorkFolder]:
+def lock_work_folder(folder: Path, plan: Plan) -> contextlib.AbstractContextManager[WorkFolder]:
     """Lock an existing work folder of a plan without changing it; a `UsageError` if it is of another sweep."""
     record = _sweep_record(plan)
     if difference := _difference_from(folder, record):
         raise UsageError(f"{folder}: {difference}; expected the folders of one sweep")
-    with _locked(folder):
-        yield WorkFolder(folder, _record_digest(record))
+    return _locked(folder, record)
 
 
 def remove_stale_work_folder(output: Path, plan: Plan) -> None:
@@ -135,8 +133,8 @@ def remove_work_folder(folder: Path) -> None:
 
 
 @contextlib.contextmanager
-def _locked(folder: Path) -> Iterator[None]:
-    """Create a folder if it is missing, and lock it."""
+def _locked(folder: Path, record: Mapping[str, Any]) -> Iterator[WorkFolder]:
+    """Create the folder of a sweep if it is missing, and lock it."""
     lock = FileLock(folder / LOCK_FILE, timeout=0)
     try:
         try:
@@ -147,7 +145,7 @@ def _locked(folder: Path) -> Iterator[None]:
             raise InUseError(f"{folder.with_suffix('')}: is being written by another process") from None
         except OSError as error:
             raise StoreError(f"{folder}: {error.strerror}") from error
-        yield
+        yield WorkFolder(folder, hashlib.sha256(json.dumps(record).encode()).hexdigest())
     finally:
         lock.release()
 
@@ -186,10 +184,6 @@ def _sweep_record(plan: Plan) -> dict[str, Any]:
         "physics": plan.physics,
         **({"extends": plan.extends} if plan.extends else {}),
     }
-
-
-def _record_digest(record: Mapping[str, Any]) -> str:
-    return hashlib.sha256(json.dumps(record).encode()).hexdigest()
 
 
 def _remove_files(folder: Path, plan: bool = False) -> None:
