@@ -93,7 +93,11 @@ def read_layout(variables: Mapping[str, xr.Variable], attributes: Mapping[str, o
     arrays = {name: stored_array(variable) for name, variable in stored.items() if name not in witnesses}
     sizes = {name: array.shape[0] for name, array in arrays.items()}
     table = stored_table(dataset, sizes, lambda name, positions: arrays[name].read((positions,)))
-    quantities = witness_variables(dataset)
+    quantities = [
+        replace(variable, dtype=stored[f"witness_{name}"].dtype.str[1:])
+        for name, variable in OUTPUTS.items()
+        if f"witness_{name}" in stored
+    ]
     check_witnesses(table, quantities, dataset)
     template = dataset.drop_vars(witnesses).drop_attrs(deep=False)
     described = {name: value for name, value in attributes.items() if name not in FACTORED_ATTRIBUTES}
@@ -429,12 +433,3 @@ def check_witnesses(table: TrajectoryTable, variables: Sequence[Variable], store
                     f"{number(expected[worst], 12)}; it was written by impact {version}, this is {__version__}: "
                     "sweep its config again, or expand it with that version (impact expand)"
                 )
-
-
-def witness_variables(stored: xr.Dataset) -> tuple[Variable, ...]:
-    """List the variables of a file's witnesses, with their dtypes in the file."""
-    return tuple(
-        replace(variable, dtype=stored[f"witness_{name}"].dtype.str[1:])
-        for name, variable in OUTPUTS.items()
-        if f"witness_{name}" in stored
-    )

@@ -63,8 +63,6 @@ from .seal import is_result
 from .selection import chosen_laws
 from .xarray_backend import open_result
 
-STARTER_E = "sweep.e=0.5"
-
 ConfigSource = str | Path | Mapping[str, object] | xr.Dataset | None
 # name, unit and meaning of the quantities that are derived from the inputs of one impact, and from its motion
 INPUT_QUANTITIES = (
@@ -607,7 +605,7 @@ def open_source(source: ConfigSource, overrides: Overrides, plugins: Plugins) ->
     if isinstance(source, xr.Dataset):
         return _open_stored(source, overrides, plugins, "the result")
     if source is None:
-        starter = open_config(None, plugins.models).with_settings([Setting.parse(STARTER_E)])
+        starter = open_config(None, plugins.models).with_settings([Setting.parse("sweep.e=0.5")])
         # that setting is no input of the user
         draft = replace(starter, origins={}).with_settings(settings_of(overrides))
         return PointSource(draft, plugins, is_starter=True)

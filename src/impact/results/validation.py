@@ -104,7 +104,7 @@ STATUS_SLAB_POINTS = 2**22
 def schema_violation(dataset: xr.Dataset) -> str | None:
     """The first reason why a dataset is neither a result nor a time history, or None."""
     kind = kind_of(dataset)
-    checks = [_name_violations, _axis_violations, _type_violations, _attribute_violations, _status_violations]
+    checks = [_name_violations, _type_violations, _attribute_violations, _status_violations]
     if kind != "board":
         checks.append(_history_violations if kind == "history" else _result_violations)
     checks.append(_study_violations)
@@ -112,14 +112,10 @@ def schema_violation(dataset: xr.Dataset) -> str | None:
 
 
 def _name_violations(dataset: xr.Dataset) -> Iterator[str]:
-    """Names that no result has."""
+    """Names that no result has, and axes without values, or with a label that occurs twice."""
     unknown = sorted({str(name) for name in (*dataset.variables, *dataset.dims) if not is_name(str(name))})
     if unknown:
         yield f"{', '.join(unknown)}: not a variable of a result"
-
-
-def _axis_violations(dataset: xr.Dataset) -> Iterator[str]:
-    """Axes without values, or with a label that occurs twice."""
     for name, size in dataset.sizes.items():
         if name not in dataset.coords or not size:
             yield f"its axis {name} has no values"
