@@ -14,8 +14,8 @@ import impact
 from impact.config.load import read_config
 from impact.contact.impacts import Impacts
 from impact.engine import trajectories as trajectories_module
-from impact.engine.build_impacts import build_impacts
 from impact.engine.execute import integrate_columns
+from impact.engine.inputs import build_impacts
 from impact.engine.plan import Plan
 from impact.engine.run import Run
 from impact.results.estimate import estimate

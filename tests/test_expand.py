@@ -14,7 +14,7 @@ import impact
 from impact.contact.output_formulas import check_inputs
 from impact.contact.status import Status
 from impact.contact.variables import CENTRAL_OUTPUTS
-from impact.engine.build_impacts import build_impacts
+from impact.engine.inputs import build_impacts
 from impact.engine.run import Run as SweepRun
 from impact.errors import UsageError
 from impact.results import sweep as sweep_module

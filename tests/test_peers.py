@@ -32,7 +32,7 @@ import pytest
 import impact
 from impact.contact.dimensionless import dimensionless_values
 from impact.contact.fixed_step import collide_at_fixed_step
-from impact.engine.build_impacts import build_impacts
+from impact.engine.inputs import build_impacts
 from impact.results.sweep import read_plan
 
 from .fork_server import run_script_in_fork

@@ -23,8 +23,7 @@ from ..contact.numba.dispatch import is_installed, serves
 from ..contact.status import FrictionStatus
 from ..errors import ConfigError, UsageError
 from ..formatting import argument
-from .build_impacts import build_impacts, build_oblique
-from .inputs import Inputs
+from .inputs import Inputs, build_impacts, build_oblique
 from .plugins import Plugins
 from .trajectories import (
     MAX_CELLS,

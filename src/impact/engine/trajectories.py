@@ -23,8 +23,7 @@ from ..contact.model import ForceModel
 from ..contact.records import CollisionResult, Record
 from ..contact.status import STATUS_OK
 from ..contact.tangential import TangentialResult
-from .build_impacts import build_impacts, build_oblique, fixed_steps_at
-from .inputs import Index, Inputs, dimensions, index_of
+from .inputs import Index, Inputs, build_impacts, build_oblique, dimensions, fixed_steps_at, index_of
 
 # cells up to which equal values are found in the whole plan; with more, only within a range of trajectories
 MAX_CELLS = 2**22

@@ -13,7 +13,7 @@ from ..contact.frictions import find_friction
 from ..contact.impacts import INPUTS, Impacts
 from ..contact.model import ForceModel
 from ..contact.models import find, original_key
-from ..engine.build_impacts import build_impacts
+from ..engine.inputs import build_impacts
 from ..engine.plan import Plan
 from ..engine.plugins import Plugins
 from ..errors import UsageError, did_you_mean

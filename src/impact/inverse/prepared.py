@@ -28,8 +28,7 @@ from ..contact.model import ForceModel
 from ..contact.output_formulas import Outputs, collide
 from ..contact.simulate import ComputeCollisions
 from ..contact.variables import CENTRAL_OUTPUTS, OUTPUTS
-from ..engine.build_impacts import build_impacts, build_oblique, fixed_steps_at
-from ..engine.inputs import Inputs
+from ..engine.inputs import Inputs, build_impacts, build_oblique, fixed_steps_at
 from ..engine.plan import Plan
 from ..engine.plugins import read_plugins
 from ..engine.trajectories import PlanLaw, model_of

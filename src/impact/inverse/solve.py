@@ -39,7 +39,7 @@ from ..contact.status import FrictionStatus, Status
 from ..contact.units import names_in, with_numbers
 from ..contact.variables import OUTPUTS
 from ..display import Block, Displayed
-from ..engine.build_impacts import build_impacts
+from ..engine.inputs import build_impacts
 from ..engine.plan import Plan
 from ..engine.plugins import read_plugins
 from ..errors import UsageError, did_you_mean, require_known, warn

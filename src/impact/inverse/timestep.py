@@ -51,7 +51,7 @@ from ..contact.status import FIRST_FAILURE, FrictionStatus, Status
 from ..contact.units import with_numbers
 from ..contact.variables import CENTRAL_OUTPUTS
 from ..display import Block, Displayed, Table
-from ..engine.build_impacts import build_impacts, build_oblique, rayleigh_time_at
+from ..engine.inputs import build_impacts, build_oblique, rayleigh_time_at
 from ..engine.plan import Plan
 from ..engine.plugins import read_plugins
 from ..errors import ModelError, UsageError

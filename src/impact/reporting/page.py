@@ -24,8 +24,7 @@ from ..config.grid import SAMPLE, Axis
 from ..config.input_names import InputName
 from ..contact.status import FIRST_FAILURE
 from ..contact.variables import OUTPUTS
-from ..engine.build_impacts import build_impacts, input_at
-from ..engine.inputs import Inputs
+from ..engine.inputs import Inputs, build_impacts, input_at
 from ..errors import UsageError
 from ..formatting import argument, with_year
 from ..plots.explore import axes_of, axis_label, shown_values

@@ -30,8 +30,7 @@ from ..contact.slip_motion import FrictionKind
 from ..contact.status import FRICTION_STATUSES, STATUSES, Status
 from ..contact.tangential import TangentialResult
 from ..contact.variables import OUTPUTS, Variable
-from ..engine.build_impacts import has_stiffness_rule, input_at
-from ..engine.inputs import Column, Inputs, index_of
+from ..engine.inputs import Column, Inputs, has_stiffness_rule, index_of, input_at
 from ..engine.plan import Plan
 from ..engine.trajectories import TrajectoryMap
 from ..errors import ResultError, UsageError

@@ -9,8 +9,7 @@ import numpy as np
 import xarray as xr
 
 from ..contact.materials import sphere_mass
-from ..engine.build_impacts import input_at, property_at, smaller_radius_at
-from ..engine.inputs import Inputs
+from ..engine.inputs import Inputs, input_at, property_at, smaller_radius_at
 from ..engine.trajectories import axes_of_arrays, probe_index
 from ..errors import ModelError, ResultError
 from ..formatting import number, prefixed, quantity, safe_text

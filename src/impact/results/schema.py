@@ -24,7 +24,7 @@ from ..config.tables import MATERIAL_KEYS
 from ..contact.fixed_step import EXACT
 from ..contact.materials import effective_mass
 from ..contact.variables import AXES, HISTORY, LAW_DIMS, OUTPUTS, Variable, by_name, default_variables
-from ..engine.build_impacts import input_at
+from ..engine.inputs import input_at
 from ..engine.plan import Plan
 from ..errors import UsageError
 from ..formatting import number

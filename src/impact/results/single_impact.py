@@ -40,7 +40,7 @@ from ..contact.tangential import RecordedSlip
 from ..contact.units import with_numbers
 from ..contact.variables import CENTRAL_OUTPUTS, HISTORY, LAW_DIMS, OUTPUTS, SLIP_HISTORY, Variable
 from ..display import Block, Displayed, Styled, Table
-from ..engine.build_impacts import build_impacts, build_oblique, fixed_steps_at, input_at
+from ..engine.inputs import build_impacts, build_oblique, fixed_steps_at, input_at
 from ..engine.plan import Plan
 from ..engine.plugins import Plugins, read_plugins
 from ..errors import ConfigError, UsageError, did_you_mean, warn

@@ -33,8 +33,7 @@ from ..contact.slip_motion import FrictionKind
 from ..contact.status import FrictionStatus, Status
 from ..contact.tangential import TangentialResult
 from ..contact.variables import AXES, Variable
-from ..engine.build_impacts import build_impacts, build_oblique, has_stiffness_rule
-from ..engine.inputs import Index, Inputs, dimensions
+from ..engine.inputs import Index, Inputs, build_impacts, build_oblique, dimensions, has_stiffness_rule
 from ..engine.plan import Plan
 from ..engine.trajectories import (
     RANGE_TRAJECTORIES,
