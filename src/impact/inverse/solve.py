@@ -44,7 +44,6 @@ from ..engine.plan import Plan
 from ..engine.plugins import read_plugins
 from ..errors import UsageError, did_you_mean, require_known, warn
 from ..formatting import argument, law_name, number, prefixed, quantity, safe_text
-from ..results.plausibility import depth_notes
 from ..results.ranking import only_target, target_value
 from ..results.single_impact import (
     PointSource,
@@ -54,6 +53,7 @@ from ..results.single_impact import (
     single_point,
     warn_of_ignored_e,
 )
+from ..results.summary import depth_notes
 from .prepared import outputs_at, trial_inputs
 
 # values that are tried before roots are refined: powers of ten times the contact's own unit of the parameter

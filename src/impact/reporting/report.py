@@ -36,7 +36,6 @@ from ..plots.slices import varying_inputs
 from ..results.attributes import read_attribute
 from ..results.board import BOARD_HEADINGS, Board, board_rows, check_rows, engine_headline, failure_lines
 from ..results.calibration import FIT_HEADINGS, calibration_title, describe_data, fit_notes, fit_rows
-from ..results.plausibility import input_notes, inputs_of, with_depths
 from ..results.provenance import stored_config
 from ..results.ranking import DEFAULT_TOL, Ranking, rank_laws
 from ..results.replay_command import describe_point
@@ -44,7 +43,7 @@ from ..results.schema import FIT_STATUSES, count_points, exponents_of, kind_of
 from ..results.selection import select_laws
 from ..results.sensitivity import INDEX_HEADINGS, describe_design, describe_study, index_rows, iterate_studies
 from ..results.slabs import MAX_SUMMARY_POINTS, is_large
-from ..results.summary import Summary, extremes_of, result_notes, summarize
+from ..results.summary import Summary, extremes_of, input_notes, inputs_of, result_notes, summarize, with_depths
 from ..results.xarray_backend import result_of
 from .figures import Drawing, Figure, at_text, coordinate_text, numbered_unit
 

@@ -46,7 +46,6 @@ from ..engine.plugins import Plugins, read_plugins
 from ..errors import ConfigError, UsageError, did_you_mean, warn
 from ..formatting import argument, law_keys, law_name, number, prefixed, safe_text
 from .calibration import fitted_config, position_of_law
-from .plausibility import depth_notes, input_notes
 from .provenance import changed_plugins, stored_config, stored_draft, unknown_plugins
 from .schema import (
     DEFAULT_RTOL_FACTOR,
@@ -61,6 +60,7 @@ from .schema import (
 )
 from .seal import is_result
 from .selection import chosen_laws
+from .summary import depth_notes, input_notes
 from .xarray_backend import open_result
 
 ConfigSource = str | Path | Mapping[str, object] | xr.Dataset | None

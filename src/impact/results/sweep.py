@@ -33,9 +33,17 @@ from ..errors import ResultError, StoreError, UnfinishedError, UsageError, warn
 from ..formatting import argument
 from .layouts import file_template, stiffness_to_store, table_values
 from .netcdf import MAX_LABEL_BYTES, RegionValues, encode_text, is_text
-from .plausibility import input_notes, with_depths
 from .schema import dataset_template, plan_coordinates, stored_variables
-from .summary import Summary, SweepOutcome, add_slab, result_notes, summarize, summarize_table
+from .summary import (
+    Summary,
+    SweepOutcome,
+    add_slab,
+    input_notes,
+    result_notes,
+    summarize,
+    summarize_table,
+    with_depths,
+)
 from .trajectory_table import (
     TrajectoryTable,
     expanded_slabs,
