@@ -224,12 +224,10 @@ def _changed_values(name: str, new: xr.DataArray, baseline: xr.DataArray) -> Dif
         return Difference("labels", name, f"the coordinate {safe_text(name)} has other values")
     pairs = zip(new.values, baseline.values, strict=True)
     differ = [index for index, (a, b) in enumerate(pairs) if not _labels_agree(np.asarray(a), np.asarray(b))]
-    numbers, a, b = (
-        [_format_value(array.values[index]) for index in differ[:MAX_NAMED_LABELS]]
-        for array in (baseline[axis], new, baseline)
-    )
     shown = "; ".join(
-        f"{x} at {axis} {number}, in BASELINE {y}" for number, x, y in zip(numbers, a, b, strict=True)
+        f"{_format_value(new.values[index])} at {axis} {_format_value(baseline[axis].values[index])}, "
+        f"in BASELINE {_format_value(baseline.values[index])}"
+        for index in differ[:MAX_NAMED_LABELS]
     )
     more = f"; and {len(differ) - MAX_NAMED_LABELS} more" if len(differ) > MAX_NAMED_LABELS else ""
     return Difference("physics config", name, f"{safe_text(name)} is {shown}{more}")

@@ -136,15 +136,12 @@ def _connect(
     """Connect to a scheduler with workers of this version; returns its info and the number of workers as well."""
     from distributed import Client
 
-    timeout = min(CONNECT_TIMEOUT_S, limit)
+    target: dict[str, Any] = {"address": scheduler}
+    if isinstance(scheduler, Path):
+        _wait_for_file(scheduler, scheduler_name)
+        target = {"scheduler_file": str(scheduler)}
     try:
-        if isinstance(scheduler, Path):
-            _wait_for_file(scheduler, scheduler_name)
-            client = Client(scheduler_file=str(scheduler), set_as_default=False, timeout=timeout)
-        else:
-            client = Client(scheduler, set_as_default=False, timeout=timeout)
-    except UsageError:
-        raise
+        client = Client(**target, set_as_default=False, timeout=min(CONNECT_TIMEOUT_S, limit))
     except (OSError, ValueError, TypeError, ImportError) as error:
         raise UsageError(f"{scheduler_name}: {error}; expected {ADDRESS_EXPECTED}") from None
     try:

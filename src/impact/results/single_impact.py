@@ -678,8 +678,16 @@ def single_point(
     labels = {name: value for name, value in source.labels.items() if name in varying | joint or is_case(name)}
     # the exponent n decides whose stiffness K is
     for name, value in sorted({**labels, **fixed}.items(), key=lambda item: item[0] == "K"):
-        if name not in joint and not is_case(name):
-            draft = draft.with_settings([_setting_at(draft, name, value, law, source.at_name)])
+        if name in joint or is_case(name):
+            continue
+        parsed = InputName.parse(name)
+        if not _has_input(draft, parsed):
+            raise _unknown_input(draft, name)
+        path, value = parsed.path, parsed.word(value)
+        if name == "K" and law is not None and has_other_stiffness(draft, law):
+            # K of a model with another exponent than [sweep] is that of its own table
+            path = ("model", law.key, "K")
+        draft = draft.with_settings([Setting(path, value, argument(source.at_name, value, key=name))])
     if is_uncertain and not paths_with(draft.data, DISTRIBUTION_FORMS):
         draft = replace(draft, data={key: value for key, value in draft.data.items() if key != "design"})
     config = build(draft)
@@ -706,17 +714,6 @@ def _joint_inputs(draft: Draft) -> set[str]:
     """Name the inputs that vary together: in zip groups and in a table of cases."""
     zipped = [name for group in draft.zip_groups for name in group]
     return {str(InputName.parse(name)) for name in (*zipped, *as_table(draft.table("sweep").get("cases")))}
-
-
-def _setting_at(draft: Draft, name: str, value: float | str, law: ForceModel | None, at_name: str) -> Setting:
-    """Fix an input at a value; K of a model with another exponent than [sweep] is that of its own table."""
-    if not _has_input(draft, InputName.parse(name)):
-        raise _unknown_input(draft, name)
-    parsed = InputName.parse(name)
-    path, value = parsed.path, parsed.word(value)
-    if name == "K" and law is not None and has_other_stiffness(draft, law):
-        path = ("model", law.key, "K")
-    return Setting(path, value, argument(at_name, value, key=name))
 
 
 def _has_input(draft: Draft, name: InputName) -> bool:

@@ -209,8 +209,8 @@ def extremes_of(dataset: xr.Dataset, name: str) -> Extremes | None:
     if record is not None and name in record.extremes:
         stored = record.extremes[name]
         return stored and Extremes(*stored)
-    parts = _distinct_parts(dataset, name)
-    if parts is None:
+    parts, is_evaluated = _distinct_parts(dataset, name)
+    if not is_evaluated:
         return None
     extremes = Extremes()
     for variable, weight in parts:
@@ -219,13 +219,12 @@ def extremes_of(dataset: xr.Dataset, name: str) -> Extremes | None:
     return extremes
 
 
-def _distinct_parts(dataset: xr.Dataset, name: str) -> list[tuple[xr.Variable, int]] | None:
-    """List the distinct points of a variable of each model, and their weights; None if they are too many."""
+def _distinct_parts(dataset: xr.Dataset, name: str) -> tuple[list[tuple[xr.Variable, int]], bool]:
+    """List the distinct points of a variable of each model with their weights; and whether they are few enough."""
     whole = dataset.variables[name]
-    # a variable that is only read may have any size
     parts = [distinct_points(part, name) for _, part in parts_of_laws(dataset[[name]], whole.dims)]
-    evaluations = sum(variable.size for variable, _ in parts) if is_computed(whole) else 0
-    return None if evaluations > MAX_SUMMARY_POINTS else parts
+    # a variable that is only read may have any size
+    return parts, not is_computed(whole) or sum(part.size for part, _ in parts) <= MAX_SUMMARY_POINTS
 
 
 def summarize_table(dataset: xr.Dataset, table: TrajectoryTable) -> tuple[Summary, SummaryRecord]:
@@ -235,13 +234,12 @@ def summarize_table(dataset: xr.Dataset, table: TrajectoryTable) -> tuple[Summar
     # by model and by the sizes of the axes along which they vary: the weight of a point, and names of variables
     groups: dict[tuple[int, tuple[int, ...]], tuple[int, list[str]]] = {}
     for name in map(str, dataset.data_vars):
-        parts = _distinct_parts(dataset, name)
-        extremes[name] = None if parts is None else Extremes()
-        dims = dataset[name].dims
-        distinct = parts or [distinct_points(part, name) for _, part in parts_of_laws(dataset, {"model", *dims})]
-        for model, (variable, weight) in enumerate(distinct, len(table.laws) if "friction" in dims else 0):
+        parts, is_evaluated = _distinct_parts(dataset, name)
+        extremes[name] = Extremes() if is_evaluated else None
+        first = len(table.laws) if "friction" in dataset[name].dims else 0
+        for model, (variable, weight) in enumerate(parts, first):
             is_judged = name in ("status", "friction_status", *ERROR_HEADINGS)
-            if parts is not None or (is_judged and variable.size <= MAX_SUMMARY_POINTS):
+            if is_evaluated or (is_judged and variable.size <= MAX_SUMMARY_POINTS):
                 sizes = tuple(variable.sizes[axis] for axis in axes)
                 groups.setdefault((model, sizes), (weight, []))[1].append(name)
             elif name == "status":
