@@ -304,8 +304,6 @@ class ExtendedPlan(Plan):
     table: TrajectoryTable | None
     name: str
     integrated: dict[int, int] = field(default_factory=dict)
-    # by law, for each trajectory its row in the old table, or -1
-    _rows: dict[int, IndexArray] = field(default_factory=dict)
 
     @cached_property
     def positions(self) -> tuple[_AxisPositions, ...]:
@@ -331,9 +329,21 @@ class ExtendedPlan(Plan):
 
     def _from_table(self, trajectory_range: TrajectoryRange, table: TrajectoryTable, law: int) -> ReusedPart:
         """Take the trajectories of a range that the old result has in its table, of a law by its number there."""
-        old_rows = self._old_rows(trajectory_range, table.maps[law])
-        is_known = old_rows >= 0
-        stored = table.rows.take(law, np.maximum(old_rows, 0))
+        trajectory_map, old_map = self.maps[trajectory_range.model], table.maps[law]
+        is_known = np.zeros(trajectory_range.size, bool)
+        old_rows = np.zeros(trajectory_range.size, np.intp)
+        if {*old_map.axes} <= {self.positions[axis].axis for axis in trajectory_map.axes}:
+            cells, of_cell = self._cells_of(trajectory_range)
+            is_old = self._is_old(trajectory_map, cells)
+            cells, of_cell = cells[is_old], of_cell[is_old]
+            index = [np.zeros(cells.shape, np.intp) for _ in self.old.config.axes]
+            for axis, coordinate in trajectory_map.index_along(cells).items():
+                old_axis = self.positions[axis].axis
+                if old_axis is not None:
+                    index[old_axis] = self.positions[axis].positions[coordinate]
+            is_known[of_cell] = True
+            old_rows[of_cell] = old_map.rows(tuple(index))
+        stored = table.rows.take(law, old_rows)
         # a status that was assigned before integration may differ between the two sweeps
         status = self.columns_of(trajectory_range)["status"]
         is_known &= np.where(
@@ -351,45 +361,24 @@ class ExtendedPlan(Plan):
         related = [number for number, other in enumerate(self.laws) if law in (other, model_of(other))]
         if None in map(self.old_law, related) or any(is_new_along):
             return super().reused(trajectory_range)
-        if trajectory_map.of_cell is None:
-            is_old = self._is_old(trajectory_map, trajectory_range.rows)
-        else:
-            needed = np.zeros(trajectory_map.count, bool)
-            needed[trajectory_map.of_cell[~self._is_old(trajectory_map, np.arange(trajectory_map.cells))]] = True
-            is_old = ~needed[trajectory_range.rows]
+        cells, of_cell = self._cells_of(trajectory_range)
+        is_old = np.ones(trajectory_range.size, bool)
+        is_old[of_cell[~self._is_old(trajectory_map, cells)]] = False
         return is_old, trajectory_range.record.blank(int(np.count_nonzero(is_old)))
+
+    def _cells_of(self, trajectory_range: TrajectoryRange) -> tuple[IndexArray, IndexArray]:
+        """List the cells of the trajectories of a range, and the positions of their trajectories in it."""
+        of_cell = self.maps[trajectory_range.model].of_cell
+        if of_cell is None:
+            return trajectory_range.rows, np.arange(trajectory_range.size)
+        cells = np.flatnonzero((of_cell >= trajectory_range.start) & (of_cell < trajectory_range.stop))
+        return cells, of_cell[cells].astype(np.intp) - trajectory_range.start
 
     def _is_old(self, trajectory_map: TrajectoryMap, cells: IndexArray) -> NDArray[np.bool_]:
         is_old = np.ones(cells.shape, bool)
         for axis, coordinate in trajectory_map.index_along(cells).items():
             is_old &= self.positions[axis].positions[coordinate] >= 0
         return is_old
-
-    def _old_rows(self, trajectory_range: TrajectoryRange, old_map: TrajectoryMap) -> IndexArray:
-        trajectory_map = self.maps[trajectory_range.model]
-        if trajectory_map.of_cell is None:
-            return self._rows_of_cells(trajectory_map, old_map, trajectory_range.rows)
-        if trajectory_range.model not in self._rows:
-            rows = np.full(trajectory_map.count, -1, np.intp)
-            of_cells = self._rows_of_cells(trajectory_map, old_map, np.arange(trajectory_map.cells))
-            rows[trajectory_map.of_cell[of_cells >= 0]] = of_cells[of_cells >= 0]
-            self._rows[trajectory_range.model] = rows
-        return self._rows[trajectory_range.model][trajectory_range.rows]
-
-    def _rows_of_cells(
-        self, trajectory_map: TrajectoryMap, old_map: TrajectoryMap, cells: IndexArray
-    ) -> IndexArray:
-        """Find the old row of each cell's trajectory, or -1."""
-        index = [np.zeros(cells.shape, np.intp) for _ in self.old.config.axes]
-        for axis, coordinate in trajectory_map.index_along(cells).items():
-            old_axis = self.positions[axis].axis
-            if old_axis is not None:
-                index[old_axis] = np.maximum(self.positions[axis].positions[coordinate], 0)
-        covered = {self.positions[axis].axis for axis in trajectory_map.axes}
-        if not set(old_map.axes) <= covered:
-            return np.full(cells.shape, -1, np.intp)
-        rows = old_map.rows(tuple(index)) if index else np.zeros(cells.shape, np.intp)
-        return np.where(self._is_old(trajectory_map, cells), rows, -1)
 
     def fill(self, slab: ExpandedSlab) -> None:
         """Copy the values of an old result without trajectories into the values of a slab.
