@@ -222,7 +222,9 @@ def extremes_of(dataset: xr.Dataset, name: str) -> Extremes | None:
 def _distinct_parts(dataset: xr.Dataset, name: str) -> tuple[list[tuple[xr.Variable, int]], bool]:
     """List the distinct points of a variable of each model with their weights; and whether they are few enough."""
     whole = dataset.variables[name]
-    parts = [distinct_points(part, name) for _, part in parts_of_laws(dataset[[name]], whole.dims)]
+    # selecting from few variables is fast; along which axes a variable varies depends on the model
+    few = dataset[[name, *({"model"} & dataset.coords.keys())]]
+    parts = [distinct_points(part, name) for _, part in parts_of_laws(few, whole.dims)]
     # a variable that is only read may have any size
     return parts, not is_computed(whole) or sum(part.size for part, _ in parts) <= MAX_SUMMARY_POINTS
 
