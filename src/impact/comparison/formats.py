@@ -83,7 +83,9 @@ def as_junit(outcome: Verdict) -> str:
 def as_markdown(outcome: Verdict) -> str:
     """Write Markdown for a pull request or a job summary."""
     sign = "⚠️" if isinstance(outcome, NoVerdict) else "✅" if outcome.equal else "❌"
-    new, baseline = (_escape_code(safe_text(name)) for name in (outcome.new, outcome.baseline))
+    # the letters that end a code span or a cell have no escapes
+    code = str.maketrans("`|", "'¦")
+    new, baseline = (safe_text(name).translate(code) for name in (outcome.new, outcome.baseline))
     lines = [f"### {sign} {PROGRAM}: {_escape_markdown(outcome.headline)}", ""]
     lines += [f"`{new}` against the baseline `{baseline}`", ""]
     if outcome.faults:
@@ -128,8 +130,3 @@ def _escape_command(text: str, letters: str = "") -> str:
 def _escape_markdown(text: str) -> str:
     """Escape text so that Markdown shows it literally."""
     return re.sub(r"([\\`*_{}\[\]<>|~#!&$@])", r"\\\1", text)
-
-
-def _escape_code(text: str) -> str:
-    """Replace the letters that end a code span or a cell, which have no escapes."""
-    return text.replace("`", "'").replace("|", "¦")
