@@ -90,7 +90,9 @@ def info(result: xr.Dataset | str | Path) -> Info:
 def _describe(result: xr.Dataset, name: str = "") -> Info:
     """Describe a dataset, of the file of a name."""
     summary = summarize(result) if "model" in result.dims else Summary()
-    variables: dict[str, Any] = {}
+    # the measured values of a calibration, the studies of a study, and the checks of a board are its points
+    by_kind = {"calibration": "measured", "sensitivity study": "mean", "board": "check_status"}
+    counted, variables = by_kind.get(kind_of(result)), dict[str, Any]()
     for variable_name, variable in result.items():
         extremes = extremes_of(result, str(variable_name))
         variables[str(variable_name)] = {
@@ -99,7 +101,7 @@ def _describe(result: xr.Dataset, name: str = "") -> Info:
             **(extremes._asdict() if extremes else dict.fromkeys(Extremes._fields)),
         }
     description = {
-        "points": _count_points(result),
+        "points": count_points(result) if counted is None else int(result[counted].size),
         # of a result in memory neither is known
         **{name: result.encoding.get(name) for name in ("layout", "seal")},
         "dimensions": {str(name): size for name, size in result.sizes.items()},
@@ -166,13 +168,6 @@ def _values_text(dataset: xr.Dataset, name: str) -> str:
     if array.dtype.kind in "fi" and len(distinct) > MAX_LISTED_NUMBERS:
         return f"{number(array.min())} … {number(array.max())}, {array.size} values{suffix}"
     return ", ".join(label(InputName.parse(name).word(value)) for value in distinct) + suffix
-
-
-def _count_points(dataset: xr.Dataset) -> int:
-    """Count the points of a sweep, the measured values of a calibration, the studies of a study, or the checks."""
-    counted = {"calibration": "measured", "sensitivity study": "mean", "board": "check_status"}
-    kind = kind_of(dataset)
-    return int(dataset[counted[kind]].size) if kind in counted else count_points(dataset)
 
 
 def describe(

@@ -156,21 +156,17 @@ class StoredArray(BackendArray):
         check_memory(self.name, [*map(len, positions)], self.dtype)
         try:
             self._check_chunks(positions)
-            if len(key) == 1 and isinstance(key[0], np.ndarray) and key[0].size:
-                return self._read_points(key[0])
-            return np.asarray(self.dataset[key])
+            if not (len(key) == 1 and isinstance(key[0], np.ndarray) and key[0].size):
+                return np.asarray(self.dataset[key])
+            # a list of positions as a key of h5py takes ten times as long
+            values, space = np.empty(key[0].size, self.dtype), self.dataset.id.get_space()
+            space.select_elements(key[0][:, np.newaxis].astype(np.uint64))
+            self.dataset.id.read(h5s.create_simple(values.shape), space, values)
+            return values
         except (OSError, RuntimeError, ValueError, zlib.error) as error:
             path = safe_text(str(self.dataset.file.filename)) if self.dataset else "the result"
             reason = f"{safe_text(self.name, 40)}: {safe_text(str(error), 80)}"
             raise ResultError(f"{path}: is not a readable result ({reason})") from error
-
-    def _read_points(self, positions: NDArray[np.intp]) -> NDArray[Any]:
-        """Read some values of a variable with one axis."""
-        values, space = np.empty(positions.size, self.dtype), self.dataset.id.get_space()
-        # a list of positions as a key of h5py takes ten times as long
-        space.select_elements(positions[:, np.newaxis].astype(np.uint64))
-        self.dataset.id.read(h5s.create_simple(values.shape), space, values)
-        return values
 
     def _check_chunks(self, positions: Sequence[range | NDArray[np.intp]]) -> None:
         """Check the sizes of chunks: HDF5 decompresses to any size, and reads beyond a short chunk."""

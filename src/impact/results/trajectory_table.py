@@ -6,6 +6,7 @@ is a pure function of the inputs, this table and an index of the grid, and is co
 
 from __future__ import annotations
 
+import contextlib
 import math
 import os
 from collections import defaultdict
@@ -326,22 +327,15 @@ def _without_dummy_axis(values: NDArray[Any], region: tuple[slice, ...]) -> NDAr
 
 
 def check_memory(name: str, shape: Sequence[int], dtype: np.dtype[Any]) -> None:
-    """Raise a MemoryError for an array of more than `max_indexed_bytes()`."""
-    size, limit = math.prod(shape) * dtype.itemsize, max_indexed_bytes()
+    """Raise a MemoryError for an array of more than half of the memory, or than MAX_INDEXED_BYTES."""
+    size, limit = math.prod(shape) * dtype.itemsize, MAX_INDEXED_BYTES
+    with contextlib.suppress(ValueError, OSError, AttributeError):
+        limit = min(limit, os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") // 2)
     if size > limit:
         raise MemoryError(
             f"{name}: {math.prod(shape):,} values take {size:,} bytes, expected at most {limit:,}; select a part "
             "first, such as result.isel(...) or result.sel(...)"
         )
-
-
-def max_indexed_bytes() -> int:
-    """Limit the bytes computed or read at once: half of the memory, at most 16 GiB."""
-    try:
-        whole = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    except (ValueError, OSError, AttributeError):
-        return MAX_INDEXED_BYTES
-    return min(MAX_INDEXED_BYTES, whole // 2)
 
 
 def lazy_dataset(template: xr.Dataset, table: TrajectoryTable, variables: Sequence[Variable]) -> xr.Dataset:
