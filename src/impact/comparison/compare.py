@@ -119,7 +119,11 @@ def compare(
         notes += [safe_text(f"not judged: {', '.join(unknown)}")] if unknown else []
         if any(fault.kind == "labels" for fault in faults) and not subset:
             notes.append(f"{argument('subset', True)} compares only what both results contain")
-        missing = _missing_variables(a, b)
+        missing = [
+            Difference("missing variable", name, f"{name} is in {'NEW' if name in a else 'BASELINE'} only")
+            for name in OUTPUTS
+            if (name in a) != (name in b)
+        ]
         notes += [fault.text for fault in missing] if subset else []
         faults += [] if subset else missing
         repeats = command_start(files[0], a) or command_start(files[1], b)
@@ -198,15 +202,6 @@ def _material_faults(new: xr.Dataset, baseline: xr.Dataset) -> list[Difference]:
                 shown = (number(v, 12) for v in (a.get(field), b.get(field)))
                 faults.append(changed_config(path, f"{path} is", *shown))
     return sorted(faults, key=lambda fault: fault.name)
-
-
-def _missing_variables(new: xr.Dataset, baseline: xr.Dataset) -> list[Difference]:
-    """List the variables that only one result has."""
-    return [
-        Difference("missing variable", name, f"{name} is in {'NEW' if name in new else 'BASELINE'} only")
-        for name in OUTPUTS
-        if (name in new) != (name in baseline)
-    ]
 
 
 def _unit_faults(new: xr.Dataset, baseline: xr.Dataset) -> Iterator[Difference]:

@@ -67,11 +67,6 @@ ReadVariable = Callable[[str, slice | NDArray[np.intp]], NDArray[Any]]
 ReadParts = Callable[[str, Sequence[int]], Iterator[NDArray[Any]]]
 
 
-def file_template(result: xr.Dataset, plan: Plan, table: TrajectoryTable) -> xr.Dataset:
-    """Build the dataset of the file, with placeholder values, from that of the result."""
-    return table_template(result, table, stored_variables(plan)) if plan.layout == "factored" else result
-
-
 def read_layout(variables: Mapping[str, xr.Variable], attributes: Mapping[str, object]) -> tuple[str, xr.Dataset]:
     """Make a dataset of the variables and attributes of a file, and name its layout.
 
@@ -116,10 +111,10 @@ def stiffness_to_store(inputs: Inputs, law: Law) -> tuple[tuple[int, ...], Array
     return axes, K
 
 
-def table_template(
-    result_template: xr.Dataset, table: TrajectoryTable, variables: Sequence[Variable]
-) -> xr.Dataset:
-    """Build the dataset of a factored file, with placeholder values, from the coordinates of the result."""
+def file_template(result: xr.Dataset, plan: Plan, table: TrajectoryTable) -> xr.Dataset:
+    """Build the dataset of the file, with placeholder values, from that of the result."""
+    if plan.layout == "full":
+        return result
     names = [axis.name for axis in table.inputs.axes]
     laws, stiffness = {}, [stiffness_to_store(table.inputs, law) for law in table.laws]
     for law, trajectory_map, rule in zip(table.laws, table.maps, stiffness, strict=False):
@@ -156,19 +151,19 @@ def table_template(
         stored["trajectory_of_cell"] = placeholder("cell", cells, "i4", "number of the trajectory of a cell")
     if values := sum(rule[1].size for rule in stiffness if rule is not None):
         stored["law_stiffness"] = placeholder("stiffness_value", values, "f8", "K by the rules of the laws")
-    for of_friction, indices, chosen in _witnesses(table, variables):
+    for of_friction, indices, chosen in _witnesses(table, stored_variables(plan)):
         dim, index_name = WITNESSES[of_friction]
         stored[index_name] = placeholder(dim, indices.size, "i8", "place in C order of (model, axes)")
         for variable in chosen:
             stored[f"witness_{variable.name}"] = placeholder(
                 dim, indices.size, variable.dtype, attributes_of(variable)
             )
-    attributes = {**result_template.attrs, "axes": json.dumps(names), "laws": json.dumps(laws)}
+    attributes = {**result.attrs, "axes": json.dumps(names), "laws": json.dumps(laws)}
     if pairs:
         attributes |= {"frictions": json.dumps(table.frictions), "pairs": json.dumps(pairs)}
-    template = xr.Dataset(stored, result_template.coords, attributes)
+    template = xr.Dataset(stored, result.coords, attributes)
     # readers of netCDF take coordinates that no variable names for variables
-    others = [str(name) for name in result_template.coords if name not in result_template.dims]
+    others = [str(name) for name in result.coords if name not in result.dims]
     return template.assign_attrs(coordinates=" ".join(others))
 
 
