@@ -44,13 +44,7 @@ from .summary import (
     summarize_table,
     with_depths,
 )
-from .trajectory_table import (
-    TrajectoryTable,
-    expanded_slabs,
-    in_memory,
-    lazy_dataset,
-    table_of_ranges,
-)
+from .trajectory_table import TrajectoryTable, expanded_slabs, in_memory, lazy_dataset, table_of_ranges
 from .validation import is_name
 from .xarray_backend import MAX_LOADED_BYTES, load, open_result, write_sealed
 
