@@ -138,7 +138,13 @@ def extend_to_file(
         require_sweep(before, "extend")
         config = stored_config(before.attrs, [], plugin_set, name, max_points)
         old = Plan(config, plugin_set.of(config.models))
-        _check_whole(before, old, name)
+        version = safe_text(str(before.attrs.get("impact_version")), 40)
+        if version != __version__:
+            raise ResultError(
+                f"{name}: was written by impact {version}, this is {__version__}; run its sweep again"
+            )
+        if before.attrs.get("fingerprint") != old.fingerprint or dict(before.sizes) != old.sizes:
+            raise UsageError(f"{name}: got a part of a result, expected the whole result")
         config = _extended_config(before, old, changes, plugin_set, name, max_points)
         if before.attrs.get("core") in CORES:
             # the existing trajectories were integrated by this core
@@ -164,15 +170,6 @@ def extend_to_file(
     run.check_stop(f"{target} is complete")
     layout = "full" if table is None else "factored"
     return replace(outcome, integrated=sum(new.integrated.values()), extended_layout=layout)
-
-
-def _check_whole(before: xr.Dataset, old: Plan, name: str) -> None:
-    """Refuse a result that is incomplete or was written by another version."""
-    version = safe_text(str(before.attrs.get("impact_version")), 40)
-    if version != __version__:
-        raise ResultError(f"{name}: was written by impact {version}, this is {__version__}; run its sweep again")
-    if before.attrs.get("fingerprint") != old.fingerprint or dict(before.sizes) != old.sizes:
-        raise UsageError(f"{name}: got a part of a result, expected the whole result")
 
 
 def _extended_config(

@@ -319,21 +319,18 @@ def recommend(
     """
     dataset = result_of(dataset)
     require_sweep(dataset, "recommend")
-    criterion = BY_ERROR if target is None else _criterion_of(target, dataset)
+    criterion = BY_ERROR
+    if target is not None:
+        name, value = only_target(target)
+        if name not in TARGETS:
+            expected = f"an output of the order of 1; {did_you_mean(name, TARGETS)}"
+            raise UsageError(f'{argument("target")}: got "{name}", expected {expected}')
+        criterion = Criterion(name, target_value(name, value), "angle" if "angle" in dataset.variables else "e")
     tol = read_number(tol, criterion.tolerance, argument("tol"))
     if as_keys(frictions, "frictions") and not OUTPUTS[criterion.names[0]].of_friction:
         origin, of = argument("frictions"), argument("target")
         raise UsageError(f"{origin}: expected a {of} that depends on friction, such as beta=0.4")
     return rank_laws(dataset, tol, criterion, sel, models, frictions)
-
-
-def _criterion_of(target: Mapping[str, object], dataset: xr.Dataset) -> Criterion:
-    """Check a target for the laws of a result."""
-    name, value = only_target(target)
-    if name not in TARGETS:
-        expected = f"an output of the order of 1; {did_you_mean(name, TARGETS)}"
-        raise UsageError(f'{argument("target")}: got "{name}", expected {expected}')
-    return Criterion(name, target_value(name, value), "angle" if "angle" in dataset.variables else "e")
 
 
 def only_target(target: Mapping[str, object]) -> tuple[str, object]:
