@@ -107,7 +107,7 @@ def fit_notes(dataset: xr.Dataset) -> list[str]:
             'noise = "excess" with a column specimen where specimens differ, or loss = "huber" against outliers'
         )
     if residuals := largest_residuals(dataset):
-        parts = [f"{residual.place} ({decimals(residual.standardized, 1)})" for residual in residuals]
+        parts = [f"{residual['place']} ({decimals(residual['standardized'], 1)})" for residual in residuals]
         notes.append(
             f"largest residuals of {best['model'].item()}, each in the fit without the point and in its standard "
             f"deviations: {', '.join(parts)}"
@@ -153,18 +153,11 @@ def _noise_notes(dataset: xr.Dataset) -> Iterator[str]:
         )
 
 
-@dataclass(frozen=True)
-class Residual:
-    """The residual of a measured value in the fit without it, in its own standard deviations, and its place."""
+def largest_residuals(dataset: xr.Dataset) -> list[dict[str, Any]]:
+    """Find the largest residuals of the best law, the largest first, with the places of the measured values.
 
-    place: str
-    output: str
-    measured: float
-    standardized: float
-
-
-def largest_residuals(dataset: xr.Dataset) -> list[Residual]:
-    """Find the largest residuals of the best law in the fits without the point, the largest first."""
+    Each is that in the fit without the value, in standard deviations of its own.
+    """
     if "loo_residual" not in dataset:
         return []
     best = dataset.isel(model=0)
@@ -177,7 +170,8 @@ def largest_residuals(dataset: xr.Dataset) -> list[Residual]:
         line, output = int(point["line"]), str(point["output"].item())
         place = (f"{file}:{line}" if file else f"value {line}") + (f" {output}" if has_several_outputs else "")
         if np.isfinite(point["loo_residual"]):
-            found.append(Residual(place, output, float(point["measured"]), float(point["loo_residual"])))
+            numbers = {"measured": float(point["measured"]), "standardized": float(point["loo_residual"])}
+            found.append({"place": place, "output": output, **numbers})
     return found
 
 
@@ -202,8 +196,7 @@ class Fits(Displayed):
 
     def as_dict(self) -> dict[str, Any]:
         """The laws with their parameters by config path, and the largest residuals."""
-        residuals = [asdict(residual) for residual in largest_residuals(self.dataset)]
-        return {"models": list(self._models()), "largest_residuals": residuals}
+        return {"models": list(self._models()), "largest_residuals": largest_residuals(self.dataset)}
 
     def _models(self) -> Iterator[dict[str, Any]]:
         paths = json.loads(self.dataset.attrs["fit_paths"])

@@ -8,7 +8,7 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -231,8 +231,7 @@ def _check_changes(old: Plan, new: Plan, name: str) -> None:
         raise UsageError(f"{name}: already has all of these; expected more values of an axis, or more models")
 
 
-@dataclass(frozen=True)
-class _AxisPositions:
+class _AxisPositions(NamedTuple):
     """The old axis that an axis corresponds to, if any, and the old positions of its values; -1 is new."""
 
     axis: int | None
