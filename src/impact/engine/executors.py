@@ -25,7 +25,7 @@ EXECUTOR_RANGES = 64
 
 
 @dataclass(frozen=True)
-class ExecutorSpec:
+class ExecutorSpec(AbstractContextManager["ExecutorSpec"]):
     """What integrates the ranges of a sweep; as a context manager, itself.
 
     Parameters
@@ -38,9 +38,6 @@ class ExecutorSpec:
     start: Callable[[], AbstractContextManager[Executor]]
     capacity: Callable[[], int]
     shares_memory: bool = False
-
-    def __enter__(self) -> ExecutorSpec:
-        return self
 
     def __exit__(self, *error: object) -> None:
         pass

@@ -78,16 +78,11 @@ class Run:
 DEFAULT_RUN = Run()
 
 
-@dataclass
 class ProgressCounter:
-    """Counts finished trajectories, and passes the progress to a callback."""
+    """Counts finished trajectories of some ranges, and passes the progress to the callback of a run."""
 
-    progress: Progress
-    on_progress: ProgressCallback
-
-    @classmethod
-    def start(cls, ranges: Sequence[TrajectoryRange], points: int, run: Run) -> ProgressCounter:
-        return cls(Progress(0, sum(part.size for part in ranges), 0, points, 0), run.on_progress)
+    def __init__(self, ranges: Sequence[TrajectoryRange], points: int, run: Run) -> None:
+        self.progress, self.run = Progress(0, sum(part.size for part in ranges), 0, points, 0), run
 
     @property
     def is_full(self) -> bool:
@@ -108,7 +103,7 @@ class ProgressCounter:
         )
 
     def report(self) -> None:
-        self.on_progress(self.progress)
+        self.run.on_progress(self.progress)
 
 
 @contextmanager

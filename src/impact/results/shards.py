@@ -163,11 +163,11 @@ def sweep_shard(
         "attributes": {name: attributes[name] for name in RECORDED_ATTRIBUTES},
     }
     with run.connected() as connected, open_work_folder(folder, plan, connected) as work_folder:
-        counter = ProgressCounter.start(ranges, plan.points, connected)
+        counter = ProgressCounter(ranges, plan.points, connected)
         with atomic_write(folder / SHARD_FILE_NAME, overwrite=True) as sink:
             sink.write(json.dumps(record).encode())
         with report_kept_ranges(folder, counter, "the same command", lambda error: []):
-            complete_ranges(work_folder, plan, ranges, counter, connected)
+            complete_ranges(work_folder, plan, ranges, counter)
     run.check_stop(f"{folder} is complete")
     progress = counter.progress
     return ShardProgress(folder, len(ranges), len(plan.ranges), progress.trajectories, progress.failed, chosen)
@@ -234,7 +234,7 @@ def merge(
     # the core that the shards were integrated by, which may not be the default of this machine
     config = replace(config, solver=replace(config.solver, core=first_record.core))
     plan = Plan(config, plugin_set.of(config.models))
-    counter = ProgressCounter.start(plan.ranges, plan.points, run)
+    counter = ProgressCounter(plan.ranges, plan.points, run)
     for folder, record in records.items():
         if record.attributes["fingerprint"] != first_record.attributes["fingerprint"]:
             # a difference in the trajectories is reported first, by its name
@@ -244,7 +244,7 @@ def merge(
                     "expected the folders of one sweep"
                 )
     # folders are locked one after the other: there may be more of them than the limit of open files
-    folder_of, repeated = _locate_ranges([*records], plan, counter, run)
+    folder_of, repeated = _locate_ranges([*records], plan, counter)
     missing = [trajectory_range for trajectory_range in plan.ranges if trajectory_range not in folder_of]
     if missing:
         raise UsageError(*_missing_shards(output, missing, records))
@@ -273,7 +273,7 @@ def _read_record(folder: Path) -> _ShardRecord:
 
 
 def _locate_ranges(
-    folders: Sequence[Path], plan: Plan, counter: ProgressCounter, run: Run
+    folders: Sequence[Path], plan: Plan, counter: ProgressCounter
 ) -> tuple[dict[TrajectoryRange, WorkFolder], int]:
     """Find the work folder of each range, and count the ranges that are in several folders."""
     folder_of: dict[TrajectoryRange, WorkFolder] = {}
@@ -281,7 +281,7 @@ def _locate_ranges(
     for folder in folders:
         with lock_work_folder(folder, plan) as work_folder:
             for trajectory_range in plan.ranges:
-                run.check_stop("nothing was written")
+                counter.run.check_stop("nothing was written")
                 collisions = work_folder.load(trajectory_range)
                 if collisions is None:
                     continue

@@ -267,7 +267,7 @@ def sweep_into(output: Path, plan: Plan, run: Run = DEFAULT_RUN) -> SweepOutcome
         except UnfinishedError:
             raise UnfinishedError("nothing was written") from None
 
-    counter = ProgressCounter.start(plan.ranges, plan.points, run)
+    counter = ProgressCounter(plan.ranges, plan.points, run)
     with checkpoint.open_work_folder(folder, plan, run) as work_folder:
         # another process may have stored it in the meantime
         check_output(output, overwrite=may_replace)
@@ -277,7 +277,7 @@ def sweep_into(output: Path, plan: Plan, run: Run = DEFAULT_RUN) -> SweepOutcome
         with report_kept_ranges(
             folder, counter, again, lambda error: _missing_space(error, output, plan, counter)
         ):
-            complete_ranges(work_folder, plan, plan.ranges, counter, run)
+            complete_ranges(work_folder, plan, plan.ranges, counter)
             table = table_of_ranges(plan, partial(reload_range, work_folder))
             outcome = store_result(output, plan, table, counter, run, checkpoint.partial_file_of(output))
         checkpoint.remove_work_folder(folder)
@@ -287,22 +287,18 @@ def sweep_into(output: Path, plan: Plan, run: Run = DEFAULT_RUN) -> SweepOutcome
 def _integrate_in_memory(plan: Plan, run: Run) -> tuple[TrajectoryTable, ProgressCounter]:
     """Integrate all ranges of a plan without a work folder."""
     finished: dict[TrajectoryRange, Record] = {}
-    counter = ProgressCounter.start(plan.ranges, plan.points, run)
-    integrate(plan, plan.ranges, finished.__setitem__, counter, run)
+    counter = ProgressCounter(plan.ranges, plan.points, run)
+    integrate(plan, plan.ranges, finished.__setitem__, counter)
     return table_of_ranges(plan, finished.__getitem__), counter
 
 
 def complete_ranges(
-    work_folder: checkpoint.WorkFolder,
-    plan: Plan,
-    ranges: Sequence[TrajectoryRange],
-    counter: ProgressCounter,
-    run: Run,
+    work_folder: checkpoint.WorkFolder, plan: Plan, ranges: Sequence[TrajectoryRange], counter: ProgressCounter
 ) -> None:
     """Integrate the ranges that a work folder does not have yet."""
     todo: list[TrajectoryRange] = []
     for number, trajectory_range in enumerate(ranges):
-        if run.should_stop():
+        if counter.run.should_stop():
             # those that are not read are kept as well
             counter.add(sum(part.size for part in ranges[number:] if work_folder.path(part).is_file()))
             raise UnfinishedError
@@ -312,7 +308,7 @@ def complete_ranges(
         else:
             counter.count(trajectory_range, stored)
     counter.report()
-    integrate(plan, todo, work_folder.store, counter, run)
+    integrate(plan, todo, work_folder.store, counter)
 
 
 def integrate(
@@ -320,10 +316,9 @@ def integrate(
     ranges: Sequence[TrajectoryRange],
     store: Callable[[TrajectoryRange, Record], None],
     counter: ProgressCounter,
-    run: Run,
 ) -> None:
     """Integrate ranges, and store and count each; an `UnfinishedError` if some are missing in the end."""
-    for trajectory_range, collisions in integrate_ranges(plan, ranges, run):
+    for trajectory_range, collisions in integrate_ranges(plan, ranges, counter.run):
         store(trajectory_range, collisions)
         counter.count(trajectory_range, collisions)
         counter.report()
