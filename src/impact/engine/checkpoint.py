@@ -107,8 +107,8 @@ def remove_stale_work_folder(output: Path, plan: Plan) -> None:
         if folder.is_dir():
             _check_is_work_folder(folder)
             with FileLock(folder / LOCK_FILE, timeout=0):
-                if os.path.lexists(folder / PLAN_FILE):
-                    _check_same_sweep(folder, _sweep_record(plan))
+                if os.path.lexists(folder / PLAN_FILE) and _difference_from(folder, _sweep_record(plan)):
+                    return
                 partial_file_of(output).unlink(missing_ok=True)
                 remove_work_folder(folder)
 
@@ -161,7 +161,9 @@ def _prepare_folder(folder: Path, record: Mapping[str, Any], run: Run) -> None:
             )
         # without a plan, the sweep was interrupted before its first range
         if run.resume and os.path.lexists(folder / PLAN_FILE):
-            _check_same_sweep(folder, record)
+            if difference := _difference_from(folder, record):
+                again = f"another output, or {argument('overwrite', True)} to start again"
+                raise UsageError(f"{folder}: {difference}; give the sweep that it is of, {again}")
             return
         _remove_files(folder)
         # after a power cut, removed ranges must not reappear next to the new plan
@@ -190,13 +192,6 @@ def _remove_files(folder: Path, plan: bool = False) -> None:
     """Remove the finished and partial ranges, and with `plan` the plan."""
     for path in (*folder.glob("*.npz"), *folder.glob("*.part"), *([folder / PLAN_FILE] if plan else [])):
         path.unlink(missing_ok=True)
-
-
-def _check_same_sweep(folder: Path, record: Mapping[str, Any]) -> None:
-    """Raise a `UsageError` if the ranges of a folder are of another sweep."""
-    if difference := _difference_from(folder, record):
-        hint = f"give the sweep that it is of, another output, or {argument('overwrite', True)} to start again"
-        raise UsageError(f"{folder}: {difference}; {hint}")
 
 
 def _difference_from(folder: Path, record: Mapping[str, Any]) -> str | None:
