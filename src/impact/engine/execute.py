@@ -109,7 +109,7 @@ def integrate_ranges(
     remaining, attempts = deque(todo), Counter[int]()
     reported: set[str] = set()
     with run.executor as spec:
-        values = [plugin.model.key for plugin in plan.plugins.items if plugin.is_value]
+        values = [plugin.model.key for plugin in plan.plugins.items if not (plugin.source or plugin.package)]
         if values and not spec.shares_memory:
             raise UsageError(
                 f"{', '.join(values)} is given as a Python value, which cannot be sent to other "

@@ -56,11 +56,6 @@ class Plugin:
     package: str | None = None
 
     @property
-    def is_value(self) -> bool:
-        """Whether the model is a Python value, which cannot be sent to another process or named in a command."""
-        return self.source is None and self.package is None
-
-    @property
     def record(self) -> dict[str, str | None]:
         """The record in a result: the name of the file without its folder, or the package, and the hash."""
         file = None if self.source is None else Path(self.source.name).name

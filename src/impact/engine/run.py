@@ -84,11 +84,6 @@ class ProgressCounter:
     def __init__(self, ranges: Sequence[TrajectoryRange], points: int, run: Run) -> None:
         self.progress, self.run = Progress(0, sum(part.size for part in ranges), 0, points, 0), run
 
-    @property
-    def is_full(self) -> bool:
-        """Whether all trajectories are integrated."""
-        return self.progress.trajectories == self.progress.of_trajectories
-
     def count(self, trajectory_range: TrajectoryRange, collisions: Record) -> None:
         """Add a finished range."""
         # a pair without a meaning did not fail

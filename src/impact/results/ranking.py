@@ -67,11 +67,6 @@ class Criterion:
     def text(self) -> str:
         return "e" if self.target is None else f"{self.output} = {self.shown(self.target)}"
 
-    @property
-    def tolerance(self) -> Quantity:
-        """The quantity of the tolerance, in the unit of the output."""
-        return replace(TOLERANCE, unit=OUTPUTS[self.output].unit, meaning="largest accepted difference")
-
     def shown(self, value: float, digits: int = 6) -> str:
         """Write a value of the output, or an error of it."""
         return prefixed(value, OUTPUTS[self.output].unit, digits)
@@ -326,7 +321,8 @@ def recommend(
             expected = f"an output of the order of 1; {did_you_mean(name, TARGETS)}"
             raise UsageError(f'{argument("target")}: got "{name}", expected {expected}')
         criterion = Criterion(name, target_value(name, value), "angle" if "angle" in dataset.variables else "e")
-    tol = read_number(tol, criterion.tolerance, argument("tol"))
+    tolerance = replace(TOLERANCE, unit=OUTPUTS[criterion.output].unit, meaning="largest accepted difference")
+    tol = read_number(tol, tolerance, argument("tol"))
     if as_keys(frictions, "frictions") and not OUTPUTS[criterion.names[0]].of_friction:
         origin, of = argument("frictions"), argument("target")
         raise UsageError(f"{origin}: expected a {of} that depends on friction, such as beta=0.4")

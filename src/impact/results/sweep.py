@@ -322,7 +322,7 @@ def integrate(
         store(trajectory_range, collisions)
         counter.count(trajectory_range, collisions)
         counter.report()
-    if not counter.is_full:
+    if counter.progress.trajectories < counter.progress.of_trajectories:
         raise UnfinishedError
 
 
