@@ -39,7 +39,7 @@ MIN_STALE_S = 60.0
 
 
 class Sink(io.FileIO):
-    """A new file that records the first I/O error instead of raising it; `check` and `sync` raise it.
+    """A new file that records the first I/O error instead of raising it; `check` raises it.
 
     HDF5 on a full disk may report success, or crash the process at its end. So writes always report success here,
     and after the first error nothing more is written.
@@ -91,16 +91,6 @@ class Sink(io.FileIO):
         with contextlib.suppress(OSError, AttributeError):
             fcntl.flock(self.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
 
-    def sync(self) -> None:
-        """Flush everything to the disk.
-
-        Raises
-        ------
-        OSError : this write or an earlier one failed
-        """
-        self.check()
-        os.fsync(self.fileno())
-
     def finish(self) -> None:
         """Close the file, as Windows needs to rename it; a recent time of change protects it until then."""
         with contextlib.suppress(OSError, TypeError):
@@ -143,7 +133,8 @@ def atomic_write(path: Path, *, overwrite: bool, part: Path | None = None) -> It
                 sink.inherit(path)
             sink.lock()
             yield sink
-            sink.sync()
+            sink.check()
+            os.fsync(sink.fileno())
             sink.finish()
             _publish(part, path, overwrite=overwrite)
         finally:

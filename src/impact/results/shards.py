@@ -64,9 +64,6 @@ class Shard:
             raise UsageError(f"{argument('shard', text)}: expected K/N with K from 1 to N, such as 3/16")
         return shard
 
-    def has(self, trajectory_range: TrajectoryRange) -> bool:
-        return trajectory_range.number % self.of == self.number - 1
-
     @property
     def suffix(self) -> str:
         """The end of the name of its work folder, after that of the result."""
@@ -154,7 +151,7 @@ def sweep_shard(
     command += [word for setting in settings_of(overrides) for word in ("--set", setting.override)]
     command += [word for path in plugins if isinstance(path, str | Path) for word in ("--plugin", str(path))]
     check_storable(plan)
-    ranges = [trajectory_range for trajectory_range in plan.ranges if chosen.has(trajectory_range)]
+    ranges = [part for part in plan.ranges if part.number % chosen.of == chosen.number - 1]
     folder, attributes = chosen.folder(Path(output)), dataset_template(plan).attrs
     record = {
         "shard": [chosen.number, chosen.of],
