@@ -54,13 +54,18 @@ def align_sweeps(new: xr.Dataset, baseline: xr.Dataset, *, subset: bool) -> Alig
     """Align two results of sweeps by their coordinates; values of variables are not read."""
     new, baseline = _drop_foreign_axes(new, baseline), _drop_foreign_axes(baseline, new)
     a, b = _comparable_coordinates(new, baseline), _comparable_coordinates(baseline, new)
-    faults = [*_missing_inputs(a, b)]
+    one_sided = (name for name in sorted(map(str, a.coords.keys() ^ b.coords.keys())) if is_input(name))
+    sides = {name: "NEW" if name in a.coords else "BASELINE" for name in one_sided}
+    faults = [
+        Difference("physics config", n, f"{safe_text(n)} is given in {side} only") for n, side in sides.items()
+    ]
     positions: dict[str, tuple[IndexArray, IndexArray]] = {}
     for axis in map(str, dict.fromkeys((*b.dims, *baseline.dims, *a.dims, *new.dims))):
         columns = _label_columns(a, axis), _label_columns(b, axis)
         if columns[0] != columns[1] or not columns[0]:
-            text = f"what varies along the axis {safe_text(axis)} is {_join_names(columns[0])}"
-            faults.append(Difference("nothing in common", axis, f"{text}, in BASELINE {_join_names(columns[1])}"))
+            got, expected = (safe_text(", ".join(names)) or "nothing" for names in columns)
+            text = f"what varies along the axis {safe_text(axis)} is {got}, in BASELINE {expected}"
+            faults.append(Difference("nothing in common", axis, text))
             continue
         positions[axis] = match_labels(
             [a[name].values for name in columns[0]], [b[name].values for name in columns[0]]
@@ -115,8 +120,13 @@ def _drop_foreign_axes(result: xr.Dataset, other: xr.Dataset) -> xr.Dataset:
 
 def _comparable_coordinates(result: xr.Dataset, other: xr.Dataset) -> xr.Dataset:
     """Load the coordinates of a result; a single value that the other varies becomes an axis of length one."""
-    materials = read_attribute(result.attrs, "materials")
-    coords = _with_materials(result.coords.to_dataset().compute(), materials, other)
+    coords, materials = result.coords.to_dataset().compute(), read_attribute(result.attrs, "materials")
+    # the properties of materials that are coordinates of the other result only
+    for name, of_other in other.coords.items():
+        parsed = InputName.parse(name)
+        value = materials.get(parsed.material, {}).get(parsed.key)
+        if name not in coords and isinstance(value, float):
+            coords = coords.assign_coords({name: xr.Variable((), value, of_other.attrs)})
     # the key of a law that was selected is still a label
     for axis in map(str, dict.fromkeys((*LAW_DIMS, *other.dims))):
         if axis not in coords.dims and axis in coords and coords[axis].ndim == 0:
@@ -139,30 +149,11 @@ def _comparable_coordinates(result: xr.Dataset, other: xr.Dataset) -> xr.Dataset
     return coords.assign_coords(repeated)
 
 
-def _with_materials(coords: xr.Dataset, materials: Mapping[str, Any], other: xr.Dataset) -> xr.Dataset:
-    """Add the properties of materials that are coordinates of the other result only."""
-    for name in map(str, other.coords):
-        parsed = InputName.parse(name)
-        properties = materials.get(parsed.material)
-        value = properties.get(parsed.key) if isinstance(properties, dict) and name not in coords else None
-        if isinstance(value, float):
-            coords = coords.assign_coords({name: xr.Variable((), value, other.variables[name].attrs)})
-    return coords
-
-
 def _axes_of_both(name: str, result: xr.Dataset, other: xr.Dataset) -> tuple[str, ...]:
     """List the axes of a variable, after axes of length one along which only the other result varies."""
     added = [str(dim) for dim in dict.fromkeys(("model", *other.dims)) if dim not in result.dims]
     of_variable = [dim for dim in added if dim not in LAW_DIMS or dim in OUTPUTS[name].dims]
     return (*reversed(of_variable), *map(str, result.variables[name].dims))
-
-
-def _missing_inputs(new: xr.Dataset, baseline: xr.Dataset) -> Iterator[Difference]:
-    """List the inputs that only one result has."""
-    for name in sorted(str(name) for name in new.coords.keys() ^ baseline.coords.keys()):
-        if is_input(name):
-            side = "NEW" if name in new.coords else "BASELINE"
-            yield Difference("physics config", name, f"{safe_text(name)} is given in {side} only")
 
 
 def _changed_scalars(new: xr.Dataset, baseline: xr.Dataset, kind: DifferenceKind) -> Iterator[Difference]:
@@ -252,11 +243,6 @@ def _first_labels(columns: Sequence[Labels], names: Sequence[str]) -> str:
 def _format_value(value: Any) -> str:
     """Write a label."""
     return safe_text(number(np.asarray(value).item(), 12), 60)
-
-
-def _join_names(names: Sequence[str]) -> str:
-    """List names, or say that there is none."""
-    return safe_text(", ".join(names)) or "nothing"
 
 
 def align_calibrations(new: xr.Dataset, baseline: xr.Dataset, *, subset: bool) -> Alignment:
