@@ -36,7 +36,7 @@ from ..engine.trajectories import TrajectoryMap
 from ..errors import ResultError, UsageError
 from ..formatting import number, safe_text
 from .attributes import LawRecord, PairRecord, SummaryRecord, read_attribute
-from .netcdf import RegionValues, stored_array
+from .netcdf import RegionValues, StoredArray
 from .schema import SLIP_INPUTS, attributes_of, count_points, derived_names, scale_of, stored_variables
 from .trajectory_table import (
     MAX_STIFFNESS_VALUES,
@@ -84,7 +84,8 @@ def read_layout(variables: Mapping[str, xr.Variable], attributes: Mapping[str, o
     witnesses = {name: variable.load() for name, variable in stored.items() if name.startswith("witness_")}
     dataset = xr.Dataset(witnesses, coordinates, attributes)
     # without xarray's indexing, which takes longer than to read a few values
-    arrays = {name: stored_array(variable) for name, variable in stored.items() if name not in witnesses}
+    lazy: dict[str, Any] = {name: variable._data for name, variable in stored.items() if name not in witnesses}
+    arrays: dict[str, StoredArray] = {name: indexed.array for name, indexed in lazy.items()}
     sizes = {name: array.shape[0] for name, array in arrays.items()}
     table = stored_table(dataset, sizes, lambda name, positions: arrays[name].read((positions,)))
     quantities = [

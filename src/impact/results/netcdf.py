@@ -183,13 +183,6 @@ class StoredArray(BackendArray):
                 self._checked.add(corner)
 
 
-def stored_array(variable: xr.Variable) -> StoredArray:
-    """Find the array that a variable of numbers in a file is read from."""
-    data: Any = variable._data
-    array: StoredArray = data.array
-    return array
-
-
 def read_variables(
     file: h5py.File, read: ReadBytes
 ) -> tuple[dict[str, xr.Variable], dict[str, object], tuple[str, ...]]:

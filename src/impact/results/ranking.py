@@ -385,7 +385,8 @@ def _check_rankable(dataset: xr.Dataset, criterion: Criterion) -> None:
     require_outputs(dataset, criterion.names)
     if criterion.target is not None:
         return
-    if "e" not in dataset.coords or not _uses_e(dataset):
+    e = distinct_points(dataset, "e")[0] if "e" in dataset.coords else xr.Variable((), np.nan)
+    if all(np.isnan(e.isel(slab).values).all() for slab in slabs(e.sizes)):
         raise UsageError("this sweep has no requested e, which the ranking needs; add e or alpha")
     dims = set(dataset["e_error"].dims)
     if "model" not in dims or dims != set(dataset["status"].dims) or not dims.issuperset(dataset["e"].dims):
@@ -404,12 +405,6 @@ def _listed(models: Sequence[Ranked]) -> str:
     others = len(models) - MAX_NAMED
     names += [f"{others} other{'s' * (others > 1)}"] if others > 0 else []
     return " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))
-
-
-def _uses_e(dataset: xr.Dataset) -> bool:
-    """Check whether any point has a target e."""
-    e, _ = distinct_points(dataset, "e")
-    return any(not np.isnan(e.isel(slab).values).all() for slab in slabs(e.sizes))
 
 
 def _keys(law_data: xr.Dataset) -> tuple[str, str]:

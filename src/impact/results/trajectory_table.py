@@ -300,7 +300,8 @@ class ExpandedArray(BackendArray):
                 region = tuple(slab.values())
                 index = np.ix_(*(axis[part] for axis, part in zip(axes, region, strict=True)))
                 part = expand(self.table, number, index, [name])[1][name]
-                out[region or ...] = _without_dummy_axis(part, region)
+                # without axes, a part has one of length one
+                out[region or ...] = part if region else part.reshape(())
         selected = tuple(0 if isinstance(part, int | np.integer) else slice(None) for part in key)
         return np.asarray(values[selected])
 
@@ -319,11 +320,6 @@ def table_of_result(dataset: xr.Dataset) -> TrajectoryTable | None:
     arrays = [computed_array(variable.variable) for variable in dataset.values()]
     tables = [None if array is None else array.table for array in arrays]
     return tables[0] if tables and all(table is tables[0] for table in tables) else None
-
-
-def _without_dummy_axis(values: NDArray[Any], region: tuple[slice, ...]) -> NDArray[Any]:
-    """Drop the axis of length one that a slab of a plan without axes has."""
-    return values if region else values.reshape(())
 
 
 def check_memory(name: str, shape: Sequence[int], dtype: np.dtype[Any]) -> None:
@@ -403,7 +399,8 @@ def expanded_slabs(
             shape = tuple(part.stop - part.start for part in region)
             values = {}
             for variable in chosen:
-                array = np.broadcast_to(_without_dummy_axis(arrays.pop(variable.name), region), shape)
+                array = arrays.pop(variable.name)
+                array = np.broadcast_to(array if region else array.reshape(()), shape)
                 # copied only if it is a broadcast view or has another dtype
                 values[variable.name] = np.asarray(array, variable.dtype, order="C")
             yield ExpandedSlab(number, table.place(number), region, impacts, values)
