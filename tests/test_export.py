@@ -604,6 +604,19 @@ def test_lammps_searches_for_neighbours_within_a_tenth_of_the_smaller_radius(R1:
     assert float(skin) == pytest.approx(5e-4, rel=1e-12)
 
 
+@pytest.mark.parametrize("other", [{"R2": 1.0}, {"m2": math.inf}])
+def test_kratos_searches_as_far_as_a_large_fast_ball_is_away_at_the_start(other: dict[str, float]) -> None:
+    at = {"e": 0.6, "v1": 20.0, "R1": 1.0, **other}
+    script = impact.export("kratos", at=at, overrides={"materials.table1.E": 1e8}, script=True).script
+    assert script is not None
+    tolerances = re.findall(
+        r"^ +\"(?:SearchTolerance|search_tolerance_against_walls)\": (\S+),$", script, re.MULTILINE
+    )
+    (x1,) = re.findall(r"^1 (\S+) 0 0$", script, re.MULTILINE)
+    assert len(tolerances) == 1 + ("m2" in other)
+    assert all(float(tolerance) > -float(x1) - 1.0 > 0.01 for tolerance in tolerances)
+
+
 @pytest.mark.parametrize("materials", [("soft", "soft"), ("soft", "hard")])
 def test_a_script_of_yade_makes_the_materials_that_its_balls_have(materials: tuple[str, str]) -> None:
     config = source(*materials) | {"models": default_law("yade")}

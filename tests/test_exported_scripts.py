@@ -217,7 +217,7 @@ PLANTED_WALLS = (
     ("pybullet", "kelvin-voigt-no-tension", "contactProcessingThreshold=0", "contactProcessingThreshold=1"),
     ("exudyn", "exudyn-carvalho-gonthier", "[[0, y", "[[0.01 * y, y"),
     ("newton", "newton-semi-implicit", "-1.0, 0.0, 0.0", "-1.0, 0.3, 0.0"),
-    ("kratos", "kratos-hertz", '"search_tolerance_against_walls": 0.01', '"search_tolerance_against_walls": 0.0'),
+    ("kratos", "kratos-hertz", '"search_tolerance_against_walls": ', '"search_tolerance_against_walls": 0.0 * '),
     (
         "simbody",
         "simbody-hunt-crossley",

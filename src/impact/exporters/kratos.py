@@ -119,9 +119,9 @@ stage = DEMAnalysisStage(Kratos.Model(), Kratos.Parameters(json.dumps({
     "dem_inlet_option": False,
     "GravityZ": 0.0,
     "RotationOption": {{ has_friction }},
-    "SearchTolerance": 0.01,
+    "SearchTolerance": {{ reach }},
 {% if has_wall %}
-    "search_tolerance_against_walls": 0.01,
+    "search_tolerance_against_walls": {{ reach }},
 {% endif %}
     "NeighbourSearchFrequency": 100,
     "solver_settings": {
