@@ -754,8 +754,11 @@ def test_verify_runs_the_script_that_is_exported(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_the_tolerance_on_beta_is_four_indentations_over_the_effective_radius(tmp_path: Path) -> None:
-    """The normal of two balls turns, which adds a part of the speed to the slip; that of a wall does not."""
+def test_the_tolerance_on_beta_is_four_indentations_over_the_effective_radius_and_a_turn(tmp_path: Path) -> None:
+    """The normal of two balls turns, which adds a part of the speed to the slip; that of a wall does not.
+
+    The beta of LAMMPS of 22 July 2025 differs by 0.019 at 80 degrees, with the balls of Table 1 of the paper.
+    """
     program = write_program(tmp_path / "lmp", RELEASE + 'echo "beta = 0.5"; echo "e_out = 0.6"')
 
     def verify(angle: float, **inputs: float) -> tuple[Verification, float]:
@@ -763,9 +766,11 @@ def test_the_tolerance_on_beta_is_four_indentations_over_the_effective_radius(tm
         config = source("soft", "soft", v1=0.5, mu=0.3, angle=angle, **inputs) | laws
         verification = impact.export("lammps", source=config, verify=True, program=str(program)).verification
         assert verification is not None
-        return verification, impact.sweep(config)["peak_indentation"].item() / 0.03
+        result = impact.sweep(config)
+        turn = 0.5 * math.tan(angle) * result["contact_time"].item() / (BALLS["R1"] + BALLS["R2"])
+        return verification, max(result["peak_indentation"].item() / 0.03, turn / 4.0)
 
-    for angle in (0.1, 0.8):
+    for angle in (0.1, 0.8, 1.5):
         balls, indentation = verify(angle)
         assert balls.beta_measured == (0.5,) * 4
         assert balls.uncertainty == pytest.approx(4.0 * indentation / math.cos(angle), rel=1e-9)

@@ -191,17 +191,21 @@ def _with_friction(
     """Add the tangential restitution.
 
     The normal of two balls turns, and some codes shorten the arm of friction: both change velocities by a part of
-    the speed before the impact, of the order of the indentation over R*.
+    the speed before the impact, of the order of the indentation over R* and of the angle of the turn.
     """
     oblique = problem.law.oblique
     assert oblique is not None
     (predicted,) = problem.law.outputs(steps, "beta")
     exact, impact = verification.uncertainty, problem.law.impact
     v0, slip = float(impact.v0[0]), float(oblique.impact.slip.item())
-    speed = math.hypot(v0, float((oblique.impact.u1 - oblique.impact.u2).item()))
+    tangential = float((oblique.impact.u1 - oblique.impact.u2).item())
+    speed = math.hypot(v0, tangential)
     # a law that needs no radius may have none in its impact
-    radius = problem.collision(float(steps[0]), 0.5).effective_radius
-    turning = TURNING * problem.law.continuous["peak_indentation"] / radius
+    collision = problem.collision(float(steps[0]), 0.5)
+    turning = TURNING * problem.law.continuous["peak_indentation"] / collision.effective_radius
+    # at a grazing impact the centres move far along the tangent while the balls touch; 0 of a wall
+    turn = abs(tangential) * problem.law.contact_time / (collision["R1"] + collision["R2"])
+    turning = max(turning, turn)
     is_turning = problem.code.shortens_arms or not problem.has_wall
     return replace(
         verification,
