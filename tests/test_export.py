@@ -1160,6 +1160,17 @@ def test_pybullet_takes_the_root_of_a_coefficient_and_newton_a_friction_that_sto
             impact.export(name, at=at, friction="drake-regularized", code_version=CODES[name].newest)
 
 
+@pytest.mark.parametrize("m2", [4e-8, math.inf])
+def test_a_ball_that_pybullet_never_turns_is_refused(m2: float) -> None:
+    at = {"K": 1e5, "kelvin-voigt-no-tension.C": 0.0, "mu": 0.3, "angle": "40 deg", "m1": 4e-8, "m2": m2}
+    export = impact.export("pybullet", at=at | {"R1": 1.2e-4}, friction="coulomb-1785", code_version="3.2.7")
+    assert export.friction == "coulomb-1785"
+    with pytest.raises(
+        UsageError, match=r"R1 and m1: expected a moment of inertia above 2.2e-16 kg m\^2: PyBullet"
+    ):
+        impact.export("pybullet", at=at | {"R1": 1.1e-4}, friction="coulomb-1785", code_version="3.2.7")
+
+
 def test_scripts_have_solid_balls() -> None:
     config = source("soft", "soft", mu=0.3, angle="40 deg", inertia_factor2=0.6)
     with pytest.raises(UsageError, match=r"inertia_factor2: got 0\.6, expected 0\.4: balls of scripts are solid"):
