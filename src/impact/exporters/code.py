@@ -84,6 +84,11 @@ class Collision:
             raise UsageError("R1 and R2: got inf, expected one finite radius")
         return 1.0 / curvature
 
+    @property
+    def largest_radius(self) -> float:
+        """The larger radius [m] of the balls, near which coordinates are rounded."""
+        return max(radius for radius in (self["R1"], self["R2"]) if math.isfinite(radius))
+
     def script_values(self) -> dict[str, str]:
         """Write the values of a script as text with all digits, in SI; ball 1 is on the left.
 
@@ -144,6 +149,7 @@ class Code:
     parameters : in the units and conventions of the code, by the code's own names
     scheme : see `impact.contact.fixed_step.SCHEMES`; None if its restitution at a time step is not predicted
     uncertainty : largest difference of e between the code and the map of its scheme, by law; ROUNDING for others
+    resolution : spacing of its numbers near 1
     law_for_version : the entry of the catalogue that holds in a version, from the key of another one and the
         version; raises a UsageError where the version has none
     read_version : converts a version as the user or the program writes it to the form in which versions are
@@ -169,6 +175,7 @@ class Code:
     lines: Callable[[Collision, Parameters], Lines]
     scheme: str | None = None
     uncertainty: Mapping[str, float] = field(default_factory=dict)
+    resolution: float = 2.0**-52
     law_for_version: Callable[[str, str], str] = lambda key, version: key
     read_version: Callable[[str], str] = lambda text: text
     comment: tuple[str, str] = ("# ", "")

@@ -8,6 +8,8 @@ from ..formatting import number
 from .code import Code, Collision, Lines, Parameters, keyword_arguments
 from .programs import python_package
 
+# of single precision
+RESOLUTION = 2.0**-23
 # the normal is along x, the tangent along y, so that spins are about z
 TEMPLATE = """\
 import newton
@@ -73,7 +75,7 @@ def lines(collision: Collision, parameters: Parameters) -> Lines:
 
 def notes(c: Collision) -> Lines:
     # the spacing of coordinates near a radius, over the peak indentation of the undamped spring
-    share = 2.0**-23 * c["R1"] / (c["v0"] * math.sqrt(c["m"] / c["K"]))
+    share = RESOLUTION * c.largest_radius / (c["v0"] * math.sqrt(c["m"] / c["K"]))
     yield "in SI, the same for both shapes: ke and kd of a contact are the means, not those of springs in series"
     yield (
         "kd acts on approach only; the restitution depends on kd/(2 sqrt(ke m)), thus on the masses, not on speed"
@@ -96,8 +98,9 @@ CODE = Code(
     newest="1.8.0",
     tested="scripts were run in Newton 1.8.0 on a CPU; warp.sim has the same force and was not run",
     scheme="kick-drift",
-    # single precision: a ball is a hundred times as large as its indentation, or more
+    # single precision, of a ball up to 800 times as large as its indentation
     uncertainty={"newton-semi-implicit": 1e-3},
+    resolution=RESOLUTION,
     parameters=parameters,
     lines=lines,
     notes=notes,

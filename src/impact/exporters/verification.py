@@ -24,6 +24,8 @@ from .programs import run_program
 # phases (i + 1/2)/4 at which a script is run
 PHASES = 4
 TIMEOUT_S = 300
+# times the spacing of coordinates over the indentation: tolerance on e of slow impacts of large or hard balls
+SPACINGS = 10.0
 # uncertainties of an extrapolation below this are rounding
 FLOOR = 1e-7
 # times the indentation over R*: tolerance on beta where codes turn the normal, or shorten the arms of the force
@@ -154,7 +156,8 @@ def verify_scripts(problem: ExportProblem, program: str, dt: float, n_phases: in
     """
     problem = replace(problem, law=replace(problem.law, phases=n_phases))
     code, phases = problem.code, (np.arange(n_phases) + 0.5) / n_phases
-    tolerance = code.uncertainty.get(problem.model.key, ROUNDING)
+    share = problem.collision(dt, 0.5).largest_radius / problem.law.continuous["peak_indentation"]
+    tolerance = max(code.uncertainty.get(problem.model.key, ROUNDING), SPACINGS * code.resolution * share)
     steps = np.array([dt] if code.scheme is not None else [dt, dt / 2, dt / 4])
     runs = []
     for dt in steps.tolist():
