@@ -264,6 +264,13 @@ def test_an_engine_with_a_friction_law_of_the_catalogue_is_judged_by_it() -> Non
     assert "friction" in failed(impact.conform(adapter=spring, only=only))
 
 
+def test_rigid_balls_have_the_beta_of_coulomb_with_a_contact_force_that_does_not_pull() -> None:
+    """As docs/conform.md says: the default one pulls, and its friction is mu |F|."""
+    only, law = "slide-mu30-75-wall", {"law": "coulomb-1785"}
+    assert failed(impact.conform(adapter=lambda c: rigid(c) | law, only=only)) == {"friction"}
+    assert impact.conform(adapter=lambda c: rigid(c) | law | {"model": "exact-hysteresis"}, only=only).passed
+
+
 def test_what_an_engine_cannot_do_is_counted_and_not_failed() -> None:
     def no_walls(c: Values) -> Values:
         return {"id": c["id"], "error": "no walls"} if c["m2"] is None else rigid(c)

@@ -301,6 +301,31 @@ def test_coulomb_friction_slides_by_the_impulse_of_the_restitution_of_the_scheme
     np.testing.assert_allclose(result.slip_post.squeeze(), expected, rtol=1e-12)
 
 
+def test_coulomb_friction_of_a_contact_force_that_pulls_slides_by_the_sum_of_its_size() -> None:
+    """As docs/timestep.md says, with N of each step: for |F| more than by the impulse of the restitution."""
+    e, h, mu = 0.3, 0.05, 0.01
+    step = {"m2": math.inf, "R1": 0.05, "m1": 1.0, "K": 1.0, "n": 1.0, "v1": 1.0, "dt": h, "phase": 0.5}
+    zeta = -math.log(e) / math.hypot(math.pi, math.log(e))
+    x, u, pressing, pulling = 0.5 * h, 1.0, 0.0, 0.0
+    while x > 0.0:
+        force = x + 2.0 * zeta * u
+        pressing, pulling = pressing + h * max(force, 0.0), pulling + h * max(-force, 0.0)
+        u -= h * force
+        x += h * u
+    assert pulling > 0.1
+    for limit, impulse in (("abs", pressing + pulling), ("positive", pressing)):
+        result = impact.sweep(
+            {
+                "models": "anagnostopoulos-1988",
+                "frictions": "coulomb-1785",
+                "friction": {"coulomb-1785": {"limit": limit}},
+                "sweep": step | {"e": e, "mu": mu, "u1": 1.0},
+                "solver": {"integrator": "kick-drift"},
+            }
+        )
+        assert result.slip_post.item() == pytest.approx(1.0 - 3.5 * mu * impulse, rel=1e-13)
+
+
 @pytest.mark.parametrize(
     ("scheme", "friction", "expected"),
     [
