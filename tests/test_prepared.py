@@ -94,6 +94,16 @@ def test_where_there_is_no_rebound_outputs_are_nan() -> None:
     assert (got["status"].tolist(), np.isnan(got["e_out"]).tolist()) == ([1, 2], [False, True])
 
 
+def test_balls_that_adhesion_holds_are_at_the_limit_as_in_a_run() -> None:
+    sweep = {"v1": 0.01, "m1": 1e-3, "m2": np.inf, "R1": 0.01, "R2": np.inf, "material": "soft"}
+    soft = {"E": 1e6, "nu": 0.3}
+    problem = impact.prepare(
+        {"models": "jkr-1971", "sweep": sweep, "materials": {"soft": soft}, "model": {"jkr-1971": {"gamma": 1.0}}}
+    )
+    for got in (problem(), problem(v1=0.01)):
+        assert (got["status"], got["e_out"], got["v1_post"]) == (3, 0.0, 0.0)
+
+
 @pytest.mark.parametrize(
     ("values", "message"),
     [

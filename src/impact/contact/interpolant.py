@@ -285,7 +285,8 @@ class InterpolatedCollisions:
             self.group = number, Interpolant(self._outcomes, GROUP_EDGES, floors)
         if self.group is not None:
             differs[self.group[0]] = False
-        direct = differs.any(axis=0) | (law.n != self.first[0])
+        # where balls stay together is not known to what polynomials replace
+        direct = differs.any(axis=0) | (law.n != self.first[0]) | never_separates
         collisions = CollisionResult.blank(n)
         same = ~direct
         if self.group is not None:
