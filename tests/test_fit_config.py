@@ -62,6 +62,15 @@ def test_a_column_without_a_dimension_may_say_so(folder: Path) -> None:
     assert (data.outputs, data.sigma) == ({"e_out": (0.5, 0.4, 0.3)}, {"e_out": (0.01, 0.02, 0.03)})
 
 
+@pytest.mark.parametrize("unit", ["[1]", "(-)"])
+def test_a_deviation_that_says_that_it_has_no_unit_is_not_in_that_of_its_column(folder: Path, unit: str) -> None:
+    csv = f"v1 [m/s], e_out [%], sigma {unit}\n1, 50, 0.01\n2, 40, 0.02\n"
+    (folder / "drops.csv").write_text(csv, encoding="utf-8")
+    data = read_config(folder / "fit.toml", purpose="calibrate").data
+    assert data is not None
+    assert (data.outputs, data.sigma) == ({"e_out": (0.5, 0.4)}, {"e_out": (0.01, 0.02)})
+
+
 def test_a_stored_config_needs_no_file(folder: Path) -> None:
     config = read_config(folder / "fit.toml", purpose="calibrate")
     (folder / "drops.csv").unlink()

@@ -307,7 +307,7 @@ def split_header(text: str) -> tuple[str, str]:
     """Split a header into a name and a unit, which is in square brackets, or in round ones if it is a known one.
 
     >>> split_header("v1 [mm/s]"), split_header("v1 (cm/s)"), split_header("e (mean)"), split_header("e_out [-]")
-    (('v1', 'mm/s'), ('v1', 'cm/s'), ('e (mean)', ''), ('e_out', ''))
+    (('v1', 'mm/s'), ('v1', 'cm/s'), ('e (mean)', ''), ('e_out', '1'))
     """
     text = text.strip()
     match = SQUARE_BRACKETS.fullmatch(text) or ROUND_BRACKETS.fullmatch(text)
@@ -316,7 +316,7 @@ def split_header(text: str) -> tuple[str, str]:
         return text, ""
     if unit.lower() in ("%", "percent", "per cent", "pct"):
         unit = "%"
-    return match[1], "" if unit in ("-", "1") else unit
+    return match[1], "1" if unit == "-" else unit
 
 
 def near_miss(header: str, known: Iterable[str]) -> str:
