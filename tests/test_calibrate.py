@@ -294,6 +294,20 @@ def test_the_table_has_the_numbers_of_the_result(cli: Run, tmp_path: Path) -> No
     np.testing.assert_allclose(shown, expected, rtol=5e-3)
 
 
+def test_spins_of_balls_that_stick_do_not_identify_mu() -> None:
+    """They are 2/7 of what rolling on the plate would change, whatever mu is."""
+    angles = [0.1, 0.3, 0.5, 0.7]
+    spins = [-100.0 / 1.4 * float(np.tan(angle)) for angle in angles]
+    sweep = {"v1": 1.0, "m1": 1.0, "m2": np.inf, "R1": 0.01, "R2": np.inf, "K": 1e6, "mu": {"fit": [0.0, 2.0]}}
+    columns = {"angle": angles, "omega1_post": spins, "sigma": [0.1] * 4}
+    result = impact.calibrate(
+        {"models": "hertz", "frictions": "coulomb-1785", "sweep": sweep, "data": {"columns": columns}}
+    )
+    np.testing.assert_allclose(np.abs(result["predicted"].values[0]), np.abs(spins), rtol=1e-9)
+    assert result["identifiable"].item() == 0
+    assert np.isnan(result["lower"].item())
+
+
 @pytest.mark.slow
 def test_several_outputs_identify_the_spring_and_the_dashpot() -> None:
     """The contact time adds what restitutions alone do not tell."""

@@ -60,6 +60,17 @@ def centred_line(rows: Array) -> Array:
     return result
 
 
+def saturating(rows: Array) -> Array:
+    result: Array = np.repeat(1.0 - np.exp(-30.0 * rows[:, :1]), 20, axis=1)
+    return result
+
+
+def of_rounding(rows: Array) -> Array:
+    """A constant, computed with a different rounding for each parameter."""
+    result: Array = 1.0 + 1e-15 * np.sin(1e6 * rows[:, :1] + np.arange(20.0))
+    return result
+
+
 def pair(rows: Array) -> Array:
     return np.repeat(rows[:, :1], 2, axis=1)
 
@@ -72,6 +83,8 @@ FUNCTIONS = {
     "line": line,
     "constant": constant,
     "centred line": centred_line,
+    "saturating": saturating,
+    "rounding": of_rounding,
 }
 
 
@@ -144,6 +157,19 @@ def test_spring_and_dashpot_are_not_identified_by_restitutions() -> None:
     np.testing.assert_allclose(np.abs(result.unidentified), [[2 / np.sqrt(5), 1 / np.sqrt(5)]], atol=1e-6)
     K, C = result.estimate
     assert C / 2 / np.sqrt(K) == pytest.approx(ZETA, abs=1e-8)
+
+
+def test_the_interval_of_a_parameter_beyond_which_little_changes_ends_where_the_prediction_changes() -> None:
+    """The end is at 1 - exp(-30 p) = 1 - 1.96 standard errors of 0.01/sqrt(20)."""
+    result = fit("saturating", [0.0], [1.0], saturating(np.array([[0.7]]))[0], 0.01)
+    assert result.lower[0] == pytest.approx(-np.log(1.959964 * 0.01 / np.sqrt(20.0)) / 30.0, abs=1e-4)
+    assert result.upper[0] == 1.0
+
+
+def test_rounding_errors_do_not_identify_a_parameter() -> None:
+    result = fit("rounding", [0.0], [1.0], np.full(20, 1.01), 0.01)
+    assert not result.identifiable.any()
+    assert np.isnan(result.lower).all()
 
 
 @pytest.mark.parametrize(

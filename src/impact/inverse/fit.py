@@ -46,6 +46,8 @@ NO_PREDICTION = 1e6
 AT_BOUND = 1e-7
 # a direction of the parameters that changes the prediction less than this share of the strongest is not identified
 RANK_RTOL = 1e-5
+# nor is one that changes it by less than this share of the prediction itself: what is left are rounding errors
+ROUNDING_RTOL = 1e-9
 # share of a parameter in such a direction from which on it is not identified
 PARTICIPATION_TOL = 1e-3
 CONFIDENCE = 0.95
@@ -448,7 +450,8 @@ class _Minimum:
         slope = np.where(bounds.lower > 0.0, bounds.values(u) / bounds.slope(u), 1.0)
         _, sizes, directions = np.linalg.svd(self.white_jacobian * slope, full_matrices=True)
         sizes = np.concatenate([sizes, np.zeros(slope.size - sizes.size)])
-        return np.asarray(directions[sizes <= RANK_RTOL * sizes.max(initial=0.0)])
+        rounding = ROUNDING_RTOL * np.linalg.norm(np.nan_to_num(self.predicted / self.problem.data.sigma))
+        return np.asarray(directions[sizes <= max(RANK_RTOL * sizes.max(initial=0.0), rounding)])
 
     @property
     def identifiable(self) -> Mask:
@@ -563,7 +566,7 @@ class _Minimum:
         for number in range(MAX_BRACKETS):
             outer = min(max(centre + direction * width * 1.5**number, 0.0), 1.0)
             if surplus(outer) > 0.0:
-                return float(brentq(surplus, inner, outer, xtol=PROFILE_XTOL * width, rtol=1e-12))
+                return float(brentq(surplus, inner, outer, xtol=PROFILE_XTOL * min(width, 1.0), rtol=1e-12))
             if outer == bound:
                 break
             inner = outer
