@@ -511,6 +511,15 @@ def test_a_law_of_the_best_config_that_is_not_fitted_is_refused_before_the_fit(t
     assert not fit.exists()
 
 
+def test_the_best_config_is_integrated_as_in_the_fit(tmp_path: Path) -> None:
+    sweep = {"m1": 1.0, "m2": 1.0, "v1": 1.0, "K": 1e6, "e": {"fit": [0.1, 1.0]}}
+    config = {"models": "hunt-crossley-1975", "sweep": sweep, "solver": {"rtol": 1e-5, "core": "numpy"}}
+    fit = impact.calibrate({**config, "data": {"columns": {"e_out": [0.6, 0.7]}}}, best=tmp_path / "best.toml")
+    predicted = fit["predicted"].values[0, 0]
+    for source in (tmp_path / "best.toml", fit):
+        assert impact.run(source).values["e_out"] == pytest.approx(predicted, rel=1e-12)
+
+
 @pytest.mark.slow
 def test_the_best_config_gives_the_predictions(cli: Run, tmp_path: Path) -> None:
     words = ("--set", 'models=["kuwabara-kono-1987"]', "--set", "solver.rtol=1e-8")

@@ -16,7 +16,7 @@ from ..config.files import toml_document
 from ..config.input_names import InputName
 from ..config.load import Config
 from ..config.quantities import KeyPath
-from ..config.tables import DEFAULT_TITLE
+from ..config.tables import DEFAULT_TITLE, Solver
 from ..contact.models import original_key
 from ..contact.variables import OUTPUTS
 from ..display import Block, Displayed, Table
@@ -316,6 +316,9 @@ def fitted_config(config: Config, law: xr.Dataset) -> str:
     columns = {name: sorted(set(column)) for name, column in config.data.inputs.items()}
     laws = {name: [key] for name, key in zip(("models", "frictions"), keys, strict=False)}
     tables: dict[KeyPath, dict[str, object]] = {(): {**laws, "title": config.title}, ("sweep",): {}}
+    solver = dict(sorted(asdict(config.solver).items() - asdict(Solver()).items()))
+    if solver:
+        tables["solver",] = solver
     for name, material in config.materials.items():
         known = {field: value for field, value in asdict(material).items() if value is not None and value == value}
         tables["materials", name] = known
