@@ -294,6 +294,39 @@ def test_the_table_has_the_numbers_of_the_result(cli: Run, tmp_path: Path) -> No
     np.testing.assert_allclose(shown, expected, rtol=5e-3)
 
 
+SPEEDS = np.linspace(0.5, 3.0, 8)
+
+
+def fit_contact_times(mass: float, **data: Any) -> tuple[xr.Dataset, Any, list[float]]:
+    """Fit K and A to contact times with a noise of 1 %; also returns chi2 of both, and bounds of A."""
+    A = 0.15 * (mass / 1e6) ** 0.4  # in units of time
+    sweep, bounds = {"m1": mass, "m2": np.inf}, [A / 10, A * 10]
+    config = {"models": "kuwabara-kono-1987", "sweep": {**sweep, "K": 1e6, "v1": 1.0}}
+    times = impact.prepare({**config, "model": {"kuwabara-kono-1987": {"A": A}}}, outputs="contact_time")
+    exact = times(v1=SPEEDS)["contact_time"]
+    sigma = 0.01 * float(exact.mean())
+    measured = exact + sigma * np.random.default_rng(4).standard_normal(8)
+    columns = {"v1": SPEEDS.tolist(), "contact_time": measured.tolist()}
+    if data.pop("has_sigma"):
+        columns["sigma"] = [sigma] * 8
+    config = {**config, "sweep": {**sweep, "K": {"fit": [1e6 / 30, 30e6]}}, "data": {"columns": columns, **data}}
+    fit = impact.calibrate({**config, "model": {"kuwabara-kono-1987": {"A": {"fit": bounds}}}})
+
+    def chi2(K: float, A: float) -> float:
+        return float((((times(v1=SPEEDS, K=K, A=A)["contact_time"] - measured) / sigma) ** 2).sum())
+
+    return fit, chi2, bounds
+
+
+def test_an_end_of_an_interval_where_the_other_parameter_is_at_a_bound() -> None:
+    fit, chi2, (least, _) = fit_contact_times(0.01, has_sigma=True)
+    K, damping = fit["estimate"].values[0]
+    assert damping > 2.0 * least
+    assert chi2(fit["upper"].values[0, 0], least) - chi2(K, damping) == pytest.approx(
+        stats.chi2.ppf(0.95, 1), rel=1e-3
+    )
+
+
 def test_spins_of_balls_that_stick_do_not_identify_mu() -> None:
     """They are 2/7 of what rolling on the plate would change, whatever mu is."""
     angles = [0.1, 0.3, 0.5, 0.7]

@@ -292,7 +292,8 @@ def minimize(
 
     result = least_squares(
         partial(one_of_both, 0),
-        start[free],
+        # at a bound the first trust region would be as small as the distance from it, and end the search
+        np.clip(start[free], FINAL_STEP, 1.0 - FINAL_STEP),
         jac=partial(one_of_both, 1),
         bounds=(0.0, 1.0),
         xtol=tolerance,
