@@ -327,6 +327,17 @@ def test_an_end_of_an_interval_where_the_other_parameter_is_at_a_bound() -> None
     )
 
 
+def test_small_values_without_deviations_are_fitted_as_those_with_one() -> None:
+    """Contact times of a microsecond."""
+    with_sigma, *_ = fit_contact_times(1e-9, has_sigma=True, noise="scale")
+    without, chi2, _ = fit_contact_times(1e-9, has_sigma=False)
+    for name in ("estimate", "lower", "upper", "aicc"):
+        np.testing.assert_allclose(without[name], with_sigma[name], rtol=1e-5, err_msg=name)
+    sigma = float(np.sqrt(without["chi2_reduced"].item() / with_sigma["chi2_reduced"].item()))
+    assert without["loo"].item() == pytest.approx(sigma * with_sigma["loo"].item(), rel=1e-4)
+    assert 6.0 * with_sigma["chi2_reduced"].item() == pytest.approx(chi2(*without["estimate"].values[0]), rel=1e-9)
+
+
 def test_spins_of_balls_that_stick_do_not_identify_mu() -> None:
     """They are 2/7 of what rolling on the plate would change, whatever mu is."""
     angles = [0.1, 0.3, 0.5, 0.7]

@@ -218,7 +218,9 @@ def fit_laws(config: Config) -> dict[str, Fit]:
     values = np.concatenate([*data.outputs.values()])
     sigma = np.concatenate([data.sigma.get(name, np.ones(len(column))) for name, column in data.outputs.items()])
     specimens = np.unique(data.specimens, return_inverse=True)[1] if data.specimens else None
-    points = DataPoints(values, sigma, data.noise, specimens, data.loss)
+    # without standard deviations nothing but the values says what is small
+    size = float(np.sqrt(np.mean((values / sigma) ** 2))) or 1.0 if data.noise == "scale" else 1.0
+    points = DataPoints(values, size * sigma, data.noise, specimens, data.loss)
     laws = laws_to_fit(config)
     problems: list[FitProblem] = []
     shared: dict[object, InterpolatedCollisions] = {}
@@ -235,7 +237,10 @@ def fit_laws(config: Config) -> dict[str, Fit]:
         function = prediction(config, law, names, data.inputs, len(data.lines), compute)
         integrated = prediction(config, law, names, with_curve, len(data.lines))
         problems.append(FitProblem(function, _bounds(config, names), points, integrated))
-    return dict(zip(laws, fit_all(problems), strict=True))
+    return {
+        key: replace(fit, chi2_reduced=size**2 * fit.chi2_reduced, loo=size * fit.loo)
+        for key, fit in zip(laws, fit_all(problems), strict=True)
+    }
 
 
 def _bounds(config: Config, names: Sequence[str]) -> Bounds:

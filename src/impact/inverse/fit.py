@@ -298,7 +298,8 @@ def minimize(
         bounds=(0.0, 1.0),
         xtol=tolerance,
         ftol=tolerance,
-        gtol=tolerance,
+        # unlike the others it is not relative, and residuals may be small
+        gtol=SOLVER_TOLERANCE,
         loss=problem.data.loss,
         max_nfev=MAX_EVALUATIONS,
     )
