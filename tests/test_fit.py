@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from impact.inverse.batched_solvers import Evaluate, run_together
-from impact.inverse.fit import Bounds, DataPoints, Estimate, Fit, FitProblem, best_of, fit_all
+from impact.inverse.fit import Bounds, DataPoints, Estimate, Fit, FitProblem, best_of, fit_all, scan
 
 Array = NDArray[np.float64]
 # damping ratio of a linear spring and dashpot with e = 0.5, and de/dzeta there
@@ -164,6 +164,18 @@ def test_the_interval_of_a_parameter_beyond_which_little_changes_ends_where_the_
     result = fit("saturating", [0.0], [1.0], saturating(np.array([[0.7]]))[0], 0.01)
     assert result.lower[0] == pytest.approx(-np.log(1.959964 * 0.01 / np.sqrt(20.0)) / 30.0, abs=1e-4)
     assert result.upper[0] == 1.0
+
+
+def test_one_start_alone_is_where_a_parameter_changes_nothing() -> None:
+    points = DataPoints(np.full(20, 0.6), np.full(20, 0.01), "given")
+
+    def plateau(rows: Array) -> Array:
+        return np.repeat(np.minimum(rows, 0.5), 20, axis=1)
+
+    problem = FitProblem(plateau, Bounds(np.zeros(1), np.ones(1)), points)
+    starts = scan(problem, lambda function, rows: function(rows))
+    assert starts.size == 4
+    assert np.count_nonzero(starts > 0.5) == 1
 
 
 def test_rounding_errors_do_not_identify_a_parameter() -> None:

@@ -243,7 +243,10 @@ def scan(problem: FitProblem, evaluate: Evaluate) -> Array:
     # the sequence begins at 0; half a cell away from it, no bound is tried
     u = qmc.Sobol(problem.count, scramble=False).random(N_SCAN) + 0.5 / N_SCAN
     cost = (problem.residuals(evaluate, u) ** 2).sum(axis=1)
-    return np.asarray(u[np.argsort(cost, kind="stable")[:N_STARTS]])
+    # of points as good as each other, such as those beyond which a parameter changes nothing, the first
+    order = np.argsort(cost, kind="stable")
+    is_other = np.diff(cost[order], prepend=-np.inf) > 1e-9 * cost[order]
+    return np.asarray(u[order[is_other | (cost[order] == 0.0)][:N_STARTS]])
 
 
 def minimize(
