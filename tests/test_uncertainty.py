@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -204,6 +205,12 @@ def test_indices_are_those_of_scipy() -> None:
     np.testing.assert_allclose(indices["first"][0], of_scipy.first_order, rtol=1e-12)
     np.testing.assert_allclose(indices["total"][0], of_scipy.total_order, rtol=1e-12)
     assert np.isnan(indices["first_lower"]).all()
+
+
+def test_the_unit_of_an_output_is_written_as_in_a_config() -> None:
+    sweep = {"v1": {"uniform": [0.8, 1.2]}, "m1": 1.0, "m2": 2.0, "K": 1e6}
+    study = impact.sensitivity({"models": "hertz", "sweep": sweep, "design": {"n": 64}}, of="v2_post")
+    assert re.search(r"mean [0-9.]+ m/s, sd", str(impact.describe(study)))
 
 
 def test_one_uncertain_input_explains_the_whole_variance() -> None:

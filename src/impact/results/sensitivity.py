@@ -18,7 +18,7 @@ from ..engine.plan import Plan
 from ..formatting import NO_BREAK, decimals, number, safe_text, scaled_unit
 from .attributes import read_attribute
 from .provenance import describe_point
-from .schema import SENSITIVITY, parts_of_laws, plan_coordinates, provenance_attributes, template
+from .schema import SENSITIVITY, parts_of_laws, plain_unit, plan_coordinates, provenance_attributes, template
 
 # probabilities of the quantiles
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
@@ -111,7 +111,7 @@ def index_rows(study: xr.Dataset) -> list[tuple[str, ...]]:
 
 def describe_study(study: xr.Dataset) -> str:
     """Describe the distribution of the output of one study, in a sentence without a full stop."""
-    of, unit = study.attrs["of"], str(study["mean"].attrs["units"])
+    of, unit = study.attrs["of"], plain_unit(str(study["mean"].attrs["units"]))
     failed = int(study["failed"])
     if failed:
         return f"{of}: {failed:,} points have no result, so there are no indices; narrow the distributions"
