@@ -304,6 +304,8 @@ def test_a_file_of_the_system_that_never_ends_is_not_read(forked: ForkServer, tm
          '--set sweep.e={file="cases.csv", column="m1", unit="g"}: sweep.e.unit: unknown key; known: column, decimal, file, separator'),
         ('sweep.e={file="cases.csv", column="m1", separator="x"}',
          '--set sweep.e={file="cases.csv", column="m1", separator="x"}: sweep.e.separator: got "x", expected ",", ";" or "\\t"'),
+        ('sweep.cases={file="cases.csv", separator=""}',
+         '--set sweep.cases={file="cases.csv", separator=""}: sweep.cases.separator: got "", expected ",", ";" or "\\t"'),
         ('sweep.cases={file="cases.csv", decimal="x"}',
          '--set sweep.cases={file="cases.csv", decimal="x"}: sweep.cases.decimal: got "x", expected "." or ","'),
         ('sweep.zip=[["e", "v1"]]',

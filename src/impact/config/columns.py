@@ -50,8 +50,8 @@ NUMBER_WITH = {
     sign: re.compile(rf"[-+]?[0-9]*[{sign}][0-9]+(?:[eE][-+]?[0-9]+)?(?:\s*[^\s0-9.,].*)?") for sign in DECIMALS
 }
 THOUSANDS = re.compile(r"[-+]?[1-9][0-9]{0,2}(?:,[0-9]{3})+")
-# keys that say how a CSV file is written, and their values; what is empty or missing is recognised
-CSV_KEYS = {"separator": ("", *SEPARATORS), "decimal": ("", *DECIMALS)}
+# keys that say how a CSV file is written, and their values; what is missing is recognised
+CSV_KEYS = {"separator": SEPARATORS, "decimal": DECIMALS}
 # what cells without a value contain
 MISSING = ("", "na", "n/a", "nan", "none", "null", "<na>")
 
