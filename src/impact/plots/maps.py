@@ -207,7 +207,7 @@ class MapData(PlotData):
         closest = np.array(self.closest, object)
         entries: LegendEntries = []
         for key, share in self.shares.items():
-            tied = {"facecolor": tint(0.26), "linewidth": 0}
+            tied = {"facecolor": tint(0.26), "linewidth": 0.5}
             style, name = (tied, f"{SEVERAL}, equally close") if key else (_failed(), NO_VALUE)
             if key in styles:
                 look, name = styles[key], names[key]
@@ -231,9 +231,11 @@ class MapData(PlotData):
         name = symbol("abs_e_error" if self.closest else "e_error") + (" = " if self.closest else " = ±")
         entries: dict[float, tuple[Artist, str]] = {}
         for panel_axes, field in zip(axes, values, strict=True):
-            mesh = panel_axes.pcolormesh(
-                *self.edges, field, norm=norm, cmap=colours, rasterized=values.size > MAX_VECTOR_CELLS
-            )
+            # edges in the colour of their cell cover the seams that viewers of vector pictures show between cells
+            edges: dict[str, Any] = {"edgecolors": "face", "linewidth": 0.5}
+            if values.size > MAX_VECTOR_CELLS:
+                edges = {"rasterized": True}
+            mesh = panel_axes.pcolormesh(*self.edges, field, norm=norm, cmap=colours, **edges)
             if field.mask.any():
                 panel_axes.add_patch(self._merged_cells(np.ma.getmaskarray(field), _failed()))
                 entries[0.0] = Patch(**_failed()), NO_VALUE
@@ -377,7 +379,7 @@ def edges_of(values: Sequence[float], log: bool) -> Array:
 
 def _failed() -> dict[str, Any]:
     """The style of cells without a value."""
-    return {"facecolor": tint(0.08), "edgecolor": tint(0.3), "hatch": "/////", "linewidth": 0}
+    return {"facecolor": tint(0.08), "edgecolor": tint(0.3), "hatch": "/////", "linewidth": 0.5}
 
 
 _over_plane = partial(Kind, default=choose_plane, along=("x", "y"))
