@@ -225,6 +225,7 @@ def test_the_page_prints_what_the_commands_print(cli: Run) -> None:
         (("--dt", "1e-12"), "--dt: got 2.90209e+08 steps per contact, expected at most 131,072"),
         (("--at", "e=0"), "has no rebound at these inputs"),
         (("--phases", "0"), "expected a whole number of at least 1"),
+        (("--phases", "1000000000"), "--phases: got 1000000000, expected at most 10,000"),
     ],
 )
 def test_bad_input_is_one_line(cli: Run, words: tuple[str, ...], message: str) -> None:

@@ -61,6 +61,8 @@ from .solve import PointWithE, config_name, point_with_e, solve_damping, unknown
 
 # steps per contact if none are given
 STEPS_PER_CONTACT = (10.0, 20.0, 50.0, 100.0)
+# 0.7 GB for four steps of a law with an e
+MAX_PHASES = 10_000
 # the e to ask for is searched between so many values from here to 1; many laws take the logarithm of e
 MIN_E, N_SCAN = 1e-6, 33
 # largest jump of the mean over the phases that is taken for a root
@@ -312,7 +314,7 @@ def timestep(
     at : values of inputs by config name; an e for a law that takes none is reached by its damping parameter
     steps_per_contact : contact times of the continuous law over dt; by default 10, 20, 50 and 100
     dt : one or more further time steps [s], or texts such as "2 us"
-    phases : number of phases, (i + 1/2)/phases
+    phases : number of phases, (i + 1/2)/phases, at most 10,000
     tol : relative tolerance for which the smallest number of steps per contact is found
     parameter : a parameter of the law, "K" or "materials.NAME.E", whose value from which on `tol` holds at the
         only `dt` is found, for a step that cannot be changed; with "drake-sap" and an e also "relaxation_time"
@@ -338,6 +340,8 @@ def timestep(
     (0.4945, 0.48, 0.519, 0.5054)
     """
     require_counts(phases=phases)
+    if phases > MAX_PHASES:
+        raise UsageError(f"{argument('phases')}: got {phases}, expected at most {MAX_PHASES:,}")
     given = read_numbers(dt, SWEEP_QUANTITIES["dt"], argument("dt"))
     counts = read_numbers(steps_per_contact, SWEEP_QUANTITIES["steps_per_contact"], argument("steps_per_contact"))
     tol = None if tol is None else read_number(tol, TOLERANCE, argument("tol"))
