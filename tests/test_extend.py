@@ -183,6 +183,31 @@ def test_a_material_whose_property_was_an_axis_before_a_ball_had_it_is_added(
     assert_same_values(larger, single_sweep(config, more, tmp_path))
 
 
+@BOTH_LAYOUTS
+def test_a_law_is_added_with_an_axis_of_its_own(stored_sweep: StoredSweep, tmp_path: Path, layout: str) -> None:
+    more = ['models=["lee-herrmann-1993"]', "model.lee-herrmann-1993.gamma=[10, 20]"]
+    larger = impact.extend(stored_sweep(BASE, layout), more)
+    both = 'models=["gharib-hurmuzlu-2012", "hertz", "lee-herrmann-1993"]'
+    assert_same_values(larger, single_sweep(BASE, [layout, both, more[1]], tmp_path))
+
+
+def test_values_of_a_parameter_that_is_a_word_are_added(stored_sweep: StoredSweep, tmp_path: Path) -> None:
+    sliding = BASE.replace("K = 1e9", "K = 1e9\nu1 = 0.5\nmu = 0.3\nR1 = 0.1\nR2 = 0.1")
+    config = sliding.replace("[solver]", 'frictions = ["coulomb-1785"]\n[solver]')
+    larger = impact.extend(stored_sweep(config), ['friction.coulomb-1785.limit=["positive"]'])
+    both = ['friction.coulomb-1785.limit=["abs", "positive"]']
+    assert_same_values(larger, single_sweep(config, both, tmp_path))
+
+
+@pytest.mark.parametrize("value", ["1e6", "[1e6]"])
+def test_an_extension_does_not_set_a_parameter_that_a_law_did_without(
+    stored_sweep: StoredSweep, value: str
+) -> None:
+    """The stiffness of the points of the result follows from the material."""
+    overrides = [f"model.kelvin-voigt.K={value}", "sweep.e=[0.9]"]
+    assert_refused(stored_sweep(DASHPOT), overrides, "changes kelvin-voigt.K, expected more values of an axis")
+
+
 @pytest.mark.slow
 def test_materials_are_extended_and_chosen_whatever_their_names(stored_sweep: StoredSweep, tmp_path: Path) -> None:
     hard = '[materials."a \\u007f \\"b\\""]\nE = 3e9\nnu = 0.3\nrho = 1000\n'

@@ -181,14 +181,16 @@ def _extended_config(
     for axis in config.axes:
         name = axis.name
         old_values = np.atleast_1d(old.inputs.values(name))
-        # a property of a material that no ball had is NaN
-        if len(axis.columns) > 1 or axis.numbered or old_values[0] != old_values[0]:
+        # a property of a material that no ball had is NaN, a parameter of a law that is added None
+        is_new = old_values[0] is None or old_values[0] != old_values[0]
+        if len(axis.columns) > 1 or axis.numbered or is_new:
             continue
         in_both, _ = match_labels([np.asarray(axis.columns[name])], [old_values])
         if len(in_both) < old_values.size:
             new_values = (value for value in axis.columns[name] if value not in old_values.tolist())
-            values = [*old_values.tolist(), *new_values]
-            added.append(override_text(InputName.parse(name).path, values))
+            parsed = InputName.parse(name)
+            values = [parsed.word(value) for value in (*old_values.tolist(), *new_values)]
+            added.append(override_text(parsed.path, values))
     for table, laws, now in (
         ("models", old.models, config.models),
         ("frictions", old.frictions, config.frictions),
@@ -219,7 +221,10 @@ def _check_changes(old: Plan, new: Plan, name: str) -> None:
         f"output.{key}" for key in ("variables", "dtype") if getattr(outputs[0], key) != getattr(outputs[1], key)
     ]
     changed += [key for key in old.inputs.names() if key not in new.inputs.names()]
-    changed += [key for key in swept if key not in old.inputs.names() and "." not in key]
+    # a material, or a law, that is added has inputs that the result does not have
+    owners = {"", *(model.key for model in old.models), *(law.key for law in old.frictions)}
+    gained = [InputName.parse(key) for key in swept if key not in old.inputs.names()]
+    changed += [str(gain) for gain in gained if gain.owner in owners and not gain.material]
     scalars, new_scalars = old.inputs.scalars, new.inputs.scalars
     changed += [key for key in scalars if key in new_scalars and scalars[key] != new_scalars[key]]
     if changed:
