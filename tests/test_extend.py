@@ -197,6 +197,11 @@ def test_values_of_a_parameter_that_is_a_word_are_added(stored_sweep: StoredSwee
     larger = impact.extend(stored_sweep(config), ['friction.coulomb-1785.limit=["positive"]'])
     both = ['friction.coulomb-1785.limit=["abs", "positive"]']
     assert_same_values(larger, single_sweep(config, both, tmp_path))
+    zipped = stored_sweep(
+        config.replace("mu = 0.3", 'mu = [0.2, 0.3]\nzip = [["mu", "friction.coulomb-1785.limit"]]'), *both
+    )
+    less = ["sweep.mu=[0.5]", 'friction.coulomb-1785.limit=["abs"]']
+    assert_refused(zipped, less, "leaves out mu=0.2, friction.coulomb-1785.limit=abs, expected all values")
 
 
 @pytest.mark.parametrize("value", ["1e6", "[1e6]"])

@@ -330,6 +330,28 @@ def test_at_selects_a_case_by_its_number_and_a_material_by_its_property(cli: Run
     assert collision.first == ("materials.steel.E",)
 
 
+def test_at_selects_a_point_of_a_zip_group_by_a_word() -> None:
+    sweep = {
+        "e": 0.5,
+        "u1": 1.0,
+        "mu": [0.2, 0.3],
+        "R1": 0.1,
+        "R2": 0.1,
+        "m1": 1.0,
+        "m2": 2.0,
+        "K": 1e8,
+        "v1": 1.0,
+    }
+    limits = {"coulomb-1785": {"limit": ["abs", "positive"]}}
+    zipped = {**sweep, "zip": [["mu", "friction.coulomb-1785.limit"]]}
+    source = {"models": ["tsuji-1992"], "frictions": ["coulomb-1785"], "sweep": zipped, "friction": limits}
+    word = {"friction.coulomb-1785.limit": "positive"}
+    for at in (word, {**word, "mu": 0.3}):
+        assert impact.run(source, at=at).point["mu"] == 0.3
+    with pytest.raises(UsageError, match=r"limit = positive, mu = 0\.2: not on"):
+        impact.run(source, at={**word, "mu": 0.2})
+
+
 def test_at_fixes_an_uncertain_input() -> None:
     uncertain = {"e": {"normal": [0.8, 0.02]}, "v1": {"uniform": [0.5, 1.5]}, "m1": 0.1, "m2": 0.2, "K": 1e8}
     source = {"models": ["tsuji-1992"], "sweep": uncertain, "design": {"n": 16}}

@@ -19,7 +19,7 @@ from ..atomic import check_outputs
 from ..config.draft import Setting, settings_of
 from ..config.files import override_text
 from ..config.grid import MAX_POINTS, Axis
-from ..config.input_names import InputName
+from ..config.input_names import InputName, with_words
 from ..config.load import Config
 from ..config.tables import CORES
 from ..contact.model import ForceModel
@@ -252,8 +252,8 @@ def _check_none_lost(plan: ExtendedPlan) -> None:
             raise UsageError(f"{plan.name}: {shown} varied together and do not now; sweep the new config")
         lost = {*range(axis.size)}.difference(*kept)
         if lost:
-            row = {column: safe_text(str(values[min(lost)]), 40) for column, values in axis.columns.items()}
-            values = ", ".join(f"{column}={value}" for column, value in row.items())
+            row = with_words({column: values[min(lost)] for column, values in axis.columns.items()})
+            values = ", ".join(f"{column}={safe_text(str(value), 40)}" for column, value in row.items())
             raise UsageError(
                 f"{plan.name}: {argument('overrides')} leaves out {values}, expected all values that the result "
                 "has, and more; columns that vary together are given together"

@@ -766,9 +766,9 @@ def _selectable_columns(axis: Axis) -> dict[str, Sequence[float | str]]:
 def _position_on_axis(axis: Axis, at: Mapping[str, float | str]) -> int:
     """Find the first position on an axis at which its columns have the values of `at`."""
     columns = _selectable_columns(axis)
-    selected = {name: value for name, value in at.items() if name in columns}
+    selected = with_words({name: value for name, value in at.items() if name in columns})
     for position in range(axis.size):
-        if all(columns[name][position] == value for name, value in selected.items()):
+        if with_words({name: columns[name][position] for name in selected}) == selected:
             return position
     requested = ", ".join(f"{name} = {value}" for name, value in selected.items())
     raise UsageError(f"{requested}: not on the zipped axis {axis.name}; these values vary together")
