@@ -267,3 +267,16 @@ def test_expand_refuses_too_many_points_unknown_labels_and_an_existing_output(cl
     assert (done.returncode, len(done.stderr.splitlines())) == (2, 1), done.stderr
     assert "got 8 points, expected at most 7 (--max-points)" in done.stderr
     assert sorted(child.name for child in tmp_path.iterdir()) == ["existing.h5", "r.h5"]
+
+
+@pytest.mark.parametrize("layout", ["full", "factored"])
+def test_a_value_that_several_points_of_a_zip_group_have_selects_all_of_them(tmp_path: Path, layout: str) -> None:
+    sweep = {"e": [0.3, 0.6, 0.9], "v1": [1.0, 2.0, 1.0], "zip": [["e", "v1"]], "m1": 1.0, "m2": 1.0, "K": 1e6}
+    config = {"models": ["flores-2011"], "sweep": sweep, "output": {"layout": layout}}
+    impact.sweep_to_file(config, tmp_path / "r.h5")
+    impact.expand(tmp_path / "r.h5", tmp_path / "part.h5", sel={"v1": 1.0})
+    part = impact.load(tmp_path / "part.h5")
+    assert part["e"].values.tolist() == [0.3, 0.9]
+    assert part["e_out"].values.tolist() == impact.load(tmp_path / "r.h5")["e_out"].isel(e=[0, 2]).values.tolist()
+    with pytest.raises(UsageError, match=r"^no v1 = 1\.0 there; v1 is 2$"):
+        impact.expand(tmp_path / "r.h5", tmp_path / "other.h5", sel={"e": 0.6, "v1": 1.0})

@@ -82,7 +82,7 @@ def select_laws(dataset: xr.Dataset, models: object = None, frictions: object = 
 
 
 def select(dataset: xr.Dataset, sel: Mapping[str, object]) -> xr.Dataset:
-    """Select at values of coordinates; an axis is dropped, unless several numbered points have the value."""
+    """Select at values of coordinates; an axis is dropped, unless several of its points have the value."""
     axes = [str(dim) for dim in dataset.sizes if dim not in LAW_DIMS]
     masks: dict[Hashable, Mask] = {}
     for name, value in sel.items():
@@ -101,15 +101,14 @@ def select(dataset: xr.Dataset, sel: Mapping[str, object]) -> xr.Dataset:
         if dim in masks and same.any():
             same &= masks[dim]
         if not same.any():
-            shown = safe_text(_nearest_values(dataset[name], number))
-            raise UsageError(f"no {name} = {plain} in this result; {shown}")
+            # where what varies with it is selected, that leaves some of its values
+            at, left = ("there", masks[dim]) if dim in masks else ("in this result", slice(None))
+            shown = safe_text(_nearest_values(dataset[name][left], number))
+            raise UsageError(f"no {name} = {plain} {at}; {shown}")
         masks[dim] = same
-    positions: dict[Hashable, int | IndexArray] = {dim: int(np.argmax(same)) for dim, same in masks.items()}
-    for dim, same in masks.items():
-        # several numbered points may match
-        if dataset[dim].dtype.kind in "iu" and np.count_nonzero(same) > 1:
-            positions[dim] = np.flatnonzero(same)
-    return dataset.isel(positions)
+    # a value of the axis itself selects the first of those that differ by rounding
+    one = {dim: dim in sel or np.count_nonzero(same) == 1 for dim, same in masks.items()}
+    return dataset.isel({dim: int(np.argmax(m)) if one[dim] else np.flatnonzero(m) for dim, m in masks.items()})
 
 
 def in_si(coordinate: xr.DataArray, value: float | str) -> float | str:
