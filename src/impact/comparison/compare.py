@@ -15,7 +15,7 @@ from ..contact.variables import LAW_DIMS, OUTPUTS
 from ..errors import UsageError
 from ..formatting import argument, number, safe_text
 from ..results.attributes import read_attribute
-from ..results.provenance import command_start
+from ..results.replay_command import command_start
 from ..results.schema import (
     MODEL_METADATA,
     SCHEMA,

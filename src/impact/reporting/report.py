@@ -36,8 +36,9 @@ from ..plots.slices import varying_inputs
 from ..results.attributes import read_attribute
 from ..results.board import BOARD_HEADINGS, Board, board_rows, check_rows, engine_headline, failure_lines
 from ..results.calibration import FIT_HEADINGS, calibration_title, describe_data, fit_notes, fit_rows
-from ..results.provenance import describe_point, stored_config
+from ..results.provenance import stored_config
 from ..results.ranking import DEFAULT_TOL, Ranking, rank_laws
+from ..results.replay_command import describe_point
 from ..results.schema import FIT_STATUSES, count_points, exponents_of, kind_of
 from ..results.selection import select_laws
 from ..results.sensitivity import INDEX_HEADINGS, describe_design, describe_study, index_rows, iterate_studies
