@@ -206,6 +206,12 @@ def test_solve_finds_the_mu_that_slides_with_a_given_beta() -> None:
     assert str(sticks).startswith("hertz with coulomb-1785: no value of mu gives beta = 0.4; beta is from -1 to 0")
 
 
+def test_the_end_of_the_scan_is_no_root_where_every_larger_value_gives_the_target() -> None:
+    """With this mu or more the slip stops before the balls separate: mu (7/2)(1 + e_out) = tan(angle)."""
+    result = impact.solve("hertz", "mu", {"beta": 0.0}, friction="coulomb-1785", source=CONFIG)
+    assert [root.value for root in result.roots] == pytest.approx([math.tan(ANGLE) / 7.0], rel=1e-8)
+
+
 def test_solve_writes_a_target_with_its_unit() -> None:
     steep = impact.solve("hertz", "mu", {"rebound_angle": "20 deg"}, friction="coulomb-1785", source=CONFIG)
     text = str(steep)

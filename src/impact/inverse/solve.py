@@ -643,11 +643,10 @@ def _runs(reached: Mask, scan: Array, bounds: set[float]) -> tuple[list[float], 
         if at_bound or scan[after - 1] - scan[first] <= ONE_ROOT * abs(scan[first]):
             roots.append(at_bound[0] if at_bound else float(scan[(first + after - 1) // 2]))
             continue
-        for end, left in ((first, first - 1), (after - 1, after - 1)):
-            if 0 <= left < scan.size - 1:
-                ends.append(left)
-            else:
-                roots.append(float(scan[end]))
+        # the end of a scan is no root where the run begins or ends within it
+        lefts = [left for left in (first - 1, after - 1) if 0 <= left < scan.size - 1]
+        ends += lefts
+        roots += [] if lefts else [float(scan[first]), float(scan[after - 1])]
     return roots, ends
 
 
