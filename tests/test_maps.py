@@ -201,6 +201,9 @@ def test_where_laws_are_exact_none_of_them_is_the_closest() -> None:
     figure = draw(map_data, Look(7.1))
     texts = [text.get_text() for text in figure.legends[0].get_texts()]
     assert "10.0%  several models, equally close" in texts
+    # a border would be drawn around each row of cells
+    patches = panels_of(figure, map_data)[0].patches
+    assert [(type(patch), patch.get_linewidth()) for patch in patches] == [(PathPatch, 0.0)] * 2
 
 
 def test_errors_of_the_solver_have_the_colour_of_no_error() -> None:

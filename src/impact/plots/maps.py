@@ -207,7 +207,7 @@ class MapData(PlotData):
         closest = np.array(self.closest, object)
         entries: LegendEntries = []
         for key, share in self.shares.items():
-            tied = {"facecolor": tint(0.26), "linewidth": 0.5}
+            tied = {"facecolor": tint(0.26), "linewidth": 0}
             style, name = (tied, f"{SEVERAL}, equally close") if key else (_failed(), NO_VALUE)
             if key in styles:
                 look, name = styles[key], names[key]
@@ -379,7 +379,7 @@ def edges_of(values: Sequence[float], log: bool) -> Array:
 
 def _failed() -> dict[str, Any]:
     """The style of cells without a value."""
-    return {"facecolor": tint(0.08), "edgecolor": tint(0.3), "hatch": "/////", "linewidth": 0.5}
+    return {"facecolor": tint(0.08), "edgecolor": tint(0.3), "hatch": "/////", "linewidth": 0}
 
 
 _over_plane = partial(Kind, default=choose_plane, along=("x", "y"))
