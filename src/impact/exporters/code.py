@@ -86,8 +86,9 @@ class Collision:
 
     @property
     def largest_radius(self) -> float:
-        """The larger radius [m] of the balls, near which coordinates are rounded."""
-        return max(radius for radius in (self["R1"], self["R2"]) if math.isfinite(radius))
+        """The larger radius [m] of the balls, near which coordinates are rounded; a wall is at the origin."""
+        radii = [self["R1"]] if self.has_wall else [self["R1"], self["R2"]]
+        return max(filter(math.isfinite, radii))
 
     def script_values(self) -> dict[str, str]:
         """Write the values of a script as text with all digits, in SI; ball 1 is on the left.
