@@ -71,12 +71,12 @@ def _own_name(law: str, name: str) -> str:
 
 
 def _estimate_texts(parameter: xr.Dataset) -> tuple[str, str]:
-    """Write an estimate and its interval."""
-    estimate = number(float(parameter["estimate"]), 5)
+    """Write an estimate and its interval; of a value that others replace, the further digits are arbitrary."""
+    estimate = float(parameter["estimate"])
     if not int(parameter["identifiable"]):
-        return estimate, "not identified"
+        return number(estimate, 3), "not identified"
     lower, upper = float(parameter["lower"]), float(parameter["upper"])
-    return estimate, "–" if lower != lower else f"{number(lower, 5)} to {number(upper, 5)}"
+    return number(estimate, 5), "–" if lower != lower else f"{number(lower, 5)} to {number(upper, 5)}"
 
 
 def unidentified_notes(dataset: xr.Dataset) -> list[str]:
