@@ -127,8 +127,8 @@ def read_cells(
 ) -> tuple[list[float | str], list[tuple[int, str]]]:
     """Convert cells to SI units or to names of materials; text without a unit is a number only with `is_text`.
 
-    Returns also problems: the index of a cell, and a message. Cells that are wrong for one reason are one, that of
-    the first.
+    Returns also problems: the index of a cell, and a message. Cells with the same fault are a single problem, that
+    of the first cell.
     """
     values: list[float | str] = []
     problems: dict[str, tuple[int, str]] = {}

@@ -107,8 +107,11 @@ def select(dataset: xr.Dataset, sel: Mapping[str, object]) -> xr.Dataset:
             raise UsageError(f"no {name} = {plain} {at}; {shown}")
         masks[dim] = same
     # a value of the axis itself selects the first of those that differ by rounding
-    one = {dim: dim in sel or np.count_nonzero(same) == 1 for dim, same in masks.items()}
-    return dataset.isel({dim: int(np.argmax(m)) if one[dim] else np.flatnonzero(m) for dim, m in masks.items()})
+    positions: dict[Hashable, int | IndexArray] = {
+        dim: int(np.argmax(same)) if dim in sel or np.count_nonzero(same) == 1 else np.flatnonzero(same)
+        for dim, same in masks.items()
+    }
+    return dataset.isel(positions)
 
 
 def in_si(coordinate: xr.DataArray, value: float | str) -> float | str:
