@@ -37,6 +37,10 @@ class History:
     [N s] are the impulses of approach and restitution, `W_c` and `W_r` [J] the works done against the force in
     them (the latter negative), by quadrature of the force. `e_kinetic` is tau_r/tau_c, equation (2), and
     `e_energetic` the root of -W_r/W_c, equation (3).
+
+    Of an oblique impact there are also `slip` [m/s] and `f`, the friction force on ball 2 [N]. `mode` is 0 while
+    the contact sticks, and the sign of the friction force while it slides; 2 or -2 where the force of the spring
+    follows its limit without sliding.
     """
 
     t: Array
@@ -53,37 +57,41 @@ class History:
     W_r: float
     e_kinetic: float
     e_energetic: float
+    slip: Array | None = None
+    f: Array | None = None
+    mode: NDArray[np.int8] | None = None
 
 
-@dataclass(frozen=True)
-class SlipHistory:
-    """The slip [m/s] and the friction force on ball 2 [N] over the times of a `History`, arrays of shape (k,).
-
-    `mode` is 0 while the contact sticks, and the sign of the friction force while it slides; 2 or -2 where the
-    force of the spring follows its limit without sliding.
-    """
-
-    slip: Array
-    f: Array
-    mode: NDArray[np.int8]
-
-
-def history_of(recorded: RecordedMotion, impacts: Impacts, times: int | Array | None = None) -> History | None:
+def history_of(
+    recorded: RecordedMotion,
+    impacts: Impacts,
+    times: int | None = None,
+    oblique: ObliqueImpacts | None = None,
+    recorded_slip: Sequence[RecordedSlip] = (),
+) -> History | None:
     """Find the history of one impact (a batch of length one) from its motion; None if the balls do not separate.
 
-    `times` is the number of uniform points in time, or increasing times in the contact's own unit; by default
-    there are SAMPLES_PER_STEP per step.
+    `times` is the number of uniform points in time; by default there are SAMPLES_PER_STEP per step, of the joint
+    motion where it has a slip. That by Coulomb's friction is of every slip, and has none of its own.
+    `recorded_slip` is empty without slip or friction.
     """
     law, params, phases = recorded
     params, back_params = (tuple(column[:1] for column in columns) for columns in (params, phases.params))
     if phases.restitution is None or phases.status[0] != Status.OK:
         return None
+    # without params, of which the phases may have different numbers
+    joint_steps = [replace(step, params=()) for part in recorded_slip for step in part.steps]
+    has_slip = bool(recorded_slip) and recorded_slip[0].phase.form.kind != "coulomb"
     peak_time, duration = (float(phase.state[2, 0]) for phase in (phases.approach, phases.restitution))
     approach_times = restitution_times = None
-    if times is not None:
-        uniform = np.linspace(0.0, peak_time + duration, times) if isinstance(times, int) else times
-        approach_times = uniform[uniform <= peak_time]
-        restitution_times = np.minimum(uniform[uniform > peak_time] - peak_time, duration)
+    if times is not None or has_slip:
+        if times is not None:
+            grid = np.linspace(0.0, peak_time + duration, times)
+        else:
+            numbers, fractions = _fractions(joint_steps)
+            grid = np.maximum.accumulate(Step.each(joint_steps, numbers).at(fractions)[TIME_ROW])
+        approach_times = grid[grid <= peak_time]
+        restitution_times = np.minimum(grid[grid > peak_time] - peak_time, duration)
     problem, steps = motion.approach_problem(law), phases.approach.recorded
     approach, tau_c, W_c = _phase(law, problem, steps, params, approach_times)
     back_law = motion.restitution_law(law)
@@ -98,7 +106,7 @@ def history_of(recorded: RecordedMotion, impacts: Impacts, times: int | Array | 
     t, delta, v, force = (row[t < next_times] for row in (t, delta, v, force))
     momentum, energy = (impacts.m * impacts.v0).item(), impacts.energy.item()
     mass_share1, mass_share2 = impacts.m / impacts.m1, impacts.m / impacts.m2
-    return History(
+    history = History(
         t=t,
         delta=delta,
         v=v,
@@ -114,42 +122,19 @@ def history_of(recorded: RecordedMotion, impacts: Impacts, times: int | Array | 
         e_kinetic=tau_r / tau_c,
         e_energetic=math.sqrt(-W_r / W_c) if W_r <= 0.0 else math.nan,
     )
+    if oblique is None:
+        return history
+    if has_slip:
+        return _with_slip(history, oblique, recorded_slip, joint_steps)
+    return _with_sliding(history, oblique, recorded_slip)
 
 
-def oblique_history_of(
-    recorded: RecordedMotion,
-    recorded_slip: Sequence[RecordedSlip],
-    oblique: ObliqueImpacts,
-    times: int | None = None,
-) -> tuple[History | None, SlipHistory | None]:
-    """Find the history of one impact (a batch of length one), and slip and friction over it.
-
-    `recorded_slip` is empty without slip or friction. Without `times` there are SAMPLES_PER_STEP per step of the
-    joint motion; that by Coulomb's friction is of every slip, and has none of its own.
-    """
-    has_slip = bool(recorded_slip) and recorded_slip[0].phase.form.kind != "coulomb"
-    grid: int | Array | None = times
-    if times is None and has_slip:
-        steps = _all_steps(recorded_slip)
-        numbers, fractions = _fractions(steps)
-        grid = np.maximum.accumulate(Step.each(steps, numbers).at(fractions)[TIME_ROW])
-    history = history_of(recorded, oblique.impacts, grid)
-    if history is None:
-        return None, None
-    slip_history = _slip_history if has_slip else _coulomb_history
-    return history, slip_history(history, oblique, recorded_slip)
-
-
-def _all_steps(recorded: Sequence[RecordedSlip]) -> list[Step]:
-    """List the steps of all phases, without their params, of which the phases may have different numbers."""
-    return [replace(step, params=()) for part in recorded for step in part.steps]
-
-
-def _slip_history(history: History, oblique: ObliqueImpacts, recorded: Sequence[RecordedSlip]) -> SlipHistory:
-    """Find slip and friction of an impact over the times of its history, from the steps of the joint motion."""
-    impacts, g0 = oblique.impacts, oblique.slip.item()
-    unit_t = impacts.time.item()
-    numbers, fractions = _fractions_at(_all_steps(recorded), history.t / unit_t, TIME_ROW)
+def _with_slip(
+    history: History, oblique: ObliqueImpacts, recorded: Sequence[RecordedSlip], steps: Sequence[Step]
+) -> History:
+    """Add slip and friction, from the joint motion and the steps of all its phases."""
+    g0, unit_t = oblique.slip.item(), oblique.impacts.time.item()
+    numbers, fractions = _fractions_at(steps, history.t / unit_t, TIME_ROW)
     rows: list[Array] = []
     first = 0
     for part in recorded:
@@ -166,11 +151,12 @@ def _slip_history(history: History, oblique: ObliqueImpacts, recorded: Sequence[
     slip, force, mode = np.concatenate(rows, axis=1)
     if recorded[0].phase.form.kind == "regularized":
         mode = np.sign(slip)
-    return SlipHistory(g0 * slip, oblique.m_t.item() * g0 / unit_t * force, (np.sign(g0) * mode).astype(np.int8))
+    f, mode = oblique.m_t.item() * g0 / unit_t * force, (np.sign(g0) * mode).astype(np.int8)
+    return replace(history, slip=g0 * slip, f=f, mode=mode)
 
 
-def _coulomb_history(history: History, oblique: ObliqueImpacts, recorded: Sequence[RecordedSlip]) -> SlipHistory:
-    """Slip until the impulse of the limiting normal force has stopped it; the slip stays without friction."""
+def _with_sliding(history: History, oblique: ObliqueImpacts, recorded: Sequence[RecordedSlip]) -> History:
+    """Add slip until the impulse of the limiting normal force has stopped it; it stays without friction."""
     m_t, mu, g0 = oblique.m_t.item(), oblique.mu.item(), oblique.slip.item()
     sliding_impulse, is_positive = 0.0, False
     if recorded:
@@ -185,9 +171,8 @@ def _coulomb_history(history: History, oblique: ObliqueImpacts, recorded: Sequen
     slip = np.maximum(np.abs(g0) - total / m_t * impulses / impulses[-1], 0.0)
     slides = (slip > 0.0) | ((mu == 0.0) & (g0 != 0.0))
     sign = np.sign(g0)
-    return SlipHistory(
-        sign * slip, np.where(slides, sign * limit, 0.0), np.where(slides, sign, 0.0).astype(np.int8)
-    )
+    f, mode = (np.where(slides, sign * size, 0.0) for size in (limit, 1.0))
+    return replace(history, slip=sign * slip, f=f, mode=mode.astype(np.int8))
 
 
 def _phase(

@@ -242,5 +242,3 @@ HISTORY = by_name(
         dtype="i1",
     ),
 )
-# those of oblique impacts only
-SLIP_HISTORY = ("slip", "f", "mode")

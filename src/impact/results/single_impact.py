@@ -28,7 +28,7 @@ from ..contact.fixed_step import EXACT
 from ..contact.force_expressions import unload_to_residual, unload_with_stiffness
 from ..contact.friction import FrictionLaw, Pair
 from ..contact.frictions import find_friction
-from ..contact.history import History, SlipHistory, history_of, oblique_history_of
+from ..contact.history import History, history_of
 from ..contact.impacts import Impacts
 from ..contact.materials import Material
 from ..contact.model import ForceModel, with_base_quantities
@@ -38,7 +38,7 @@ from ..contact.simulate import RecordedMotion
 from ..contact.status import FIRST_FAILURE, FrictionStatus, Status
 from ..contact.tangential import RecordedSlip
 from ..contact.units import with_numbers
-from ..contact.variables import CENTRAL_OUTPUTS, HISTORY, LAW_DIMS, OUTPUTS, SLIP_HISTORY, Variable
+from ..contact.variables import CENTRAL_OUTPUTS, HISTORY, LAW_DIMS, OUTPUTS, Variable
 from ..display import Block, Displayed, Styled, Table
 from ..engine.inputs import build_impacts, build_oblique, fixed_steps_at, input_at
 from ..engine.plan import Plan
@@ -383,13 +383,10 @@ def run_single_impact(plan: Plan, first: tuple[str, ...], times: int | None = No
     )
     values = {name: array[0].item() for name, array in collision.items()}
     warn(*errors.values())
-    history = slip = None
+    history = None
     has_slip = values.get("friction_status", FrictionStatus.OK) < FIRST_FAILURE
     if values["status"] == Status.OK and recorded and has_slip:
-        if oblique:
-            history, slip = oblique_history_of(recorded[0], recorded_slip, oblique[1], times)
-        else:
-            history = history_of(recorded[0], impacts, times)
+        history = history_of(recorded[0], impacts, times, oblique and oblique[1], recorded_slip)
     v0 = impacts.v0[0].item()
     # a law may have its own n, which replaces that of the config
     point = with_words({**config.scalars, "n": impacts.n[0].item()})
@@ -413,7 +410,7 @@ def run_single_impact(plan: Plan, first: tuple[str, ...], times: int | None = No
         e_kinematic=(values["v2_post"] - values["v1_post"]) / v0 if v0 > 0.0 else float("nan"),
         e_kinetic=history.e_kinetic if history else values["e_kinetic"],
         e_energetic=history.e_energetic if history else values["e_energetic"],
-        history=history_dataset(history, plan, point, slip) if history else None,
+        history=history_dataset(history, plan, point) if history else None,
         friction=config.frictions[0] if config.frictions else None,
         rtol=solver.rtol,
     )
@@ -442,16 +439,13 @@ def _derived_quantities(
     return {name: quantities.get(name, math.nan) for name, _, _ in DERIVED_QUANTITIES}
 
 
-def history_dataset(
-    history: History, plan: Plan, point: Mapping[str, float | str], slip: SlipHistory | None = None
-) -> xr.Dataset:
+def history_dataset(history: History, plan: Plan, point: Mapping[str, float | str]) -> xr.Dataset:
     """Build the dataset of a time history over t, with the inputs and masses of the impact as an attribute."""
     masses = {name: input_at(plan.inputs, name, plan.inputs.index()).item() for name in ("m1", "m2")}
-    laws = {"model": plan.models[0].key, **({"friction": plan.frictions[0].key} if slip else {})}
-    names = [name for name in HISTORY if slip or name not in SLIP_HISTORY]
-    arrays = {name: getattr(slip if name in SLIP_HISTORY else history, name) for name in names}
+    laws = {"model": plan.models[0].key, **({"friction": plan.frictions[0].key} if plan.frictions else {})}
+    arrays = {name: getattr(history, name) for name in HISTORY}
     dataset = xr.Dataset(
-        {name: ("t", array, attributes_of(HISTORY[name])) for name, array in arrays.items()},
+        {name: ("t", a, attributes_of(HISTORY[name])) for name, a in arrays.items() if a is not None},
         coords={"t": ("t", history.t, {"units": "s", "long_name": "time since first contact"}), **laws},
     )
     dataset.attrs = {
