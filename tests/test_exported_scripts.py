@@ -418,7 +418,7 @@ def test_printed_spins_are_those_of_the_impulse_of_friction(name: str) -> None:
     assert list(printed) == ["beta", "omega1", "omega2", "e_out"]
     oblique = problem.law.oblique
     assert oblique is not None
-    impulse = (oblique.impact.m_t * oblique.impact.slip).item() * (1.0 + printed["beta"])
+    impulse = (oblique.m_t * oblique.slip).item() * (1.0 + printed["beta"])
     for ball in ("1", "2"):
         change = 2.5 * impulse / (collision[f"m{ball}"] * collision[f"R{ball}"])
         assert collision[f"omega{ball}"] - printed[f"omega{ball}"] == pytest.approx(change, rel=0.02)

@@ -69,13 +69,13 @@ def _compute(name: str, computed: dict[str, Any]) -> Any:
 
 
 def collide(
-    model: ForceModel,
+    law: ForceModel | Pair,
     impacts: Impacts,
     *,
     fixed_step: Mapping[str, Array] | None = None,
     errors: dict[str, str] | None = None,
     names: Iterable[str] = CENTRAL_OUTPUTS,
-    oblique: tuple[Pair, ObliqueImpacts] | None = None,
+    oblique: ObliqueImpacts | None = None,
     compute: ComputeCollisions | None = None,
     recorded: list[RecordedMotion] | None = None,
     recorded_slip: list[RecordedSlip] | None = None,
@@ -94,27 +94,27 @@ def collide(
     errors : receives a line for each distinct error of the law, see `impact.contact.formula_calls.describe_error`
     compute, recorded : see `impact.contact.simulate.simulate`
     recorded_slip : see `impact.contact.tangential.simulate_friction`
-    oblique : the model with a friction law, and the tangential inputs of the impacts, for outputs of friction
+    oblique : the tangential inputs of the impacts, for outputs of a pair of laws; without it friction is left out
     """
+    model = law.model if isinstance(law, Pair) else law
     with np.errstate(all="ignore"):
         values, checked = dimensionless_values(model, impacts), check_inputs(model, impacts)
-        of_friction = friction_values(*oblique) if oblique is not None else {}
+        of_friction = friction_values(law, oblique) if isinstance(law, Pair) and oblique is not None else {}
     values |= fixed_step or {}
     columns = values | of_friction
     normal = columns if settings.get("integrator") == MUJOCO_CONE else values
     result = simulate(
         model, impacts.n, normal, checked, errors=errors, compute=compute, recorded=recorded, **settings
     )
-    if oblique is None:
+    if oblique is None or not isinstance(law, Pair):
         return outputs(model, impacts, result, names, checked)
-    pair, inputs = oblique
     with np.errstate(all="ignore"):
-        status = np.where(checked == STATUS_OK, check_friction(pair, inputs), checked).astype(np.int8)
+        status = np.where(checked == STATUS_OK, check_friction(law, oblique), checked).astype(np.int8)
     shape = np.broadcast_shapes(impacts.n.shape, status.shape, *(column.shape for column in columns.values()))
     n, status = np.broadcast_to(impacts.n, shape), np.broadcast_to(status, shape)
     columns = {name: np.broadcast_to(column, shape) for name, column in columns.items()}
-    tangential = simulate_friction(pair, n, columns, status, errors=errors, recorded=recorded_slip, **settings)
-    return outputs(model, impacts, result, names, checked, (inputs, tangential, pair.friction.kind))
+    tangential = simulate_friction(law, n, columns, status, errors=errors, recorded=recorded_slip, **settings)
+    return outputs(model, impacts, result, names, checked, (oblique, tangential, law.friction.kind))
 
 
 # ---- outputs; the arguments of each function are names of FORMULAS

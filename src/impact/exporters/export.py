@@ -331,12 +331,12 @@ def _header(
         spread = f"{decimals(row.e_least)} to {decimals(row.e_largest)} by the phase in the step"
         delivered = row.failure(law.phases) if row.failed else f"mean e {decimals(row.e_mean)}, {spread}"
         yield f"{steps}: {delivered} ({law.scheme})"
-        if law.oblique is not None and not row.failed:
+        if law.friction and not row.failed:
             spread = f"{decimals(row.beta_least)} to {decimals(row.beta_largest)}"
             # without slip there is no beta
             has_slip = row.beta_mean == row.beta_mean
             delivered = f"mean beta {decimals(row.beta_mean)}, {spread}" if has_slip else "no beta without slip"
-            yield f"friction: {law.oblique.pair.friction.key}, {delivered}"
+            yield f"friction: {law.friction}, {delivered}"
         if row.e_to_ask == row.e_to_ask:
             yield f"a mean of {number(problem.requested_e)} at this dt: enter e = {decimals(row.e_to_ask)}"
         if advised is not None:

@@ -6,9 +6,11 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+from ..array_types import Array
 from ..config.draft import Overrides, Setting
 from ..config.load import Config
 from ..config.tables import SWEEP_QUANTITIES
+from ..contact.friction import FrictionLaw, Pair
 from ..contact.frictions import find_friction
 from ..contact.impacts import INPUTS, Impacts
 from ..contact.model import ForceModel
@@ -19,7 +21,7 @@ from ..engine.plugins import Plugins
 from ..errors import UsageError, did_you_mean
 from ..formatting import argument, law_keys, number, quantity
 from ..inverse.solve import PointWithE, point_with_e, warn_of_point
-from ..inverse.timestep import FixedStepLaw, ObliqueLaw, fixed_step_law
+from ..inverse.timestep import FixedStepLaw, fixed_step_law
 from ..results.calibration import position_of_law, unidentified_notes
 from ..results.single_impact import Calibration, ConfigSource, PointSource, open_source
 from .code import Code, Collision
@@ -83,8 +85,8 @@ class ExportProblem:
                 values[name] = math.inf if is_wall else RADIUS_PER_PEAK * self.law.continuous["peak_indentation"]
         oblique = self.law.oblique
         if oblique is not None:
-            values |= {name: float(getattr(oblique.impact, name).item()) for name in OBLIQUE_VALUES}
-            values |= {name: float(value.item()) for name, value in oblique.impact.parameters.items()}
+            values |= {name: float(getattr(oblique, name).item()) for name in OBLIQUE_VALUES}
+            values |= {name: float(value.item()) for name, value in oblique.parameters.items()}
         names = self.point.config.scalars
         material1, material2 = (
             str(names.get(f"material{ball}", names.get("material", ""))) for ball in ("1", "2")
@@ -98,7 +100,7 @@ class ExportProblem:
             has_wall=self.has_wall,
             dt=dt,
             gap=(STEPS_BEFORE - phase) * dt * values["v0"],
-            friction=oblique.pair.friction.key if oblique else "",
+            friction=self.law.friction,
             steps=STEPS_BEFORE + math.ceil(CONTACTS_RUN * self.law.contact_time / dt),
         )
 
@@ -148,8 +150,8 @@ def prepare_export(
     scheme = (find_friction(chosen).scheme if chosen else "") or code.scheme
     fixed = fixed_step_law(point.config, PHASES, scheme, of_friction=chosen is not None)
     warn_of_point(point_source, point, fixed.impact, fixed.continuous)
-    if fixed.oblique is not None:
-        _check_limit(code, fixed.oblique)
+    if isinstance(fixed.law, Pair) and fixed.oblique is not None:
+        _check_limit(code, fixed.law.friction, fixed.oblique.parameters.get("limit"))
     better_fit = ""
     if calibration := point_source.calibration:
         better_fit, fit_notes = _fit_notes(code, version, key, calibration)
@@ -201,9 +203,8 @@ def _choose_friction(
     return chosen, () if chosen else tuple(keys)
 
 
-def _check_limit(code: Code, oblique: ObliqueLaw) -> None:
+def _check_limit(code: Code, law: FrictionLaw, limit: Array | None) -> None:
     """Refuse the other normal force that limits friction; that of `coulomb-1785` is taken of any code."""
-    law, limit = oblique.pair.friction, oblique.impact.parameters.get("limit")
     if law.kind == "coulomb" or limit is None:
         return
     words = next(parameter.choices for parameter in law.parameters if parameter.name == "limit")

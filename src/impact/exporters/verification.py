@@ -200,8 +200,8 @@ def _with_friction(
     assert oblique is not None
     (predicted,) = problem.law.outputs(steps, "beta")
     exact, impact = verification.uncertainty, problem.law.impact
-    v0, slip = float(impact.v0[0]), float(oblique.impact.slip.item())
-    tangential = float((oblique.impact.u1 - oblique.impact.u2).item())
+    v0, slip = float(impact.v0[0]), float(oblique.slip.item())
+    tangential = float((oblique.u1 - oblique.u2).item())
     speed = math.hypot(v0, tangential)
     # a law that needs no radius may have none in its impact
     collision = problem.collision(float(steps[0]), 0.5)

@@ -73,17 +73,14 @@ def outputs_at(
     index = inputs.index()
     impacts = build_impacts(inputs, model, index).broadcast()
     steps = fixed_steps_at(inputs, impacts, index)
-    oblique = None
-    if isinstance(law, Pair):
-        oblique = law, build_oblique(inputs, impacts, index, law.friction)
     errors: dict[str, str] = {}
     outputs = collide(
-        model,
+        law,
         impacts,
         fixed_step={name: np.broadcast_to(values, impacts.n.shape) for name, values in steps.items()},
         errors=errors,
         names=names,
-        oblique=oblique,
+        oblique=build_oblique(inputs, impacts, index, law.friction) if isinstance(law, Pair) else None,
         compute=compute,
         **asdict(config.solver),
     )

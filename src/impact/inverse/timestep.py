@@ -16,7 +16,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cache, partial
 from pathlib import Path
-from typing import Any, NamedTuple, SupportsFloat
+from typing import Any, SupportsFloat
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -54,6 +54,7 @@ from ..display import Block, Displayed, Table
 from ..engine.inputs import build_impacts, build_oblique, rayleigh_time_at
 from ..engine.plan import Plan
 from ..engine.plugins import read_plugins
+from ..engine.trajectories import PlanLaw, model_of
 from ..errors import ModelError, UsageError
 from ..formatting import argument, decimals, law_name, number, quantity, rounded
 from ..results.single_impact import open_source
@@ -379,16 +380,9 @@ def timestep(
         parameter=parameter or "",
         needed_parameter=found,
         rayleigh_time=law.rayleigh_time,
-        friction=law.oblique.pair.friction.key if law.oblique else "",
+        friction=law.friction,
         beta_continuous=law.continuous.get("beta", math.nan),
     )
-
-
-class ObliqueLaw(NamedTuple):
-    """A pair of laws, and the inputs of one oblique impact."""
-
-    pair: Pair
-    impact: ObliqueImpacts
 
 
 @dataclass(frozen=True)
@@ -397,18 +391,28 @@ class FixedStepLaw:
 
     Parameters
     ----------
+    law : the model, or its pair with a friction law, which has the tangential inputs `oblique`
     continuous : outputs of the continuous law by name, in SI
     rayleigh_time : the smaller one of both balls [s]
     """
 
     config: Config
-    model: ForceModel
+    law: PlanLaw
     impact: Impacts
+    oblique: ObliqueImpacts | None
     continuous: Mapping[str, float]
     phases: int
     scheme: str
     rayleigh_time: float
-    oblique: ObliqueLaw | None = None
+
+    @property
+    def model(self) -> ForceModel:
+        return model_of(self.law)
+
+    @property
+    def friction(self) -> str:
+        """The key of the friction law; "" without one."""
+        return self.law.friction.key if isinstance(self.law, Pair) else ""
 
     @property
     def contact_time(self) -> float:
@@ -433,10 +437,9 @@ class FixedStepLaw:
         """Compute outputs by name at steps dt [s] with the e to ask for at each, of shape (k, phases)."""
         step, phase = np.repeat(dt / self.impact.time, self.phases), (np.arange(self.phases) + 0.5) / self.phases
         impact = self.impact if e is None else replace(self.impact, e=np.repeat(e, self.phases))
-        impact, oblique = impact.broadcast(step.shape), None
+        impact = impact.broadcast(step.shape)
         # friction is not integrated for what does not depend on it
-        if self.oblique is not None and (self.is_coupled or "beta" in names):
-            oblique = ObliqueLaw(self.oblique.pair, replace(self.oblique.impact, impacts=impact))
+        oblique = self.oblique if self.is_coupled or "beta" in names else None
         fixed_step = {
             simulate.STEP: step,
             simulate.STEPS_PER_CONTACT: np.full(step.shape, self.contact_time / dt.min()),
@@ -444,7 +447,7 @@ class FixedStepLaw:
         }
         errors: dict[str, str] = {}
         outputs = collide(
-            self.model,
+            self.law,
             impact,
             rtol=DEFAULT_RTOL,
             # the steps in a contact limit their number
@@ -454,7 +457,7 @@ class FixedStepLaw:
             fixed_step=fixed_step,
             errors=errors,
             names=names,
-            oblique=oblique,
+            oblique=oblique and replace(oblique, impacts=impact),
         )
         for error in errors.values():
             raise ModelError(error)
@@ -716,31 +719,31 @@ def fixed_step_law(
     config: Config, phases: int, scheme: str | None = None, *, of_friction: bool = False
 ) -> FixedStepLaw:
     """Build the law and impact of a config without axes; its friction law is left out unless it is asked for."""
-    plan = Plan(config)
-    model = config.models[0]
+    plan = Plan(config if of_friction else replace(config, frictions=()))
+    model, law = plan.models[0], plan.laws[-1]
     impact = build_impacts(plan.inputs, model, ())
-    law = config.frictions[0] if of_friction and config.frictions else None
+    friction = law.friction if isinstance(law, Pair) else None
     if scheme is None:
-        scheme = (law.scheme if law else "") or default_scheme(model)
+        scheme = (friction.scheme if friction else "") or default_scheme(model)
     check_scheme(model, float(impact.n[0]), scheme)
     oblique = None
-    if law is not None:
-        if problem := friction_problem(law.key, law.kind, scheme):
+    if friction is not None:
+        if problem := friction_problem(friction.key, friction.kind, scheme):
             raise UsageError(problem)
-        oblique = ObliqueLaw(Pair(model, law), build_oblique(plan.inputs, impact, (), law))
-    continuous = oblique if law is not None and not law.scheme else None
+        oblique = build_oblique(plan.inputs, impact, (), friction)
+    continuous = oblique if friction is not None and not friction.scheme else None
     names = (*CENTRAL_OUTPUTS, *(("beta", "friction_status") if continuous else ()))
     rtol, max_steps = config.solver.rtol, config.solver.max_steps
-    outputs = collide(model, impact, rtol=rtol, max_steps=max_steps, names=names, oblique=continuous)
+    outputs = collide(law, impact, rtol=rtol, max_steps=max_steps, names=names, oblique=continuous)
     values = {name: array.ravel()[0].item() for name, array in outputs.items()}
     status = Status(values["status"])
     if status != Status.OK:
         raise UsageError(f"{model.key} has no rebound at these inputs: {status.meaning}")
     friction_status = FrictionStatus(values.get("friction_status", FrictionStatus.OK))
-    if friction_status >= FIRST_FAILURE and oblique is not None:
-        raise UsageError(f"{oblique.pair.key} has no answer at these inputs: {friction_status.meaning}")
+    if friction_status >= FIRST_FAILURE:
+        raise UsageError(f"{law.key} has no answer at these inputs: {friction_status.meaning}")
     wave_time = float(rayleigh_time_at(plan.inputs, ()).item()) if _takes_moduli(config, model) else math.nan
-    return FixedStepLaw(config, model, impact, values, phases, scheme, wave_time, oblique)
+    return FixedStepLaw(config, law, impact, oblique, values, phases, scheme, wave_time)
 
 
 def time_steps(contact_time: float, steps_per_contact: Sequence[float], dt: Sequence[float]) -> list[float]:

@@ -357,13 +357,9 @@ def no_motion(integrator: str) -> str:
 def run_single_impact(plan: Plan, first: tuple[str, ...], times: int | None = None) -> Impact:
     """Integrate the only impact of a plan without axes; `first` names axes of its source at their first value."""
     plan.pair_notes("frictions")
-    config = plan.config
-    law = config.models[0]
-    impacts = build_impacts(plan.inputs, law, ())
-    oblique = None
-    if config.frictions:
-        pair = Pair(law, config.frictions[0])
-        oblique = pair, build_oblique(plan.inputs, impacts, (), pair.friction)
+    config, model, law = plan.config, plan.models[0], plan.laws[-1]
+    impacts = build_impacts(plan.inputs, model, ())
+    oblique = build_oblique(plan.inputs, impacts, (), law.friction) if isinstance(law, Pair) else None
     # what is recorded is not compiled
     solver = replace(config.solver, core="numpy")
     errors: dict[str, str] = {}
@@ -386,18 +382,18 @@ def run_single_impact(plan: Plan, first: tuple[str, ...], times: int | None = No
     history = None
     has_slip = values.get("friction_status", FrictionStatus.OK) < FIRST_FAILURE
     if values["status"] == Status.OK and recorded and has_slip:
-        history = history_of(recorded[0], impacts, times, oblique and oblique[1], recorded_slip)
+        history = history_of(recorded[0], impacts, times, oblique, recorded_slip)
     v0 = impacts.v0[0].item()
     # a law may have its own n, which replaces that of the config
     point = with_words({**config.scalars, "n": impacts.n[0].item()})
     if "alpha" in config.scalars:
         point["e"] = impacts.e[0].item()
-    derived = _derived_quantities(law, impacts, values, history)
+    derived = _derived_quantities(model, impacts, values, history)
     if oblique:
-        tangential = {name: getattr(oblique[1], name).item() for name in ("u1", "slip", "m_t")}
+        tangential = {name: getattr(oblique, name).item() for name in ("u1", "slip", "m_t")}
         derived |= {"v1": impacts.v1.item(), **tangential}
     return Impact(
-        model=law,
+        model=model,
         point=point,
         first=first,
         values=values,
