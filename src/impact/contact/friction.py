@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ..array_types import Array, Mask
 from ..errors import ModelError
-from ..formatting import law_name
+from ..formatting import law_name, number
 from . import fixed_step_slip
 from .closed_forms.dashpot import gap_damping
 from .dimensionless import LawValues, dimensionless_values, with_coefficients, with_units
@@ -41,6 +41,8 @@ StiffnessRule = Literal["", "constant", "mindlin", "liggghts", "kratos", "classi
 # Kratos does, by the damping ratio of the contact force; c_t; as MuJoCo does, b_t and the impedance
 DampingRule = Literal["", "xt", "liggghts", "betas", "kratos", "c_t", "cone"]
 HERTZ = 1.5
+# the exponents of the contact forces whose stiffness is kt_over_kn times a tangential one, or goes with 8 G* a
+EXPONENTS = {"constant": (1.0,), "mindlin": (HERTZ,), "liggghts": (1.0, HERTZ)}
 # the parameters that set the stiffness of the tangential spring
 STIFFNESS_PARAMETERS = ("k_t", "kt_over_kn")
 
@@ -187,11 +189,10 @@ def check_friction(pair: Pair, oblique: ObliqueImpacts) -> NDArray[np.int8]:
     one without it, and an e outside [0, 1] from which a damping is computed, OUT_OF_RANGE where a stiffness or a
     damping is NaN; an infinite one may be that of a limit of the normal motion, and is judged after that.
     """
-    law = pair.friction
     status = np.full((1,) * max(1, len(oblique.impacts.shape)), FrictionStatus.OK, np.int8)
     for value in _spring_values(pair, oblique).values():
         status = replace_where(status, ~(value >= 0.0), np.int8(FrictionStatus.OUT_OF_RANGE))
-    for mask in _invalid(law, oblique):
+    for mask in _invalid(pair.friction, oblique):
         status = replace_where(status, mask, np.int8(FrictionStatus.INVALID_PARAMETER))
     for mask, _ in _problems(pair, oblique):
         status = replace_where(status, mask, np.int8(FrictionStatus.NOT_COMBINABLE))
@@ -394,16 +395,13 @@ def _problems(pair: Pair, oblique: ObliqueImpacts) -> Iterator[tuple[Mask, str]]
         with suppress(ModelError):
             pulls = _force_at_first_contact(model, oblique.impacts) < 0.0
             yield pulls & ~is_allowed, f"the contact force pulls from the start: {expected}"
+    exponents = EXPONENTS.get(law.stiffness, ())
+    is_other, numbers = ~np.isin(n, exponents), " or ".join(map(number, exponents))
     if _parameter(law, oblique, "kt_over_kn") is not None:
-        is_other = (
-            ~np.isin(n, (1.0, HERTZ)) if law.stiffness == "liggghts" else n != 1.0 + _stiffness_power(law, 1.0)
-        )
-        expected = {"constant": "1", "mindlin": "1.5", "liggghts": "1 or 1.5"}[law.stiffness]
-        yield is_other, f"kt_over_kn needs a contact force of n = {expected}"
+        yield is_other, f"kt_over_kn needs a contact force of n = {numbers}"
     elif law.stiffness in ("mindlin", "liggghts") and _parameter(law, oblique, "k_t") is None:
-        is_linear = n == 1.0 if law.stiffness == "liggghts" else np.zeros_like(n, bool)
-        numbers = "1 or 1.5" if law.stiffness == "liggghts" else "1.5; set k_t"
-        yield ~(is_linear | (n == HERTZ)), f"8 G* a needs a contact force of n = {numbers}"
+        advice = "; set k_t" if law.stiffness == "mindlin" else ""
+        yield is_other, f"8 G* a needs a contact force of n = {numbers}{advice}"
         if model.unloading is not None or model.is_permanent:
             needed = "a contact force without permanent indentation and without unloading branch"
             yield n == HERTZ, f"8 G* a needs {needed}"
