@@ -9,7 +9,7 @@ from dataclasses import replace
 from ..contact.dimensionless import required_quantities
 from ..contact.fixed_step import EXACT, SCHEMES, friction_problem, has_scheme, law_problem
 from ..contact.formula_calls import argument_names
-from ..contact.friction import FrictionLaw, parameter_problem, required_inputs
+from ..contact.friction import parameter_problem, required_inputs
 from ..contact.frictions import frictions
 from ..contact.materials import hertz_stiffness
 from ..contact.model import ForceModel, with_base_quantities
@@ -295,8 +295,12 @@ def _friction_problems(draft: Draft) -> Iterable[ConfigProblem]:
     has_material = "material" in sweep or {"material1", "material2"} <= sweep.keys()
     for law in draft.frictions:
         given = as_table(draft.table("friction").get(law.key)).keys()
-        problem = _tangential_stiffness_problem(draft, law)
-        if problem:
+        problems = (
+            parameter_problem(law, given, n=n, has_stiffness=_has_stiffness(draft, model))
+            for model in draft.models
+            for n in _exponents(draft, model)
+        )
+        if problem := next(filter(None, problems), ""):
             name, _, message = problem.partition(": ")
             yield ("friction", law.key, name), message
         needed = required_inputs(law, given, exponents)
@@ -318,16 +322,9 @@ def _exponents(draft: Draft, model: ForceModel) -> Sequence[float]:
     return _numbers(draft, "n") or (SWEEP_DEFAULTS["n"],)
 
 
-def _tangential_stiffness_problem(draft: Draft, law: FrictionLaw) -> str:
-    """Name what is wrong with the tangential stiffness of a friction law with any of the models, or return ""."""
-    given = as_table(draft.table("friction").get(law.key)).keys()
-    for model in draft.models:
-        has_stiffness = "K" in draft.table("sweep") or _sets_stiffness(draft, model)
-        for n in _exponents(draft, model):
-            problem = parameter_problem(law, given, n=n, has_stiffness=has_stiffness)
-            if problem:
-                return problem
-    return ""
+def _has_stiffness(draft: Draft, model: ForceModel) -> bool:
+    """Whether the config has the K of a model."""
+    return "K" in draft.table("sweep") or _sets_stiffness(draft, model)
 
 
 def _stiffness_arguments(model: ForceModel) -> frozenset[str]:
@@ -337,8 +334,7 @@ def _stiffness_arguments(model: ForceModel) -> frozenset[str]:
 
 def _depends_on(model: ForceModel, draft: Draft) -> set[str]:
     """List the quantities that a model needs in a sweep, including those of its stiffness."""
-    has_stiffness = "K" in draft.table("sweep") or _sets_stiffness(draft, model)
-    stiffness = () if has_stiffness else _stiffness_arguments(model)
+    stiffness = () if _has_stiffness(draft, model) else _stiffness_arguments(model)
     return {*with_base_quantities(required_quantities(model)), *model.domain, *stiffness}
 
 

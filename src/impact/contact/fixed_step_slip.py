@@ -89,8 +89,7 @@ class FixedStepSlip:
 
     def take(self, rows: NDArray[Any]) -> FixedStepSlip:
         """Take some of the contacts."""
-        columns = (getattr(self, field.name) for field in fields(self)[1:])
-        return FixedStepSlip(self.form, *(column[rows] for column in columns))
+        return FixedStepSlip(self.form, *(getattr(self, field.name)[rows] for field in fields(self)[1:]))
 
     def put(self, rows: NDArray[Any], part: FixedStepSlip) -> None:
         """Write contacts that have ended to their positions."""
@@ -125,22 +124,16 @@ class FixedStepSlip:
         self.changes = self.changes + ((self.regime != 0) & (slips != self.slipped)).astype(np.int32)
         self.regime, self.slipped = self.regime | np.where(slips, SLIDES, STICKS), slips
 
-    @property
-    def remembers_force(self) -> bool:
-        """Whether z is the force of the spring, not its displacement."""
-        return self.form.memory[0] == 0.0
-
     def _spring(self, x: Array, step: Array) -> Array:
         """Compute the force of the spring in a step, before its limit."""
         form, now = self.form, power(x, self.form.stiffness_power)
         rescaled = form.memory[1] - form.memory[0]
         if rescaled:
-            self.memory = np.where(
-                now < self.last_power, self.memory * power(now / self.last_power, rescaled), self.memory
-            )
+            shrinks = now < self.last_power
+            self.memory = np.where(shrinks, self.memory * power(now / self.last_power, rescaled), self.memory)
         self.last_power = now
         stiffness = self.stiffness * now
-        if self.remembers_force:
+        if form.memory[0] == 0.0:
             return self.memory + step * stiffness * self.slip
         return stiffness * (self.memory + step * self.slip)
 
@@ -156,7 +149,7 @@ class FixedStepSlip:
 
     def _remember(self, spring: Array, slips: Mask) -> None:
         """Keep the force of the spring, or the displacement that belongs to it."""
-        if self.remembers_force:
+        if self.form.memory[0] == 0.0:
             self.memory = spring
             return
         stiffness = self.stiffness * self.last_power

@@ -123,9 +123,9 @@ class Pair:
 
     def form(self, n: float) -> TangentialForm:
         """Find the form of its tangential problems at an exponent n."""
-        law = self.friction
-        stiffness_power = _stiffness_power(law, n)
-        damping_power = 0.0
+        law, damping_power = self.friction, 0.0
+        powers = {"mindlin": 0.5, "classic": 0.5, "liggghts": n - 1.0, "kratos": n - 1.0}
+        stiffness_power = powers.get(law.stiffness, 0.0)
         if law.damping == "betas" or (law.damping == "liggghts" and n == HERTZ):
             damping_power = 0.5 * stiffness_power
         elif law.damping in ("xt", "liggghts", "kratos"):
@@ -277,10 +277,6 @@ def _spring_values(pair: Pair, oblique: ObliqueImpacts) -> dict[str, Array]:
         if law.damping:
             values[fixed_step_slip.TANGENTIAL_DAMPING] = _damping(pair, oblique) / oblique.mass_ratio
     return values
-
-
-def _stiffness_power(law: FrictionLaw, n: float) -> float:
-    return {"mindlin": 0.5, "classic": 0.5, "liggghts": n - 1.0, "kratos": n - 1.0}.get(law.stiffness, 0.0)
 
 
 def _stiffness(pair: Pair, oblique: ObliqueImpacts) -> Array:

@@ -110,9 +110,8 @@ def collide(
         return outputs(model, impacts, result, names, checked)
     with np.errstate(all="ignore"):
         status = np.where(checked == STATUS_OK, check_friction(law, oblique), checked).astype(np.int8)
-    shape = np.broadcast_shapes(impacts.n.shape, status.shape, *(column.shape for column in columns.values()))
-    n, status = np.broadcast_to(impacts.n, shape), np.broadcast_to(status, shape)
-    columns = {name: np.broadcast_to(column, shape) for name, column in columns.items()}
+    n, status, *arrays = np.broadcast_arrays(impacts.n, status, *columns.values())
+    columns = dict(zip(columns, arrays, strict=True))
     tangential = simulate_friction(law, n, columns, status, errors=errors, recorded=recorded_slip, **settings)
     return outputs(model, impacts, result, names, checked, (oblique, tangential, law.friction.kind))
 
