@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..array_types import Array
-from .status import Status
+from .status import Status, StatusWithMeaning
 
 # positions of trajectories; a slice for all of them, so that nothing is copied
 Positions = NDArray[np.intp] | slice
@@ -30,6 +30,8 @@ class Record:
     if TYPE_CHECKING:
         # every record has it, among its own fields
         status: NDArray[np.int8]
+    # what the status may be
+    statuses: ClassVar[type[StatusWithMeaning]]
 
     @classmethod
     def columns(cls) -> tuple[str, ...]:
@@ -88,6 +90,8 @@ class CollisionResult(Record):
     -e_out^2 up to the solver's error; `chi` is the law's damping ratio and `exact` its restitution in closed form,
     NaN for a law without them.
     """
+
+    statuses = Status
 
     e_out: Array
     peak: Array

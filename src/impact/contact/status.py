@@ -52,7 +52,6 @@ class FrictionStatus(StatusWithMeaning):
     NOT_COMBINABLE = 18, "the contact force lacks what the friction law needs"
 
 
-STATUSES, FRICTION_STATUSES = tuple(map(int, Status)), tuple(map(int, FrictionStatus))
 # an array is compared with a plain number eight times as fast as with a member of an enum
 STATUS_OK, NO_IMPACT, LIMIT, FIRST_FAILURE = map(
     int, (Status.OK, Status.NO_IMPACT, Status.LIMIT, Status.NOT_SEPARATED)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,6 +57,8 @@ class TangentialResult(Record):
     is kappa m/m_t, where kappa is that of Maw, Barber and Fawcett, NaN for a kind without a spring. For the kind
     "coulomb" there is only `sliding_impulse`, from which the slip follows, and `exact` is its closed form.
     """
+
+    statuses = FrictionStatus
 
     slip: Array
     sliding_impulse: Array
@@ -191,22 +193,13 @@ def _slip_at_fixed_steps(
         slip=slip,
     )
     status = np.where(is_invalid & (collisions.status == STATUS_OK), Status.OUT_OF_RANGE, collisions.status)
-    has_answer = status == STATUS_OK
-    result = replace(
-        TangentialResult.blank(count),
-        sliding_impulse=np.where(has_answer, slip.impulse, np.nan),
-        steps=collisions.steps,
-        status=status.astype(np.int8),
-    )
-    if form.kind == "coulomb":
-        return result
-    return replace(
-        result,
-        slip=np.where(has_answer, slip.slip, np.nan),
-        regime=np.where(has_answer, slip.regime, np.int8(0)),
-        slip_changes=np.where(has_answer, slip.changes, 0).astype(np.int32),
-        stiffness=slip.stiffness / n if form.kind == "spring" else np.full(count, np.nan),
-    )
+    result = replace(TangentialResult.blank(count), steps=collisions.steps, status=status.astype(np.int8))
+    answers: dict[str, NDArray[Any]] = {"sliding_impulse": slip.impulse}
+    if form.kind != "coulomb":
+        answers |= {"slip": slip.slip, "regime": slip.regime, "slip_changes": slip.changes}
+    for name, column in answers.items():
+        np.copyto(getattr(result, name), column, where=status == STATUS_OK)
+    return replace(result, stiffness=slip.stiffness / n) if form.kind == "spring" else result
 
 
 def _smooth_model(model: ForceModel, form: TangentialForm) -> ForceModel:
@@ -240,12 +233,9 @@ def _integrate(
     def solve(
         law: motion.MotionLaw, problem: Problem, start: Array, params: Params, recovery: simulate.Recovery | None
     ) -> Solution:
-        if recovery is None:
-            columns, rows = (*base, *coefficient), np.vstack([start, np.ones(n), np.zeros(n)])
-        else:
-            columns = tuple(column[recovery.rows] for column in (*base, *coefficient))
-            rows = np.vstack([start, states[0][2:, recovery.rows]])
-        residual = None if recovery is None else recovery.residual
+        index, residual = (slice(None), None) if recovery is None else recovery
+        columns = tuple(column[index] for column in (*base, *coefficient))
+        rows = np.vstack([start, *(states[0][2:, index] if states else (np.ones(n), np.zeros(n)))])
         params, breakpoints = motion.breakpoints(law, params, rows, residual)
         phase = SlipPhase(form, law, problem, len(params), recovery is not None, track, breakpoints)
 

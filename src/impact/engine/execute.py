@@ -25,8 +25,7 @@ from ..contact.models import catalogue
 from ..contact.numba.dispatch import is_installed
 from ..contact.records import Record, positions
 from ..contact.simulate import simulate
-from ..contact.status import FRICTION_STATUSES, STATUSES
-from ..contact.tangential import TangentialResult, simulate_friction
+from ..contact.tangential import simulate_friction
 from ..errors import StoreError, UsageError, warn
 from .executors import ExecutorSpec
 from .plan import Plan
@@ -198,10 +197,10 @@ def _check_integrated(trajectory_range: TrajectoryRange, integrated: object, siz
         raise StoreError(f"{prefix}: got {type(errors).__name__}, expected a dict of errors")
     if misfit := collisions.misfit(size):
         raise StoreError(f"{prefix}: {misfit}")
-    statuses = FRICTION_STATUSES if kind is TangentialResult else STATUSES
+    statuses = [int(status) for status in kind.statuses]
     unknown = np.setdiff1d(collisions.status, statuses)
     if unknown.size:
-        raise StoreError(f"{prefix}: status: got {unknown[0]}, expected one of {list(statuses)}")
+        raise StoreError(f"{prefix}: status: got {unknown[0]}, expected one of {statuses}")
 
 
 def context_of(plan: Plan) -> WorkerContext:

@@ -356,8 +356,7 @@ def timestep(
     opened = open_source(source, overrides, plugin_set)
     point_source = replace(opened, config_draft=replace(opened.config_draft, has_own_scheme=True))
     point = point_with_e(point_source, find(model, plugin_set.models), at or {}, friction=friction)
-    if point.config.frictions:
-        Plan(point.config).pair_notes("frictions")
+    Plan(point.config).pair_notes("frictions")
     law = fixed_step_law(point.config, phases, scheme, of_friction=True)
     warn_of_point(point_source, point, law.impact, law.continuous)
     steps = time_steps(law.contact_time, counts or (() if given else STEPS_PER_CONTACT), given)

@@ -198,12 +198,11 @@ def curves_over(
     is_single = of_friction and len({str(history["model"].item()) for history in histories}) == 1
     laws = []
     for history in histories:
-        # a single model is not named beside every friction law
-        names = [] if is_single else [_model_label(history, choice.equations)]
         friction = str(history["friction"].item()) if of_friction else ""
-        if friction:
-            names.append(friction_text(friction, _with_units(history)))
-        laws.append(LawPart(law_name(*names), str(history["model"].item()), data=history, friction=friction))
+        # a single model is not named beside every friction law
+        model = "" if is_single else _model_label(history, choice.equations)
+        label = law_name(model, friction_text(friction, _with_units(history)))
+        laws.append(LawPart(label, str(history["model"].item()), data=history, friction=friction))
     panels = []
     for x, y, end in pairs:
         curves = tuple(curve_of(law, law.data[x].values, law.data[y].values, y, end) for law in laws)

@@ -27,7 +27,7 @@ from ..contact.materials import Material
 from ..contact.model import Law, Parameter, StoredLaw
 from ..contact.records import CollisionResult, Record
 from ..contact.slip_motion import FrictionKind
-from ..contact.status import FRICTION_STATUSES, STATUSES, Status
+from ..contact.status import Status
 from ..contact.tangential import TangentialResult
 from ..contact.variables import OUTPUTS, Variable
 from ..engine.inputs import Column, Inputs, has_stiffness_rule, index_of, input_at
@@ -52,11 +52,6 @@ N_WITNESSES = 1_000
 # tolerance of a witness, relative to the scale that `compare` uses for its variable
 WITNESS_TOLERANCE = 1e-12
 SLAB_ROWS = 2**16
-# by the bits of a status, whether it is one
-IS_STATUS = {
-    CollisionResult: np.isin(np.arange(2**8), STATUSES),
-    TangentialResult: np.isin(np.arange(2**8), FRICTION_STATUSES),
-}
 # what the variables of each type of trajectories begin with, which is also the name of their dimension
 PREFIXES: Mapping[type[Record], str] = {CollisionResult: "trajectory", TangentialResult: "tangential"}
 # by whether they are of pairs, the dimension of witnesses and the variable of their places
@@ -353,9 +348,11 @@ def _check_summary(summary: SummaryRecord, dataset: xr.Dataset, shape: tuple[int
 
 def _check_trajectory_statuses(record: type[Record], rows: int, read: ReadVariable) -> None:
     """Refuse unknown statuses, since the computed ones would be unknown as well."""
+    # by the bits of a status
+    is_known = np.isin(np.arange(2**8), [*record.statuses])
     for first in range(0, rows, SLAB_ROWS):
         values = read(f"{PREFIXES[record]}_status", slice(first, min(first + SLAB_ROWS, rows)))
-        if values.dtype != np.int8 or not IS_STATUS[record][values.view(np.uint8)].all():
+        if values.dtype != np.int8 or not is_known[values.view(np.uint8)].all():
             raise ValueError
 
 
