@@ -38,10 +38,9 @@ from ..results.board import BOARD_HEADINGS, Board, board_rows, check_rows, engin
 from ..results.calibration import FIT_HEADINGS, calibration_title, describe_data, fit_notes, fit_rows
 from ..results.provenance import stored_config
 from ..results.ranking import DEFAULT_TOL, Ranking, rank_laws
-from ..results.replay_command import describe_point
 from ..results.schema import FIT_STATUSES, count_points, exponents_of, kind_of
 from ..results.selection import select_laws
-from ..results.sensitivity import INDEX_HEADINGS, describe_design, describe_study, index_rows, iterate_studies
+from ..results.sensitivity import INDEX_HEADINGS, describe_design, study_texts
 from ..results.slabs import MAX_SUMMARY_POINTS, is_large
 from ..results.summary import Summary, extremes_of, input_notes, inputs_of, result_notes, summarize, with_depths
 from ..results.xarray_backend import result_of
@@ -130,7 +129,7 @@ def _report_of(
     sections = sections or SECTIONS
     summary = with_depths(summarize(dataset, MAX_FAILED), dataset)
     fits = _fits_section(dataset) if kind_of(dataset) == "calibration" else None
-    studies = list(_studies(dataset)) if kind_of(dataset) == "sensitivity study" else []
+    studies = list(study_texts(dataset)) if kind_of(dataset) == "sensitivity study" else []
     ranked, headline = (None, "") if fits or studies else _rank_models(dataset)
     keys = [str(key) for key in dataset["model"].values]
     selection = ""
@@ -258,16 +257,6 @@ def _pair_notes(dataset: xr.Dataset, plugins: Sequence[ForceModel | str | Path])
     except ImpactError:
         # without its plug-ins, or its config, a result has no law to ask
         return []
-
-
-def _studies(dataset: xr.Dataset) -> Iterator[dict[str, Any]]:
-    """Describe the output of each model at each point, and the indices of the uncertain inputs."""
-    for point, study in iterate_studies(dataset):
-        yield {
-            "point": describe_point(point),
-            "sentence": f"{describe_study(study)}.",
-            "rows": index_rows(study) if study["total"].notnull().any() else [],
-        }
 
 
 def template(name: str) -> Template:

@@ -43,53 +43,76 @@ def fit_status(law: xr.Dataset) -> str:
     return str(law["fit_status"].attrs["flag_meanings"]).split()[int(law["fit_status"])]
 
 
+def fitted_laws(dataset: xr.Dataset) -> list[dict[str, Any]]:
+    """List the laws as plain data, the best first, with their parameters by path in the config."""
+    paths = json.loads(dataset.attrs["fit_paths"])
+    laws = []
+    for rank, key in enumerate(map(str, dataset["model"].values), 1):
+        law = dataset.sel(model=key)
+        parameters = {}
+        for position, path in enumerate(paths):
+            parameter = law.isel(parameter=position)
+            if int(parameter["identifiable"]) >= 0:
+                numbers = {name: float(parameter[name]) for name in ("estimate", "lower", "upper")}
+                parameters[path] = {**numbers, "identifiable": bool(parameter["identifiable"])}
+        laws.append(
+            {
+                "model": key,
+                "rank": rank,
+                "status": fit_status(law),
+                "parameters": parameters,
+                "determined": [group for group in str(law["determined"].item()).split("; ") if group],
+                **{name: float(law.get(name, math.nan)) for name in CRITERIA},
+            }
+        )
+    return laws
+
+
 def fit_rows(dataset: xr.Dataset) -> list[tuple[str, ...]]:
     """Write a row for each parameter of each law, the best law first, under FIT_HEADINGS."""
     rows: list[tuple[str, ...]] = []
-    for key in map(str, dataset["model"].values):
-        law = dataset.sel(model=key)
+    for law in fitted_laws(dataset):
         quality = (
-            number(float(law["chi2_reduced"]), 3),
-            number(float(law["p_value"]), 2) if "p_value" in law and np.isfinite(law["p_value"]) else "–",
-            decimals(float(law["aicc"]), 1),
-            decimals(float(law["weight"]), 3),
-            number(float(law["loo"]), 3),
-            fit_status(law),
+            number(law["chi2_reduced"], 3),
+            number(law["p_value"], 2),
+            decimals(law["aicc"], 1),
+            decimals(law["weight"], 3),
+            number(law["loo"], 3),
+            law["status"],
         )
-        names = [str(name) for name in law["parameter"].values[law["identifiable"].values >= 0]]
-        for position, name in enumerate(names or [""]):
-            estimate = _estimate_texts(law.sel(parameter=name)) if name else ("", "")
-            rest = quality if position == 0 else ("",) * len(quality)
-            rows.append((key if position == 0 else "", _own_name(key, name), *estimate, *rest))
+        parameters = [
+            (_own_name(law["model"], path), *_estimate_texts(**numbers))
+            for path, numbers in law["parameters"].items()
+        ]
+        first, *others = parameters or [("",) * 3]
+        rows.append((law["model"], *first, *quality))
+        rows += [("", *parameter, *("",) * len(quality)) for parameter in others]
     return rows
 
 
-def _own_name(law: str, name: str) -> str:
-    """Write the config name of a parameter without the key of the law, or of a law of the pair."""
-    model, *friction = law_keys(law)
-    return name.removeprefix(f"{model}.").removeprefix(f"friction.{''.join(friction)}.")
+def _own_name(law: str, path: str) -> str:
+    """Write the path of a parameter, its name alone in [sweep] and in the table of a law of its own."""
+    tables = ("sweep.", *map("{}.{}.".format, ("model", "friction"), law_keys(law)))
+    return path.rpartition(".")[2] if path.startswith(tables) else path
 
 
-def _estimate_texts(parameter: xr.Dataset) -> tuple[str, str]:
+def _estimate_texts(estimate: float, lower: float, upper: float, identifiable: bool) -> tuple[str, str]:
     """Write an estimate and its interval; of a value that others replace, the further digits are arbitrary."""
-    estimate = float(parameter["estimate"])
-    if not int(parameter["identifiable"]):
+    if not identifiable:
         return number(estimate, 3), "not identified"
-    lower, upper = float(parameter["lower"]), float(parameter["upper"])
     return number(estimate, 5), "–" if lower != lower else f"{number(lower, 5)} to {number(upper, 5)}"
 
 
 def unidentified_notes(dataset: xr.Dataset) -> list[str]:
     """List for each law the parameters that the data do not determine."""
     notes = []
-    for key in map(str, dataset["model"].values):
-        law = dataset.sel(model=key)
-        names = [str(name) for name in law["parameter"].values[law["identifiable"].values == 0]]
+    for law in fitted_laws(dataset):
+        parameters = law["parameters"].items()
+        names = [_own_name(law["model"], path) for path, numbers in parameters if not numbers["identifiable"]]
         if names:
-            groups = str(law["determined"].item())
-            parameters = ", ".join(_own_name(key, name) for name in names)
+            groups = "; ".join(law["determined"])
             only = f"only {groups} is determined" if groups else "the data do not determine them"
-            notes.append(f"{key}: {parameters}: {only}")
+            notes.append(f"{law['model']}: {', '.join(names)}: {only}")
     return notes
 
 
@@ -196,33 +219,14 @@ class Fits(Displayed):
 
     def as_dict(self) -> dict[str, Any]:
         """The laws with their parameters by config path, and the largest residuals."""
-        return {"models": list(self._models()), "largest_residuals": largest_residuals(self.dataset)}
-
-    def _models(self) -> Iterator[dict[str, Any]]:
-        paths = json.loads(self.dataset.attrs["fit_paths"])
-        for rank, key in enumerate(map(str, self.dataset["model"].values), 1):
-            law = self.dataset.sel(model=key)
-            parameters = {}
-            for position, path in enumerate(paths):
-                parameter = law.isel(parameter=position)
-                if int(parameter["identifiable"]) >= 0:
-                    numbers = {name: float(parameter[name]) for name in ("estimate", "lower", "upper")}
-                    parameters[path] = {**numbers, "identifiable": bool(parameter["identifiable"])}
-            yield {
-                "model": key,
-                "rank": rank,
-                "status": fit_status(law),
-                "parameters": parameters,
-                "determined": [group for group in str(law["determined"].item()).split("; ") if group],
-                **{name: float(law.get(name, math.nan)) for name in CRITERIA},
-            }
+        return {"models": fitted_laws(self.dataset), "largest_residuals": largest_residuals(self.dataset)}
 
     def records(self) -> Sequence[Mapping[str, Any]]:
         """A row for each parameter of each law."""
         return [
             {"model": law["model"], "parameter": path, **numbers, "status": law["status"]}
             | {name: law[name] for name in CRITERIA}
-            for law in self._models()
+            for law in fitted_laws(self.dataset)
             for path, numbers in law["parameters"].items()
         ]
 

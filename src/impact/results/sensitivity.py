@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -15,10 +16,10 @@ from ..contact.units import names_in, with_numbers
 from ..contact.variables import LAW_DIMS, OUTPUTS
 from ..display import Block, Displayed, Table
 from ..engine.plan import Plan
-from ..formatting import NO_BREAK, decimals, number, safe_text, scaled_unit
+from ..formatting import NO_BREAK, decimals, number, quantity, safe_text, scaled_unit
 from .attributes import read_attribute
 from .replay_command import describe_point
-from .schema import SENSITIVITY, parts_of_laws, plain_unit, plan_coordinates, provenance_attributes, template
+from .schema import SENSITIVITY, parts_of_laws, plan_coordinates, provenance_attributes, template
 
 # probabilities of the quantiles
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
@@ -74,61 +75,82 @@ def describe_design(dataset: xr.Dataset) -> str:
     return f"{drawn} of {', '.join(distribution_texts(dataset))}"
 
 
-def iterate_studies(dataset: xr.Dataset) -> Iterator[tuple[dict[str, float | str], xr.Dataset]]:
-    """Yield the model and the point of each study, and the study; once along parameters of other laws."""
-    dims = list(map(str, dataset["mean"].dims))
+def _list_studies(dataset: xr.Dataset) -> Iterator[dict[str, Any]]:
+    """Yield each study as plain data: of each law at each point, once along parameters of other laws."""
+    dims, design = list(map(str, dataset["mean"].dims)), read_attribute(dataset.attrs, "design")
     for _, law in parts_of_laws(dataset, dims, first=0):
         axes = [dim for dim in dims if dim in law.dims]
         for index in np.ndindex(*(law.sizes[dim] for dim in axes)):
             study = law.isel(dict(zip(axes, index, strict=True)))
-            yield {dim: study[dim].item() for dim in dims if dim in LAW_DIMS or dim in axes}, study
+            point = {dim: study[dim].item() for dim in dims if dim in LAW_DIMS or dim in axes}
+            probabilities = [f"{probability:g}" for probability in study["quantile"].values]
+            rows = (study.isel(input=position) for position in range(study.sizes["input"]))
+            yield {
+                **{dim: point.pop(dim) for dim in LAW_DIMS if dim in point},
+                "at": point,
+                "of": dataset.attrs["of"],
+                **{name: design[name] for name in ("n", "method", "seed")},
+                "failed": int(study["failed"]),
+                "mean": float(study["mean"]),
+                "sd": float(study["sd"]),
+                "quantiles": dict(zip(probabilities, study["quantiles"].values.tolist(), strict=True)),
+                "indices": [
+                    {"input": str(row["input"].item())} | {name: float(row[name]) for name in INDICES}
+                    for row in rows
+                ],
+            }
 
 
 INDEX_HEADINGS = ("input", "first-order", "95 %", "total", "95 %", "first-order, n/2", "total, n/2")
 
 
-def index_rows(study: xr.Dataset) -> list[tuple[str, ...]]:
+def _index_rows(study: Mapping[str, Any]) -> list[tuple[str, ...]]:
     """Write a row for each input that matters, the largest total index first, under INDEX_HEADINGS."""
-    order = np.argsort(-np.nan_to_num(study["total"].values), kind="stable")
-    order = order[study["total"].values[order] != 0.0]
 
-    def interval(row: xr.Dataset, name: str) -> str:
-        lower, upper = (float(row[f"{name}_{end}"]) for end in ("lower", "upper"))
+    def interval(row: Mapping[str, float], name: str) -> str:
+        lower, upper = (row[f"{name}_{end}"] for end in ("lower", "upper"))
         return "–" if lower != lower else f"{decimals(lower)} to {decimals(upper)}"
 
     return [
         (
-            str(row["input"].item()),
-            decimals(float(row["first"])),
+            row["input"],
+            decimals(row["first"]),
             interval(row, "first"),
-            decimals(float(row["total"])),
+            decimals(row["total"]),
             interval(row, "total"),
-            *(decimals(float(row[name])) for name in HALF),
+            *(decimals(row[name]) for name in HALF),
         )
-        for row in (study.isel(input=int(position)) for position in order)
+        for row in sorted(study["indices"], key=lambda row: -np.nan_to_num(row["total"]))
+        # NaN without a result
+        if abs(row["total"]) > 0.0
     ]
 
 
-def describe_study(study: xr.Dataset) -> str:
+def _describe_study(study: Mapping[str, Any]) -> str:
     """Describe the distribution of the output of one study, in a sentence without a full stop."""
-    of, unit = study.attrs["of"], plain_unit(str(study["mean"].attrs["units"]))
-    failed = int(study["failed"])
+    of, mean, failed = study["of"], study["mean"], study["failed"]
     if failed:
         return f"{of}: {failed:,} points have no result, so there are no indices; narrow the distributions"
-    if np.isnan(study["mean"]):
+    if math.isnan(mean):
         return f"{of}: the friction law is not combinable with the model"
-    suffix = "" if unit == "1" else f" {unit}"
-    if not np.isfinite(study["total"].values).any():
-        return f"{of}: {number(float(study['mean']))}{suffix}; it does not depend on the uncertain inputs"
-    lower, median, upper = (float(study["quantiles"].sel(quantile=q)) for q in (0.05, 0.5, 0.95))
-    text = f"{of}: mean {number(float(study['mean']))}{suffix}, sd {number(float(study['sd']), 3)}, "
-    text += f"5 % {number(lower)}, 50 % {number(median)}, 95 % {number(upper)}"
-    irrelevant = study["input"].values[study["total"].values == 0.0].tolist()
+    mean_text, totals = quantity(mean, OUTPUTS[of].unit), {row["input"]: row["total"] for row in study["indices"]}
+    if not any(map(math.isfinite, totals.values())):
+        return f"{of}: {mean_text}; it does not depend on the uncertain inputs"
+    lower, median, upper = (number(study["quantiles"][q]) for q in ("0.05", "0.5", "0.95"))
+    text = f"{of}: mean {mean_text}, sd {number(study['sd'], 3)}, 5 % {lower}, 50 % {median}, 95 % {upper}"
+    irrelevant = [name for name, total in totals.items() if total == 0.0]
     if irrelevant:
         text += f"; it does not depend on {', '.join(irrelevant)}"
-    if read_attribute(study.attrs, "design")["n"] < MIN_SAMPLES:
+    if study["n"] < MIN_SAMPLES:
         text += f"; the intervals need at least {MIN_SAMPLES} samples"
     return text
+
+
+def study_texts(dataset: xr.Dataset) -> Iterator[tuple[str, str, list[tuple[str, ...]]]]:
+    """Yield the point of each study, the distribution of the output, and the rows under INDEX_HEADINGS."""
+    for study in _list_studies(dataset):
+        laws = {dim: study[dim] for dim in LAW_DIMS if dim in study}
+        yield describe_point(laws | study["at"]), _describe_study(study), _index_rows(study)
 
 
 @dataclass(frozen=True)
@@ -139,43 +161,20 @@ class Studies(Displayed):
 
     def as_dict(self) -> dict[str, Any]:
         """The studies with the distribution of the output and the indices of each uncertain input."""
-        return {"studies": list(self._studies())}
-
-    def _studies(self) -> Iterator[dict[str, Any]]:
-        design = read_attribute(self.dataset.attrs, "design")
-        for point, study in iterate_studies(self.dataset):
-            probabilities = [f"{probability:g}" for probability in study["quantile"].values]
-            rows = (study.isel(input=position) for position in range(study.sizes["input"]))
-            yield {
-                **{dim: point.pop(dim) for dim in ("model", "friction") if dim in point},
-                "at": point,
-                "of": self.dataset.attrs["of"],
-                **{name: design[name] for name in ("n", "method", "seed")},
-                "failed": int(study["failed"]),
-                "mean": float(study["mean"]),
-                "sd": float(study["sd"]),
-                "quantiles": dict(zip(probabilities, map(float, study["quantiles"].values), strict=True)),
-                "indices": [
-                    {"input": str(row["input"].item())} | {name: float(row[name]) for name in INDICES}
-                    for row in rows
-                ],
-            }
+        return {"studies": list(_list_studies(self.dataset))}
 
     def records(self) -> Sequence[Mapping[str, Any]]:
         """A row for each uncertain input of each study."""
         return [
-            {dim: study[dim] for dim in ("model", "friction") if dim in study}
-            | {**study["at"], "of": study["of"], **indices}
-            for study in self._studies()
+            {dim: study[dim] for dim in LAW_DIMS if dim in study} | {**study["at"], "of": study["of"], **indices}
+            for study in _list_studies(self.dataset)
             for indices in study["indices"]
         ]
 
     def sections(self, width: int) -> Iterator[Block]:
         """The design, and the distribution and a table of indices of each study."""
         yield describe_design(self.dataset)
-        for point, study in iterate_studies(self.dataset):
-            yield ""
-            yield describe_point(point)
-            yield describe_study(study)
-            if study["total"].notnull().any():
-                yield Table(index_rows(study), INDEX_HEADINGS)
+        for point, sentence, rows in study_texts(self.dataset):
+            yield from ("", point, sentence)
+            if rows:
+                yield Table(rows, INDEX_HEADINGS)
