@@ -229,3 +229,12 @@ def test_values_of_a_property_are_added_to_a_result(tmp_path: Path, layout: str)
         single_impact = impact.run(tmp_path / "more.h5", model="thornton-1997", at=at)
         single = impact.sweep(swept(yield_strength=strength, rho=1000.0)).sel(model="thornton-1997", e=0.9)
         assert single_impact.values["e_out"] == single["e_out"].item()
+
+
+def test_an_impact_names_a_property_that_varies_once() -> None:
+    balls = {**BALLS, "m1": 1.0, "m2": 1.0, "material": "steel"}
+    steel: dict[str, Any] = {**STEEL, "E": [70e9, 210e9]}
+    shot = impact.run(config(balls, {"steel": steel}, LAW))
+    (line,) = [line for line in str(shot).splitlines() if line.startswith("materials.steel.E ")]
+    assert "70 GPa" in line
+    assert "first value of its axis" in line

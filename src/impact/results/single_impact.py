@@ -23,7 +23,7 @@ from ..config.input_names import SWEEP_INPUTS, InputName, input_values, paths_wi
 from ..config.load import Config, build, inline_files
 from ..config.quantities import DISTRIBUTION_FORMS
 from ..config.rules import has_other_stiffness
-from ..config.tables import DEFAULT_RTOL, MATERIAL_QUANTITIES, SWEEP_DEFAULTS, expand_laws, law_quantities
+from ..config.tables import DEFAULT_RTOL, SWEEP_DEFAULTS, expand_laws, law_quantities
 from ..contact.fixed_step import EXACT
 from ..contact.force_expressions import unload_to_residual, unload_with_stiffness
 from ..contact.friction import FrictionLaw, Pair
@@ -162,20 +162,20 @@ class Impact(Displayed):
         inputs = [("model", self.model.key, self.model.equation)]
         if friction:
             inputs.append(("friction", friction.key, friction.equation))
-        for name, value in self.point.items():
+        materials = {
+            f"materials.{material}.{name}": value
+            for material, properties in self.materials.items()
+            for name, value in asdict(properties).items()
+            if value is not None
+        }
+        # a property that varies is an input of the point as well
+        for name, value in {**self.point, **materials}.items():
             unit, meaning = self._unit_and_meaning(name)
             note = "first value of its axis" if name in self.first else ""
             inputs.append((name, prefixed(value, unit, INPUT_DIGITS), "; ".join(filter(None, (meaning, note)))))
-        for material, properties in self.materials.items():
-            for name, value in asdict(properties).items():
-                if value is not None:
-                    rule = MATERIAL_QUANTITIES[name]
-                    shown = prefixed(value, rule.unit, INPUT_DIGITS)
-                    inputs.append((f"materials.{material}.{name}", shown, rule.meaning))
-        inputs += self._derived_rows(INPUT_QUANTITIES, INPUT_DIGITS)
+        inputs += self._derived_rows((*INPUT_QUANTITIES, *OBLIQUE_QUANTITIES), INPUT_DIGITS)
         outputs = [("status", self.status.name.lower(), self.status.meaning)]
         if friction:
-            inputs += self._derived_rows(OBLIQUE_QUANTITIES, INPUT_DIGITS)
             regime = OUTPUTS["contact_regime"]
             outputs += [
                 ("friction_status", self.friction_status.name.lower(), self.friction_status.meaning),
@@ -224,7 +224,7 @@ class Impact(Displayed):
         return [
             (name, prefixed(self.derived[name], self._with_numbers(plain_unit(unit)), digits), meaning)
             for name, unit, meaning in quantities
-            if self.derived[name] == self.derived[name] and name not in self.point
+            if not math.isnan(self.derived.get(name, math.nan)) and name not in self.point
         ]
 
     def as_dict(self) -> dict[str, Any]:
