@@ -32,7 +32,7 @@ from ..engine.inputs import Inputs, build_impacts, build_oblique, fixed_steps_at
 from ..engine.plan import Plan
 from ..engine.plugins import read_plugins
 from ..engine.trajectories import PlanLaw, model_of
-from ..errors import UsageError, did_you_mean, require_known, warn
+from ..errors import UsageError, require_known, warn
 from ..results.selection import as_keys
 from ..results.single_impact import open_source, single_point
 
@@ -140,20 +140,17 @@ class PreparedProblem:
     @cached_property
     def _quantities(self) -> dict[str, tuple[str, Quantity]]:
         """The inputs that a call may have: their names in the config and what they may be, by name."""
-        scalars = self.config.scalars
-        model = model_of(self.law)
+        scalars, model = self.config.scalars, model_of(self.law)
         pair = {"friction": self.law.friction} if isinstance(self.law, Pair) else {}
         laws: dict[str, ForceModel | FrictionLaw] = {"model": model, **pair}
-        # what the config has, and what replaces what the law derives from it
-        names = [InputName.parse(name) for name in (*scalars, *DERIVED, *(() if "alpha" in scalars else ("e",)))]
-        names += [
-            InputName("materials", name, key) for name in self.config.materials for key in MATERIAL_QUANTITIES
-        ]
         of_laws = [InputName(table, law.key, key) for table, law in laws.items() for key in law_quantities(law)]
-        quantities = {
-            name: name.quantity({law.key: law for law in self.config.models}) for name in (*names, *of_laws)
+        materials = (f"materials.{name}.{key}" for name in self.config.materials for key in MATERIAL_QUANTITIES)
+        # what the config has, and what replaces what the law derives from it
+        names = (*scalars, *DERIVED, *(() if "alpha" in scalars else ("e",)), *materials)
+        inputs = {
+            str(name): name.quantity({model.key: model}) for name in (*map(InputName.parse, names), *of_laws)
         }
-        known = {str(name): (str(name), quantity) for name, quantity in quantities.items() if quantity is not None}
+        known = {name: (name, quantity) for name, quantity in inputs.items() if quantity is not None}
         if model.exponent is not None:
             known.pop("n", None)
         short = {name.key: known[str(name)] for name in of_laws if name.key != "K" or str(name) in scalars}
@@ -161,10 +158,9 @@ class PreparedProblem:
 
     def _read(self, name: str, value: Any) -> tuple[str, Array]:
         """Read the values of an input, with its name in the config."""
-        known = self._quantities.get(str(InputName.parse(name)))
-        if known is None:
-            raise UsageError(f'no input "{name}" of this law; {did_you_mean(name, list(self._quantities))}')
-        full_name, quantity = known
+        parsed, known = str(InputName.parse(name)), self._quantities
+        require_known([] if parsed in known else [name], known, "no input", " of this law")
+        full_name, quantity = known[parsed]
         plain, _ = to_plain_data(value)
         try:
             array = np.asarray(plain)
