@@ -20,14 +20,14 @@ from ..contact.model import ForceModel, Parameter
 from ..contact.models import catalogue
 from ..contact.numba.dispatch import serves
 from ..display import Block, Displayed, Styled, Table, Wrapped, html_of
-from ..errors import UsageError, did_you_mean
+from ..errors import UsageError, did_you_mean, require_known
 from ..formatting import argument, decimals, number, with_year
 from .plugins import read_plugins
 
 # requested e of which a table of the catalogue shows the delivered restitution
 E_VALUES = (0.1, 0.3, 0.5, 0.7, 0.9)
-# characters that a column of the catalogue takes, with the space before it
-E_WIDTH, EQUATION_WIDTH, DOMAIN_WIDTH, CORE_WIDTH = 8, 32, 26, 7
+# characters that a column of the catalogue takes, with the space before it: of a value of e, and of the others
+E_WIDTH, WIDTHS = 8, {"equation": 32, "core": 7, "stated domain": 26}
 # exponents for which the compiled core is reported
 COMPILED_AT = (1.0, 1.5, 2.0, 2.5, 3.0)
 # characters of a text about one model, which may be a plug-in
@@ -209,24 +209,25 @@ class Models(Laws[ForceModel]):
     def sections(self, width: int) -> Iterator[Block]:
         """One row for each model, by family, with the columns that fit the terminal, and what they mean."""
         width_left = width - max(map(len, self))
-        e_values, others = _catalogue_columns(max(width_left, E_WIDTH))
+        columns = _catalogue_columns(max(width_left, E_WIDTH))
         rows: list[Sequence[object]] = []
         for family, members in groupby(self.values(), lambda model: model.family):
             rows.append([Styled(f"family:{family}", "dim")])
-            rows += [[model.key, *_catalogue_cells(model, e_values, others)] for model in members]
-        numbers = range(1, 1 + len(e_values))
+            cells = ((model.key, _catalogue_cells(model)) for model in members)
+            rows += [[key, *(of_model.get(name, "–") for name in columns)] for key, of_model in cells]
+        numbers = [position for position, name in enumerate(columns, 1) if name not in WIDTHS]
         yield Table(
             rows,
-            ("model", *(f"e={number(e)}" for e in e_values), *others),
-            text=(0, *range(numbers.stop, numbers.stop + len(others))),
+            ("model", *columns),
+            text={*range(len(columns) + 1)}.difference(numbers),
             # on the narrowest terminal the keys are folded, so that one value stays
             no_wrap=(*([0] if width_left >= E_WIDTH else []), *numbers),
             max_cell=MAX_TEXT,
         )
-        if e_values:
+        if numbers:
             yield ""
             yield Wrapped("The columns e=... show the delivered restitution for each requested e.")
-        if "core" in others:
+        if "core" in columns:
             yield Wrapped(
                 "The column core shows what integrates a law, or a phase of it, if numba is installed "
                 '(extra "fast").'
@@ -264,39 +265,33 @@ class Frictions(Laws[FrictionLaw]):
         yield self._evidence_line
 
 
-def _catalogue_columns(width_left: int) -> tuple[tuple[float, ...], tuple[str, ...]]:
-    """Choose the values of e, and the other columns, that a table of the catalogue shows next to the keys.
+def _catalogue_columns(width_left: int) -> list[str]:
+    """Choose the columns that a table of the catalogue shows next to the keys: values of e, and others.
 
-    >>> _catalogue_columns(3), _catalogue_columns(20), _catalogue_columns(43)
-    (((), ()), ((0.1, 0.9), ()), ((0.1, 0.3, 0.5, 0.7, 0.9), ()))
+    >>> _catalogue_columns(3), _catalogue_columns(20), _catalogue_columns(48)
+    ([], ['e=0.1', 'e=0.9'], ['e=0.1', 'e=0.3', 'e=0.5', 'e=0.7', 'e=0.9', 'core'])
     """
     count = min(len(E_VALUES), width_left // E_WIDTH)
     few: dict[int, tuple[float, ...]] = {0: (), 1: (0.5,), 2: (0.1, 0.9), 3: (0.1, 0.5, 0.9)}
-    e_values = few.get(count, E_VALUES[: count - 1] + E_VALUES[-1:])
-    width_left -= E_WIDTH * len(e_values)
-    others = []
-    for name, width in (("equation", EQUATION_WIDTH), ("core", CORE_WIDTH), ("stated domain", DOMAIN_WIDTH)):
+    columns = [f"e={number(e)}" for e in few.get(count, E_VALUES[: count - 1] + E_VALUES[-1:])]
+    width_left -= E_WIDTH * len(columns)
+    for name, width in WIDTHS.items():
         if width_left >= width:
-            others.append(name)
+            columns.append(name)
             width_left -= width
-    return e_values, tuple(others)
+    return columns
 
 
-def _catalogue_cells(model: ForceModel, e_values: Sequence[float], others: Sequence[str]) -> Iterator[str]:
-    """Write the columns of a model in a table of the catalogue, after its key."""
+def _catalogue_cells(model: ForceModel) -> dict[str, str]:
+    """Write what is known of a model in a table of the catalogue, by column."""
     description = ModelDescription(model)
-    restitution = description.delivered
-    for e in e_values:
-        yield decimals(restitution[number(e)]) if restitution else "–"
-    parameters = ", ".join(parameter.name for parameter in model.parameters)
-    texts = {
-        "equation": model.equation + (f"  [{parameters}]" if parameters else ""),
-        "core": description.cores.split()[0].rstrip(","),
-        "stated domain": model.domain_text or "–",
-    }
+    delivered_e = {f"e={e}": decimals(out) for e, out in description.delivered.items()}
     if model.same_as:
-        texts = {"equation": f"same law as {model.same_as}", "core": "", "stated domain": ""}
-    yield from (texts[name] for name in others)
+        return delivered_e | {"equation": f"same law as {model.same_as}", "core": "", "stated domain": ""}
+    parameters = ", ".join(parameter.name for parameter in model.parameters)
+    equation = model.equation + (f"  [{parameters}]" if parameters else "")
+    texts = {"equation": equation, "core": description.cores.split()[0].rstrip(",")}
+    return delivered_e | texts | ({"stated domain": model.domain_text} if model.domain_text else {})
 
 
 def models(
@@ -334,8 +329,7 @@ def models(
     families = sorted({model.family for model in all_models.values()})
     if pattern.startswith("family:"):
         pattern, family = "*", pattern.removeprefix("family:")
-    if family is not None and family not in families:
-        raise UsageError(f'{argument("family")}: no family "{family}"; {did_you_mean(family, families)}')
+    require_known([] if family is None else [family], families, f"{argument('family')}: no family")
     candidates = {key: model for key, model in all_models.items() if family in (None, model.family)}
     return Models(matching_laws(candidates, "model", pattern, search))
 
