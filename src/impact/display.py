@@ -78,33 +78,30 @@ class Table:
         from rich.table import Table as RichTable
         from rich.text import Text
 
-        rows = [list(row) for row in self.rows]
-        texts = [[safe_text(number(cell), self.max_cell) for cell in row] for row in rows]
+        rows = [
+            [Text(safe_text(number(cell), self.max_cell), getattr(cell, "style", "")) for cell in row]
+            for row in self.rows
+        ]
+        texts = ([cell.plain for cell in row] for row in rows)
         columns = list(itertools.zip_longest(self.headings, *texts, fillvalue=""))
-        count, widths = len(columns), self._widths(columns, console.width)
         table = RichTable(box=None, pad_edge=False, header_style="bold", show_header=bool(self.headings))
-        for column in range(count):
-            is_text = not self.headings or column in self.text or column - count in self.text
+        for position, width in enumerate(self._widths(columns, console.width)):
+            is_text = not self.headings or position in self.text or position - len(columns) in self.text
             table.add_column(
-                self.headings[column] if self.headings else "",
-                justify="left" if is_text else "right",
-                overflow="fold",
-                width=widths[column] if widths else None,
+                columns[position][0], justify="left" if is_text else "right", overflow="fold", width=width
             )
-        for row, of_row in zip(rows, texts, strict=True):
-            styles = [cell.style if isinstance(cell, Styled) else "" for cell in row]
-            table.add_row(*map(Text, of_row, styles))
+        for row in rows:
+            table.add_row(*row)
         console.print(table)
 
-    def _widths(self, columns: Sequence[Sequence[str]], width: int) -> list[int] | None:
-        """Choose the widths of columns that fold at spaces, the widest first. None without room for words."""
+    def _widths(self, columns: Sequence[Sequence[str]], width: int) -> Sequence[int | None]:
+        """Choose the widths of columns that fold at spaces, the widest first. None each without room for words."""
         from rich.cells import cell_len
 
         most = [max(map(cell_len, texts)) for texts in columns]
         words = [max((cell_len(word) for text in texts for word in text.split()), default=0) for texts in columns]
         # headings keep their line, for which addresses may be broken
-        headings = [cell_len(texts[0]) if self.headings else 0 for texts in columns]
-        kept = [max(heading, min(word, MAX_WORD)) for heading, word in zip(headings, words, strict=True)]
+        kept = [max(cell_len(texts[0]), min(word, MAX_WORD)) for texts, word in zip(columns, words, strict=True)]
         whole = [most[i] if i in self.no_wrap else kept[i] for i in range(len(columns))]
         for least in (whole, kept, words):
             # two spaces are between columns
@@ -114,7 +111,7 @@ class Table:
             while sum(widths) > room:
                 widths[max((i for i in range(len(widths)) if widths[i] > least[i]), key=widths.__getitem__)] -= 1
             return widths
-        return None
+        return [None] * len(columns)
 
     def html(self) -> str:
         """The table in HTML; texts are left-aligned.
@@ -344,9 +341,7 @@ def show(value: Displayed, *, as_json: bool = False, stream: TextIO | None = Non
     if as_json:
         print(dump(value), file=stream)
     else:
-        stream = stream or sys.stdout
-        width = _width(stream)
-        print_blocks(value.sections(width), stream, width)
+        print_blocks(value.sections(_width(stream or sys.stdout)), stream)
 
 
 def html_of(blocks: Iterable[Block]) -> str:

@@ -133,7 +133,7 @@ def to_plain_data(value: Any, path: KeyPath = ()) -> tuple[Any, list[ConfigProbl
     value = _from_library(value)
     if isinstance(value, str) and not _is_storable(value):
         return value, [(path, f"got {as_text(value)}, expected text without NUL and lone surrogates")]
-    if not isinstance(value, Mapping | list | tuple):
+    if not isinstance(value, Mapping | list | tuple | range):
         return value, []
     if len(path) >= MAX_DEPTH:
         return None, [(path, f"nested too deeply, expected at most {MAX_DEPTH} levels")]
@@ -157,8 +157,8 @@ def _from_library(value: Any) -> object:
     The libraries are not imported: pandas and pint are needed only where a value is theirs.
 
     >>> import numpy as np
-    >>> [_from_library(value) for value in (np.arange(2.0), range(1, 3), Fraction(1, 2))]
-    [[0.0, 1.0], [1, 2], 0.5]
+    >>> _from_library(np.arange(2.0)), _from_library(Fraction(1, 2))
+    ([0.0, 1.0], 0.5)
     """
     if hasattr(value, "magnitude") and hasattr(value, "units"):
         number, unit = _from_library(value.magnitude), str(value.units)
@@ -172,8 +172,6 @@ def _from_library(value: Any) -> object:
         value = value.values
     if hasattr(value, "tolist"):
         return value.tolist()
-    if isinstance(value, range):
-        return list(value)
     return float(value) if isinstance(value, Fraction | Decimal) else value
 
 
