@@ -21,11 +21,11 @@ from ..config.load import Config
 from ..contact.model import ForceModel
 from ..engine.plan import Plan
 from ..engine.plugins import Plugins, read_plugins
-from ..errors import ImpactError, UsageError, did_you_mean, require_known
+from ..errors import ImpactError, UsageError, require_known
 from ..formatting import prefixed, safe_text
 from ..results.provenance import changed_plugins, config_of_part, stored_config
 from ..results.schema import kind_of
-from ..results.selection import chosen_laws, in_si, select
+from ..results.selection import chosen_laws, in_si, select, select_laws
 from ..results.sweep import sweep_in_memory
 from ..results.xarray_backend import result_of
 from .draw import plot
@@ -90,76 +90,62 @@ def explore(
         advice = "impact.report writes the page of a board" if is_board else "impact.plot draws a time history"
         raise UsageError(f"expected the result of a sweep, with models; {advice}")
     kinds, axes, plugin_set = kinds_to_offer(dataset), axes_of(dataset), read_plugins(plugins)
-    if kind is not None and kind not in kinds:
-        raise UsageError(f'kind: no kind "{kind}" of this result; {did_you_mean(kind, kinds)}')
-    keys, shown = chosen_laws(None, dataset), chosen_laws(models, dataset)
+    require_known([] if kind is None else [kind], kinds, "kind: no kind", " of this result")
+    laws = {"models": (chosen_laws(None, dataset), chosen_laws(models, dataset))}
+    if "friction" in dataset.dims:
+        laws["frictions"] = (chosen_laws(None, dataset, "friction"),) * 2
     swept = [name for name in axes if dataset.sizes[name] > 1]
     config, reasons = _config_and_reasons(dataset, swept, plugin_set)
-
-    kind_menu = ipywidgets.Dropdown(options=kinds, value=kind or default_kind(dataset).name, description="kind")
-    # none to choose from where there is no friction
-    laws = chosen_laws(None, dataset, "friction") if "friction" in dataset.dims else []
-    model_list, friction_list = (
-        # with a row for the scroll bar below names that are wider than the list
-        ipywidgets.SelectMultiple(options=options, value=value, description=name, rows=min(len(options) + 1, 8))
-        for name, options, value in (("models", keys, shown), ("frictions", laws, laws))
-    )
-    first = choose_line(dataset, keys).x
-    first = first if first in axes else next(iter(axes), None)
-    others = [name for name in axes if name != first]
-    x = ipywidgets.Dropdown(options=axes, value=first, description="x")
-    y = ipywidgets.Dropdown(options=axes, value=others[0] if others else first, description="y")
     require_known(sel or {}, swept, "sel: no axis", " to select along")
+
+    first = choose_line(dataset, laws["models"][0]).x
+    first = first if first in axes else next(iter(axes), None)
+    # by the names of the arguments of `plot`
+    menus = {
+        "kind": ipywidgets.Dropdown(options=kinds, value=kind or default_kind(dataset).name),
+        **{
+            # with a row for the scroll bar below names that are wider than the list
+            name: ipywidgets.SelectMultiple(options=options, value=value, rows=min(len(options) + 1, 8))
+            for name, (options, value) in laws.items()
+        },
+        "x": ipywidgets.Dropdown(options=axes, value=first),
+        "y": ipywidgets.Dropdown(options=axes, value=next((name for name in axes if name != first), first)),
+    }
+    for name, menu in menus.items():
+        menu.description = name
     sliders = {name: _slider(dataset, name, name not in reasons, (sel or {}).get(name)) for name in swept}
+    controls = menus | sliders
     picture = ipywidgets.Image(
         format="png", layout={"width": "100%", "max_width": f"{WIDTH_INCHES * DPI:.0f}px", "margin": "0"}
     )
     message = ipywidgets.HTML(layout={"min_height": "2em"})
 
-    def draw_values() -> None:
-        message.value = COMPUTING
-        found = find_kind(kind_menu.value)
-        drawn = found.inputs_along(x.value, y.value)
-        x.disabled, y.disabled = "x" not in found.along, "y" not in found.along
-        for name, slider in sliders.items():
-            slider.disabled = name in drawn
-        at = {
-            name: slider.value if name in reasons else value_shown(slider.value, dataset[name].values)
-            for name, slider in sliders.items()
-            if name not in drawn
-        }
-        # a result without friction has no list
-        selected, frictions = list(model_list.value), list(friction_list.value) if laws else None
-        off_grid = {name: value for name, value in at.items() if value not in dataset[name].values}
-        try:
-            result = dataset
-            if off_grid and config and found.source != "history":
-                result = integrate_at(dataset, config, at, plugin_set, models=selected, frictions=frictions or ())
-            figure = plot(
-                result,
-                kind=kind_menu.value,
-                x=None if x.disabled else x.value,
-                y=None if y.disabled else y.value,
-                sel=at,
-                models=selected,
-                frictions=frictions,
-                width=WIDTH_INCHES,
-                plugins=plugins,
-            )
-            figure.savefig(png := BytesIO(), dpi=DPI)
-        except Exception as error:
-            message.value = escape(safe_text(str(error) or repr(error), 400))
-            if isinstance(error, ImpactError):
-                return
-            raise
-        picture.value = png.getvalue()
-        values = ", ".join(f"{name} = {value:.6g}" for name, value in off_grid.items())
-        message.value = escape(f"{values}: between values of the grid, integrated again") if values else ""
-
     def draw() -> None:
         # JupyterLab handles changes in several threads, and each draws the present values
         with DRAWING:
-            draw_values()
+            message.value = COMPUTING
+            found = find_kind(menus["kind"].value)
+            along = found.inputs_along(menus["x"].value, menus["y"].value)
+            for name, control in controls.items():
+                control.disabled = name in along or name in {"x", "y"}.difference(found.along)
+            chosen = {name: control.value for name, control in controls.items() if not control.disabled}
+            at = {name: value_shown(chosen.pop(name), dataset[name].values) for name in sliders if name in chosen}
+            off_grid = {name: value for name, value in at.items() if value not in dataset[name].values}
+            try:
+                result = dataset
+                if off_grid and config and found.source != "history":
+                    of_laws = select_laws(dataset, chosen["models"], chosen.get("frictions"))
+                    result = integrate_at(of_laws, config, at, plugin_set)
+                figure = plot(result, sel=at, width=WIDTH_INCHES, plugins=plugins, **chosen)
+                figure.savefig(png := BytesIO(), dpi=DPI)
+            except Exception as error:
+                message.value = escape(safe_text(str(error) or repr(error), 400))
+                if isinstance(error, ImpactError):
+                    return
+                raise
+            picture.value = png.getvalue()
+            values = ", ".join(f"{name} = {value:.6g}" for name, value in off_grid.items())
+            message.value = escape(f"{values}: between values of the grid, integrated again") if values else ""
 
     waiting: list[asyncio.TimerHandle] = []
 
@@ -173,29 +159,23 @@ def explore(
         except RuntimeError:
             draw()
 
-    controls = [kind_menu, model_list, *([friction_list] if laws else []), x, y, *sliders.values()]
     # ch: the width of a digit in the font of the page
-    longest = min(max(len(control.description) for control in controls), MAX_LABEL_LETTERS)
-    for control in controls:
+    longest = min(max(len(control.description) for control in controls.values()), MAX_LABEL_LETTERS)
+    for control in controls.values():
         control.layout.width, control.style.description_width = "auto", f"{longest + 1}ch"
         control.tooltip = control.description
         control.observe(update, names="value")
-    controls.append(ipywidgets.HTML(_notes(swept, reasons)))
+    notes = ["Click a number to type another one."] if len(reasons) < len(swept) else []
+    notes += [f"{name} keeps to the grid: {reason}." for name, reason in reasons.items()]
+    shown_notes = ipywidgets.HTML("".join(f"<p style='line-height: 1.4'>{escape(note)}</p>" for note in notes))
     draw()
     # the picture goes below the controls where both do not fit side by side
     columns = [
-        ipywidgets.VBox(controls, layout={"flex": "1 1 280px", "min_width": "0"}),
+        ipywidgets.VBox([*controls.values(), shown_notes], layout={"flex": "1 1 280px", "min_width": "0"}),
         ipywidgets.VBox([message, picture], layout={"flex": "3 1 440px", "min_width": "0"}),
     ]
     box = ipywidgets.Box(columns, layout={"flex_flow": "row wrap", "width": "100%", "grid_gap": "4px 16px"})
     return ipywidgets.VBox([box])
-
-
-def _notes(swept: Sequence[str], reasons: Mapping[str, str]) -> str:
-    """Write how to type a number, and which axes take values of the grid only, as HTML."""
-    notes = ["Click a number to type another one."] if len(reasons) < len(swept) else []
-    notes += [f"{name} keeps to the grid: {reason}." for name, reason in reasons.items()]
-    return "".join(f"<p style='line-height: 1.4'>{escape(note)}</p>" for note in notes)
 
 
 def _slider(dataset: xr.Dataset, name: str, is_free: bool, value: object) -> Any:
@@ -207,23 +187,19 @@ def _slider(dataset: xr.Dataset, name: str, is_free: bool, value: object) -> Any
     if not (is_free and isinstance(first, float | int) and values.min() <= first <= values.max()):
         # one of the grid, or the message that there is no such value
         first = select(dataset, {name: first})[name].values.ravel()[0].item()
+    common = {"value": first, "description": label, "continuous_update": False}
     if not is_free:
-        return ipywidgets.SelectionSlider(
-            options=shown_values(dataset[name]), value=first, description=label, continuous_update=False
-        )
-    least, most = float(values.min()), float(values.max())
+        return ipywidgets.SelectionSlider(options=shown_values(dataset[name]), **common)
     is_log = is_geometric(np.sort(values))
-    # at least a hundred positions, at round numbers
-    step = 0.01 if is_log else 10.0 ** math.floor(math.log10((most - least) / 100.0))
+    least, most = (math.log10(end) if is_log else float(end) for end in (values.min(), values.max()))
     return (ipywidgets.FloatLogSlider if is_log else ipywidgets.FloatSlider)(
-        min=math.log10(least) if is_log else least,
-        max=math.log10(most) if is_log else most,
-        step=step,
-        value=first,
-        description=label,
+        min=least,
+        max=most,
+        # at least a hundred positions, at round numbers
+        step=0.01 if is_log else 10.0 ** math.floor(math.log10((most - least) / 100.0)),
         # six digits, without zeros at the end
         readout_format=".6",
-        continuous_update=False,
+        **common,
     )
 
 
@@ -237,12 +213,14 @@ def axis_label(name: str, unit: str = "1") -> str:
     return ", ".join(filter(None, (parsed.key if unit == "1" else f"{parsed.key} [{unit}]", parsed.owner)))
 
 
-def value_shown(value: float, grid: np.ndarray) -> float:
-    """Round a number to what a slider shows of it; where a value of the grid is shown alike, it is that value.
+def value_shown(value: Any, grid: np.ndarray) -> Any:
+    """Round a number to what a slider shows of it; a value of the grid, or shown as one is, is that value.
 
     >>> value_shown(0.333333, np.array([1 / 3, 0.5])) == 1 / 3, value_shown(0.4000000001, np.array([0.5]))
     (True, 0.4)
     """
+    if value in grid:
+        return value
     nearest = float(grid[np.argmin(np.abs(grid - value))])
     return nearest if f"{nearest:.6g}" == f"{value:.6g}" else float(f"{value:.6g}")
 
@@ -260,8 +238,7 @@ def _config_and_reasons(
             raise UsageError("the axes of the result are not those of its config")
     except ImpactError as error:
         return None, dict.fromkeys(axes, safe_text(str(error), 200))
-    reasons = {name: _why_on_grid(by_name[name]) for name in axes}
-    return config, {name: reason for name, reason in reasons.items() if reason}
+    return config, {name: reason for name in axes if (reason := _why_on_grid(by_name[name]))}
 
 
 def _why_on_grid(axis: Axis) -> str:
@@ -274,16 +251,8 @@ def _why_on_grid(axis: Axis) -> str:
     return "" if np.isfinite(np.asarray(axis.labels, float)).all() else "it has an infinite value"
 
 
-def integrate_at(
-    dataset: xr.Dataset,
-    config: Config,
-    at: Mapping[str, Any],
-    plugins: Plugins,
-    *,
-    models: Sequence[str] = (),
-    frictions: Sequence[str] = (),
-) -> xr.Dataset:
-    """Integrate a part of a result again, by some or all laws, at values of axes that need not be on its grid.
+def integrate_at(dataset: xr.Dataset, config: Config, at: Mapping[str, Any], plugins: Plugins) -> xr.Dataset:
+    """Integrate a result, or some laws of one, again at values of axes that need not be on its grid.
 
     Each of these is then the only value of its axis; other axes are those of the result. More points than
     MAX_POINTS_AGAIN are a UsageError.
@@ -292,7 +261,7 @@ def integrate_at(
     >>> from impact.engine.plugins import Plugins
     >>> result = impact.sweep("configs/figure6.toml")
     >>> config = stored_config(result.attrs, (), Plugins(), "result")
-    >>> part = integrate_at(result, config, {"e": 0.333}, Plugins(), models=["gharib-hurmuzlu-2012"])
+    >>> part = integrate_at(result.sel(model=["gharib-hurmuzlu-2012"]), config, {"e": 0.333}, Plugins())
     >>> shot = impact.run("configs/figure6.toml", model="gharib-hurmuzlu-2012", at={"e": 0.333})
     >>> part["e_out"].item() == shot.values["e_out"]
     True
@@ -301,12 +270,14 @@ def integrate_at(
     off_grid = {name: {name: (value,)} for name, value in at.items() if name not in on_grid}
     axes = config_of_part(config, select(dataset, on_grid)).axes
     # an axis of a law needs that law
-    owners = [InputName.parse(axis.name).owner for axis in axes]
+    keys = {InputName.parse(axis.name).owner for axis in axes}.union(
+        chosen_laws(None, dataset), chosen_laws(None, dataset, "friction")
+    )
     part = replace(
         config,
         axes=tuple(replace(axis, columns=off_grid.get(axis.name, axis.columns)) for axis in axes),
-        models=tuple(law for law in config.models if not models or law.key in (*models, *owners)),
-        frictions=tuple(law for law in config.frictions if not frictions or law.key in (*frictions, *owners)),
+        models=tuple(law for law in config.models if law.key in keys),
+        frictions=tuple(law for law in config.frictions if law.key in keys),
     )
     plan = Plan(part, plugins.of(part.models))
     if plan.points > MAX_POINTS_AGAIN:
