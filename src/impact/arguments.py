@@ -9,6 +9,7 @@ import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, fields, is_dataclass
 from functools import wraps
+from itertools import starmap
 from types import FunctionType, UnionType
 from typing import Any, ParamSpec, TypeVar, get_args, get_origin
 
@@ -46,10 +47,8 @@ def name_wrong_types(function: Callable[P, T]) -> Callable[P, T]:
             warnings.warn(text, DeprecationWarning, stacklevel=2)
         try:
             return function(*args, **kwargs)
-        except ImpactError:
-            raise
         except Exception as error:
-            if problem := type_problem(function, args, kwargs):
+            if not isinstance(error, ImpactError) and (problem := type_problem(function, args, kwargs)):
                 raise UsageError(problem) from error
             raise
 
@@ -69,11 +68,10 @@ def prepare_for_users(member: Any) -> Any:
 
 def _show_defaults(kind: type[Any]) -> None:
     """Let `help` show the defaults of a dataclass, such as {}, in place of `<factory>`."""
-    made = {field.name: field.default_factory for field in fields(kind) if field.default_factory is not MISSING}
+    made = {field.name: field.default_factory() for field in fields(kind) if field.default_factory is not MISSING}
     signature = inspect.signature(vars(kind)["__init__"])
     parameters = [
-        parameter.replace(default=made[name]()) if name in made else parameter
-        for name, parameter in signature.parameters.items()
+        each.replace(default=made.get(each.name, each.default)) for each in signature.parameters.values()
     ]
     vars(kind)["__init__"].__signature__ = signature.replace(parameters=parameters)
 
@@ -118,21 +116,12 @@ def _wrong_type(value: Any, annotation: Any) -> str:
         kind = get_origin(alternative) or alternative
         # a type such as ArrayLike is for type checkers
         if not isinstance(kind, type) or isinstance(value, ABSTRACT.get(kind, kind)):
-            element = _wrong_element(value, kind, get_args(alternative))
+            columns = [value, value.values()] if kind is Mapping else [value] if kind is Sequence else []
+            elements = (
+                (each, of) for column, of in zip(columns, get_args(alternative), strict=True) for each in column
+            )
+            element = next(filter(None, starmap(_wrong_type, elements)), "")
             if not element:
                 return ""
             wrong = f"{type_of(value)} with {element}"
     return wrong
-
-
-def _wrong_element(value: Any, kind: Any, annotations: Sequence[Any]) -> str:
-    """Name the type of the first wrong element of a sequence, or key or value of a mapping."""
-    if kind not in (Sequence, Mapping):
-        return ""
-    columns = (value,) if kind is Sequence else (value, value.values())
-    wrong_types = (
-        _wrong_type(element, annotation)
-        for column, annotation in zip(columns, annotations, strict=True)
-        for element in column
-    )
-    return next(filter(None, wrong_types), "")
