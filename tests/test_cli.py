@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import ast
 import errno
+import inspect
 import io
 import itertools
 import json
@@ -14,6 +16,7 @@ import subprocess
 import sys
 import time
 import warnings
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -47,6 +50,24 @@ def small(tmp_path: Path) -> Path:
     path = tmp_path / "small.toml"
     path.write_text(SMALL, encoding="utf-8")
     return path
+
+
+@pytest.mark.parametrize("name", [name for name in COMMANDS if name != "help"])
+def test_no_option_is_ignored(name: str) -> None:
+    """Each parameter of a command is read in it, or by the name of a parameter of the function that it calls."""
+    command = getattr(import_module(f"impact.cli.{COMMANDS[name][0]}"), name)
+    (tree,) = ast.parse(inspect.getsource(command)).body
+    assert isinstance(tree, ast.FunctionDef)
+    nodes = [node for statement in tree.body for node in ast.walk(statement)]
+    read = {node.id for node in nodes if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load)}
+    imported = {
+        alias.asname: alias.name for node in nodes if isinstance(node, ast.ImportFrom) for alias in node.names
+    }
+    for node in nodes:
+        if isinstance(node, ast.Call) and ast.unparse(node.func) == "options.call":
+            function = ast.unparse(node.args[0]).removeprefix("impact.")
+            read |= {*inspect.signature(getattr(impact, imported.get(function, function))).parameters}
+    assert {*inspect.signature(command).parameters} - read == set()
 
 
 def test_from_toml_to_picture(cli: Run, small: Path, tmp_path: Path) -> None:

@@ -50,7 +50,7 @@ def export(
     output: Annotated[Path | None, options.output("The file. \\[default: stdout]")] = None,
     overwrite: options.Overwrite = False,
     show_codes: Annotated[bool, typer.Option("--list", help="List the codes and their laws.")] = False,
-    sets: options.Set = None,
+    overrides: options.Set = None,
     as_json: options.Json = False,
 ) -> int:
     """Write the input lines of a simulation code for a law, and what the code delivers at its time step.
@@ -64,22 +64,7 @@ def export(
         return exits.EXIT_OK
     if to is None:
         raise UsageError("--to: expected a code; impact export --list shows them")
-    result = impact.export(
-        to,
-        model,
-        source=source,
-        at=dict(at or ()),
-        dt=dt,
-        parameter=parameter,
-        friction=friction,
-        code_version=code_version,
-        program=program,
-        script=script,
-        verify=verify,
-        output=output,
-        overwrite=overwrite,
-        overrides=sets or (),
-    )
+    result = options.call(impact.export, locals())
     for warning in result.warnings:
         exits.print_line(f"warning: {warning}")
     exits.print_written(output)
@@ -139,17 +124,7 @@ def conform(
     if show_engines:
         show(impact.conform_engines(program), as_json=as_json)
         return exits.EXIT_OK
-    board = impact.conform(
-        engines or (),
-        adapter=adapter or (),
-        suite=suite,
-        only=only or (),
-        tol=dict(tol or ()) or None,
-        timeout=timeout,
-        program=program,
-        output=output,
-        overwrite=overwrite,
-    )
+    board = options.call(impact.conform, locals(), engine=engines or ())
     with exits.ignore_broken_pipe():
         show(board, as_json=as_json)
     exits.print_written(output)

@@ -44,7 +44,7 @@ def compare(
 
     _check_plot(plot, new, baseline)
     try:
-        verdict = impact.compare(new, baseline, tol=dict(tol or ()) or None, subset=subset)
+        verdict = options.call(impact.compare, locals())
     except ImpactError as error:
         _print_outcome(formats.NoVerdict(str(new), str(baseline), error=str(error)), format)
         raise
@@ -69,9 +69,7 @@ def bless(
     from ..comparison.bless import bless as replace_baseline
 
     try:
-        verdict = replace_baseline(
-            new, baseline, reason=reason, tol=dict(tol or ()) or None, allow_failed=allow_failed, show=show_verdict
-        )
+        verdict = options.call(replace_baseline, locals(), show=show_verdict)
     except (BrokenPipeError, SystemExit):
         raise UsageError(
             f"{baseline}: not replaced, the output was closed before the end of the verdict"
@@ -97,14 +95,7 @@ def rerun(
 
         _check_plot(plot, result)
         try:
-            verdict = repeat(
-                result,
-                plugins=plugins or (),
-                tol=dict(tol or ()) or None,
-                subset=subset,
-                max_points=max_points,
-                execute=partial(run_in_memory, **keywords),
-            )
+            verdict = options.call(repeat, locals(), execute=partial(run_in_memory, **keywords))
         except ImpactError as error:
             _print_outcome(formats.NoVerdict("the rerun", str(result), error=str(error)), format)
             raise

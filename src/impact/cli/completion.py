@@ -76,12 +76,5 @@ def complete_setting() -> list[str]:
 
 
 def _parameters(context: typer.Context) -> list[str]:
-    keys = context.params.get("model")
-    models = impact.models()
-    names = {
-        parameter.name
-        for key in ([keys] if isinstance(keys, str) else keys or ())
-        if key in models
-        for parameter in models[key].parameters
-    }
-    return sorted(names)
+    model = impact.models().get(context.params.get("model") or "")
+    return sorted(parameter.name for parameter in model.parameters) if model else []

@@ -38,7 +38,7 @@ def solve(
             options.parse_range,
         ),
     ] = None,
-    sets: options.Set = None,
+    overrides: options.Set = None,
     plugins: options.Plugins = None,
     as_json: options.Json = False,
 ) -> None:
@@ -48,18 +48,7 @@ def solve(
 
     With --over it is one value: that with the least largest distance from the target over the range.
     """
-    result = impact.solve(
-        model,
-        name,
-        dict([target]),
-        friction=friction,
-        source=source,
-        at=dict(at or ()),
-        over=dict([over]) if over else None,
-        overrides=sets or (),
-        plugins=plugins or (),
-    )
-    show(result, as_json=as_json)
+    show(options.call(impact.solve, locals()), as_json=as_json)
 
 
 def timestep(
@@ -98,7 +87,7 @@ def timestep(
         ),
     ] = None,
     friction: options.FrictionKey = None,
-    sets: options.Set = None,
+    overrides: options.Set = None,
     plugins: options.Plugins = None,
     output: options.Table = None,
     rows: options.Rows = None,
@@ -117,20 +106,7 @@ def timestep(
     """
     form = TableForm(rows, digits, decimal)
     check_table_output(output, form, overwrite=overwrite)
-    result = impact.timestep(
-        model,
-        source=source,
-        at=dict(at or ()),
-        steps_per_contact=steps_per_contact or (),
-        dt=dt or (),
-        phases=phases,
-        tol=tol,
-        parameter=parameter,
-        scheme=scheme,
-        friction=friction,
-        overrides=sets or (),
-        plugins=plugins or (),
-    )
+    result = options.call(impact.timestep, locals())
     for warning in result.warnings:
         exits.print_line(f"warning: {warning}")
     if output is not None:
@@ -151,7 +127,7 @@ def calibrate(
         Path | None, options.value("FILE", "Write the config of the best law with its parameters.")
     ] = None,
     model: Annotated[str | None, options.model("The law of --best, in place of the one that fits best.")] = None,
-    sets: options.Set = None,
+    overrides: options.Set = None,
     plugins: options.Plugins = None,
     jobs: options.Jobs = 1,
     rows: options.Rows = None,
@@ -165,17 +141,7 @@ def calibrate(
     """
     form = TableForm(rows, digits, decimal)
     form.check_used(output, "output")
-    result = impact.calibrate(
-        config,
-        output=output,
-        best=best,
-        model=model,
-        overwrite=overwrite,
-        overrides=sets or (),
-        plugins=plugins or (),
-        jobs=jobs,
-    )
-    described = impact.describe(result)
+    described = impact.describe(options.call(impact.calibrate, locals(), source=config))
     # in another form than that of the function
     if output is not None and form != TableForm():
         write_table(described, output, form, overwrite=True)

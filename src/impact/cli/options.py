@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import inspect
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any, NamedTuple, TypeVar
 
 import typer
 
 from ..formatting import safe_text
 from . import completion
+
+ResultT = TypeVar("ResultT")
 
 
 class NamedValue(NamedTuple):
@@ -18,6 +21,29 @@ class NamedValue(NamedTuple):
 
     name: str
     value: Any
+
+
+def call(function: Callable[..., ResultT], options: Mapping[str, Any], **arguments: Any) -> ResultT:
+    """Call a function with those options of a command that it has a parameter for, and with further arguments.
+
+    An option without a value keeps the default of the function. Words NAME=VALUE become a mapping.
+
+    >>> def solve(model, at, sel="none"):
+    ...     return model, at, sel
+    >>> call(solve, {"at": [NamedValue("e", 0.5)], "sel": None, "as_json": True}, model="hertz")
+    ('hertz', {'e': 0.5}, 'none')
+    """
+    for name in inspect.signature(function).parameters.keys() & options.keys() - arguments.keys():
+        match options[name]:
+            case None:
+                continue
+            case NamedValue() as word:
+                arguments[name] = dict([word])
+            case [NamedValue(), *_] as words:
+                arguments[name] = dict(words)
+            case other:
+                arguments[name] = other
+    return function(**arguments)
 
 
 def parse_setting(word: str, example: str = "m2=1.0") -> NamedValue:
@@ -156,14 +182,14 @@ def target(help: str) -> Any:
     return value("NAME=VALUE", help, completion.complete_target, lambda word: parse_setting(word, "e_out=0.6"))
 
 
-def model(help: str) -> Any:
+def model(help: str, names: Sequence[str] = ()) -> Any:
     """Declare an option for the key of a model."""
-    return value("KEY", help, completion.complete_model)
+    return value("KEY", help, completion.complete_model, names=names)
 
 
-def friction(help: str) -> Any:
+def friction(help: str, names: Sequence[str] = ()) -> Any:
     """Declare an option for the key of a friction law."""
-    return value("KEY", help, completion.complete_friction)
+    return value("KEY", help, completion.complete_friction, names=names)
 
 
 Result = Annotated[Path, typer.Argument(help="A result of `impact sweep`.")]
@@ -215,8 +241,8 @@ Select = Annotated[
     list[NamedValue] | None,
     pairs(completion.complete_selection, "Value of an axis, such as m2=1.0; may be repeated."),
 ]
-Models = Annotated[list[str] | None, model("Only this model; may be repeated.")]
-Frictions = Annotated[list[str] | None, friction("Only this friction law; may be repeated.")]
+Models = Annotated[list[str] | None, model("Only this model; may be repeated.", ["--model"])]
+Frictions = Annotated[list[str] | None, friction("Only this friction law; may be repeated.", ["--friction"])]
 Jobs = Annotated[int, whole_number("Number of processes.", names=["--jobs", "-j"])]
 Threads = Annotated[int, whole_number("Number of threads, instead of processes.")]
 MaxPoints = Annotated[int, whole_number("Largest number of points in layout full, of trajectories otherwise.")]

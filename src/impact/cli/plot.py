@@ -27,7 +27,7 @@ def plot(
             "\\[default: RESULT.png]"
         ),
     ] = None,
-    kind: Annotated[
+    kinds: Annotated[
         list[str] | None,
         options.value(
             "KIND",
@@ -52,8 +52,8 @@ def plot(
         ),
     ] = None,
     sel: options.Select = None,
-    model: options.Models = None,
-    friction: options.Frictions = None,
+    models: options.Models = None,
+    frictions: options.Frictions = None,
     log: Annotated[str, options.value("AXES", "Logarithmic axes: x, y or xy.")] = "",
     points: Annotated[
         Path | None,
@@ -104,7 +104,7 @@ def plot(
     digits: options.Digits = None,
     decimal: options.Decimal = "point",
     overwrite: options.Overwrite = False,
-    plugin: options.Plugins = None,
+    plugins: options.Plugins = None,
     as_json: options.Json = False,
 ) -> None:
     """Plot a stored result: by default the final-velocity comparison, Figure 6 of the paper.
@@ -114,33 +114,7 @@ def plot(
     Of several kinds, those that --sel leaves no axis are drawn over the whole axis, and those that do not apply
     are reported with the reason.
     """
-    files = impact.plot_to_files(
-        result,
-        output,
-        kinds=kind or (),
-        x=x,
-        y=y,
-        variable=variable,
-        sel=dict(sel or ()),
-        models=model,
-        log=log,
-        points=points,
-        width=width,
-        height=height,
-        style=style,
-        title=not no_title,
-        legend=legend,
-        labels=_parse_labels(label),
-        equations=equations,
-        frictions=friction,
-        data=data,
-        data_form=data_form,
-        rows=rows,
-        digits=digits,
-        decimal=decimal,
-        overwrite=overwrite,
-        plugins=plugin or (),
-    )
+    files = options.call(impact.plot_to_files, locals(), title=not no_title, labels=_parse_labels(label))
     for name, picture in files.pictures.items():
         plot_data = files.plot_data[name]
         conditions = plot_data.conditions.replace("\N{NO-BREAK SPACE}", " ")

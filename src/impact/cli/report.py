@@ -23,8 +23,8 @@ def recommend(
         options.target("The wanted output, such as beta=0.4. \\[default: e_out, compared with e]"),
     ] = None,
     sel: options.Select = None,
-    model: options.Models = None,
-    friction: options.Frictions = None,
+    models: options.Models = None,
+    frictions: options.Frictions = None,
     output: options.Table = None,
     rows: options.Rows = None,
     digits: options.Digits = None,
@@ -38,14 +38,7 @@ def recommend(
     """
     form = TableForm(rows, digits, decimal)
     check_table_output(output, form, overwrite=overwrite)
-    ranking = impact.recommend(
-        impact.load(result),
-        tol=tol,
-        sel=dict(sel or ()),
-        models=model,
-        target=dict([target]) if target else None,
-        frictions=friction,
-    )
+    ranking = options.call(impact.recommend, locals(), dataset=impact.load(result))
     if output is not None:
         write_table(ranking, output, form, overwrite=overwrite)
     show(ranking, as_json=as_json)
@@ -56,11 +49,15 @@ def report(
     result: options.Result,
     output: options.Page = None,
     overwrite: options.Overwrite = False,
-    plugin: options.Plugins = None,
-    model: options.Models = None,
-    section: Annotated[
+    plugins: options.Plugins = None,
+    models: options.Models = None,
+    sections: Annotated[
         list[str] | None,
-        options.value("NAME", "Only this section, such as figures, answer, friction or models; may be repeated."),
+        options.value(
+            "NAME",
+            "Only this section, such as figures, answer, friction or models; may be repeated.",
+            names=["--section"],
+        ),
     ] = None,
 ) -> None:
     """Write a report: one HTML page with the swept inputs, the ranking, figures, failed points and the config.
@@ -68,9 +65,7 @@ def report(
     The page is a single file. It needs no network and runs no scripts.
     """
     output = output or result.with_suffix(".html")
-    page = impact.report(
-        result, output=output, overwrite=overwrite, plugins=plugin or (), models=model, sections=section
-    )
+    page = options.call(impact.report, locals(), dataset=result)
     figures = page.count("<figure")
     size = f"{len(page.encode()) / 1000:,.0f} kB"
     exits.print_line(f"{output}: {figures} figure{'' if figures == 1 else 's'}, {size}")
@@ -80,12 +75,12 @@ def page(
     result: options.Result,
     output: options.Page = None,
     overwrite: options.Overwrite = False,
-    model: options.Models = None,
+    models: options.Models = None,
 ) -> None:
     """Write a page that draws a result over any axis, with a slider for each other axis and a choice of models.
 
     The page is a single file for any browser. It needs neither Python nor a network, and has the numbers as CSV.
     """
     output = output or result.with_suffix(".html")
-    text = impact.page(result, output=output, overwrite=overwrite, models=model)
+    text = options.call(impact.page, locals(), dataset=result)
     exits.print_line(f"{output}: {len(text.encode()) / 1000:,.0f} kB")

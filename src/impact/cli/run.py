@@ -23,7 +23,7 @@ def run(
     model: Annotated[str | None, options.model("The model. \\[default: the first of the source]")] = None,
     friction: options.FrictionKey = None,
     at: options.At = None,
-    sets: options.Set = None,
+    overrides: options.Set = None,
     plugins: options.Plugins = None,
     history: Annotated[
         Path | None, options.value("FILE", "Write the time history: .h5, .hdf5, .nc or .csv.")
@@ -43,15 +43,7 @@ def run(
     if history is not None:
         check_outputs([history], (source, *(plugins or ())), overwrite=overwrite)
         check_suffix(history, "history", HISTORY_SUFFIXES)
-    result = impact.run(
-        source,
-        model=model,
-        friction=friction,
-        at=dict(at or ()),
-        overrides=sets or (),
-        plugins=plugins or (),
-        times=times,
-    )
+    result = options.call(impact.run, locals())
     show(result, as_json=as_json)
     if result.failed:
         raise typer.Exit(exits.EXIT_POINTS_FAILED)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -21,7 +21,7 @@ from .execution import execution, print_summary_and_exit, run_in_memory
 def sweep(
     config: Annotated[Path, typer.Argument(help="The sweep, a TOML file; `impact init` writes one.")],
     output: options.Output = Path("results.h5"),
-    sets: options.Set = None,
+    overrides: options.Set = None,
     plugins: options.Plugins = None,
     overwrite: options.Overwrite = False,
     allow_failed: options.AllowFailed = False,
@@ -51,27 +51,23 @@ def sweep(
             if not quiet:
                 exits.print_line(f"note: {config}: {note}")
 
-        inputs: dict[str, Any] = {
-            "overrides": sets or (),
-            "plugins": plugins or (),
-            "max_points": max_points,
-            "on_note": print_note,
-        }
+        keywords["on_note"] = print_note
         if dry_run:
             if shard is not None:
                 raise UsageError(f"--shard {shard}: got --dry-run as well, which estimates the whole sweep")
-            expected = impact.estimate(config, jobs=max(jobs, threads), **inputs)
+            expected = options.call(
+                impact.estimate, locals(), source=config, jobs=max(jobs, threads), on_note=print_note
+            )
             show(expected, as_json=as_json)
             if not as_json and (scheduler or scheduler_file):
                 print_blocks([Wrapped(expected.workers_line)])
             if keywords["should_stop"]():
                 raise UnfinishedError("nothing was written")
             return
-        inputs |= keywords
         if shard is not None:
-            done = impact.sweep_shard(config, shard, output, overwrite=overwrite, **inputs)
+            done = options.call(impact.sweep_shard, locals(), source=config, **keywords)
         else:
-            outcome = impact.sweep_to_file(config, output, resume=resume, overwrite=overwrite, **inputs)
+            outcome = options.call(impact.sweep_to_file, locals(), source=config, **keywords)
     if shard is not None:
         if as_json:
             print(dump(done))
@@ -94,7 +90,7 @@ def merge(
     with execution(quiet) as keywords:
         # nothing is integrated
         del keywords["backend"]
-        outcome = impact.merge(folders, output, plugins=plugins or (), overwrite=overwrite, **keywords)
+        outcome = options.call(impact.merge, locals(), **keywords)
     if outcome.repeated_blocks and not quiet:
         exits.print_line(f"{outcome.repeated_blocks:,} blocks were in more than one folder, with the same bits")
     print_summary_and_exit(outcome, quiet=quiet, as_json=as_json, allow_failed=allow_failed)
@@ -104,27 +100,19 @@ def expand(
     result: options.Result,
     output: Annotated[Path, options.output("The file to write.")],
     sel: options.Select = None,
-    model: options.Models = None,
+    models: options.Models = None,
     overwrite: options.Overwrite = False,
     max_points: options.MaxPoints = 10**9,
 ) -> None:
     """Write all values of a result, or of a part of it, as netCDF for programs that do not use impact."""
     with exits.catch_signals() as should_stop:
-        points = impact.expand(
-            result,
-            output,
-            sel=dict(sel or ()),
-            models=model,
-            overwrite=overwrite,
-            max_points=max_points,
-            should_stop=should_stop,
-        )
+        points = options.call(impact.expand, locals(), should_stop=should_stop)
     exits.print_line(f"{output}: {points:,} points, {output.stat().st_size:,} bytes")
 
 
 def extend(
     result: options.Result,
-    sets: Annotated[
+    overrides: Annotated[
         list[str],
         options.value(
             "PATH=VALUE",
@@ -146,16 +134,7 @@ def extend(
 ) -> None:
     """Add values to the axes of a result; only what it does not hold is integrated."""
     with execution(quiet, jobs, threads) as keywords:
-        outcome = impact.extend_to_file(
-            result,
-            sets,
-            output=output,
-            resume=resume,
-            overwrite=overwrite,
-            plugins=plugins or (),
-            max_points=max_points,
-            **keywords,
-        )
+        outcome = options.call(impact.extend_to_file, locals(), **keywords)
     if not quiet:
         reason = "; layout full holds none of them" if outcome.extended_layout == "full" else ""
         count = f"{outcome.integrated:,} of {outcome.trajectories:,} trajectories were integrated for it"
@@ -173,7 +152,7 @@ def sensitivity(
     ] = None,
     output: Annotated[Path | None, options.output("The result file. \\[default: none]")] = None,
     overwrite: options.Overwrite = False,
-    sets: options.Set = None,
+    overrides: options.Set = None,
     plugins: options.Plugins = None,
     jobs: options.Jobs = 1,
     threads: options.Threads = 1,
@@ -188,22 +167,13 @@ def sensitivity(
 
     Of several outputs each has its own tables, and --json is a list.
     """
-    outputs = list(dict.fromkeys(of or ["e_out"]))
     with execution(quiet, jobs, threads) as keywords, warnings.catch_warnings():
         if quiet:
             warnings.simplefilter("ignore", impact.ImpactWarning)
         from ..uncertainty.sensitivity import sensitivities
 
-        results = sensitivities(
-            config,
-            outputs,
-            output=output,
-            overwrite=overwrite,
-            overrides=sets or (),
-            plugins=plugins or (),
-            max_points=max_points,
-            execute=partial(run_in_memory, **keywords),
-        )
+        outputs, execute = dict.fromkeys(of or ["e_out"]), partial(run_in_memory, **keywords)
+        results = options.call(sensitivities, locals(), source=config, of=[*outputs], execute=execute)
     descriptions = [impact.describe(result) for result in results]
     if as_json:
         studies = [study for description in descriptions for study in description.as_dict()["studies"]]
