@@ -19,10 +19,13 @@ inlined = njit(**JIT_OPTIONS)
 kept_on_disk = compiled(nogil=True, **OPTIONS)
 
 
-def shared(formula):
-    """A formula of the NumPy back end, compiled for numbers into its callers, which may be such formulas too."""
-    overload(formula, jit_options=JIT_OPTIONS, strict=False)(lambda *arguments: formula)
-    return inlined(formula)
+def shared(formula, of_numbers=None):
+    """A formula of the NumPy back end, compiled for numbers into its callers, which may be such formulas too.
+
+    With `of_numbers`, another formula for numbers takes its place.
+    """
+    overload(formula, jit_options=JIT_OPTIONS, strict=False)(lambda *arguments: of_numbers or formula)
+    return inlined(of_numbers or formula)
 
 
 def _reinterpreted(target, source):
@@ -41,41 +44,20 @@ def _reinterpreted(target, source):
 _bits_of, _float_of = _reinterpreted(types.int64, types.float64), _reinterpreted(types.float64, types.int64)
 
 
+def _larger_quotient(this, divisor, other, other_divisor):
+    """The larger of two quotients, by one division."""
+    this, other = this * other_divisor, other * divisor
+    # the comparison may drop a NaN, which the sum keeps
+    return ((this if this > other else other) + 0.0 * (this + other)) / (divisor * other_divisor)
+
+
 # versions for numbers of the functions that the shared formulas call
-@overload(events.choose, jit_options={"forceinline": True})
-def _compiled_choose(condition, this, other):
-    return lambda condition, this, other: this if condition else other
-
-
-@overload(events.smaller, jit_options={"forceinline": True})
-def _compiled_smaller(this, other):
-    return lambda this, other: this if this < other else other
-
-
-@overload(rk45.larger, jit_options={"forceinline": True})
-def _compiled_larger(this, other):
-    return lambda this, other: this if this > other else other
-
-
-@overload(rk45.larger_quotient, jit_options=JIT_OPTIONS)
-def _compiled_larger_quotient(this, divisor, other, other_divisor):
-    def by_one_division(this, divisor, other, other_divisor):
-        this, other = this * other_divisor, other * divisor
-        # the comparison may drop a NaN, which the sum keeps
-        return ((this if this > other else other) + 0.0 * (this + other)) / (divisor * other_divisor)
-
-    return by_one_division
-
-
-@overload(rk45.bits, jit_options={"forceinline": True})
-def _compiled_bits(number):
-    return lambda number: _bits_of(number)
-
-
-@overload(rk45.from_bits, jit_options={"forceinline": True})
-def _compiled_from_bits(whole):
-    return lambda whole: _float_of(whole)
-
+shared(events.choose, lambda condition, this, other: this if condition else other)
+shared(events.smaller, lambda this, other: this if this < other else other)
+shared(rk45.larger, lambda this, other: this if this > other else other)
+shared(rk45.larger_quotient, _larger_quotient)
+shared(rk45.bits, lambda number: _bits_of(number))
+shared(rk45.from_bits, lambda whole: _float_of(whole))
 
 ONE_BITS = int(np.float64(1.0).view(np.int64))
 # a number whose last bit has the value 1, so that adding it rounds to an integer
