@@ -9,17 +9,12 @@ from __future__ import annotations
 from ...ode import events, maximum, rk45
 from ...ode.tableau import A as FRACTIONS, E as DIFFERENCES
 from .. import force_expressions, motion, velocity_coordinates
+from ..motion import ERROR_FLOOR, MAX_S, MIN_RELEASE_S, RELEASE_STEP
 from .dispatch import END_AT_GAP, END_AT_NO_FORCE, END_AT_PEAK, EQ_DAMPED, EQ_DRAGGED, EQ_FORCE, EQ_LOG, EQ_SPRING
 from .simd_math import exponential, inlined, shared, whole_power
 
 A = tuple(tuple(map(float, row)) for row in FRACTIONS)
 E = tuple(map(float, DIFFERENCES))
-MAX_S, ERROR_FLOOR, RELEASE_STEP, MIN_RELEASE_S = (
-    motion.MAX_S,
-    motion.ERROR_FLOOR,
-    motion.RELEASE_STEP,
-    motion.MIN_RELEASE_S,
-)
 
 damped, dragged = shared(force_expressions.damped), shared(force_expressions.dragged)
 rate_of_log, rate_of_force = shared(velocity_coordinates.rate_of_log), shared(velocity_coordinates.rate_of_force)

@@ -15,8 +15,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ...ode import maximum, rk45
+from ...ode.maximum import FLAT_SLOPE, SECANT_STEPS, SLOPE_STEP
 from ...ode.problem import Termination
+from ...ode.rk45 import MAX_HALVINGS, MIN_STEP
 from .dispatch import END_AT_PEAK, Form
 from .expressions import (
     at_event,
@@ -53,22 +54,12 @@ LANES, GROUPS = 32, 2
 ) = range(30)  # fmt: skip
 WORKSPACE_ROWS = 30
 
-MIN_STEP, MAX_HALVINGS = rk45.MIN_STEP, float(rk45.MAX_HALVINGS)
-SLOPE_STEP, FLAT_SLOPE, SECANT_STEPS = maximum.SLOPE_STEP, maximum.FLAT_SLOPE, maximum.SECANT_STEPS
-RUNNING, EVENT_REACHED = float(Termination.RUNNING), float(Termination.EVENT_REACHED)
-EVENT_UNREACHABLE, TOO_MANY_STEPS = float(Termination.EVENT_UNREACHABLE), float(Termination.MAX_STEPS)
-STEP_UNDERFLOW, NOT_FINITE = float(Termination.STEP_UNDERFLOW), float(Termination.NOT_FINITE)
+# numbers of the workspace
+RUNNING, EVENT_REACHED, EVENT_UNREACHABLE, TOO_MANY_STEPS, STEP_UNDERFLOW, NOT_FINITE = map(float, Termination)
 
 # numba's cache checks this file alone; this number, a constant of the kernel, represents the other source files
-_NUMBA_FOLDER = Path(__file__).parent
-_PACKAGE_FOLDER = _NUMBA_FOLDER.parents[1]
-_SOURCES = sorted(
-    (
-        *(_PACKAGE_FOLDER / "ode").glob("*.py"),
-        *(_PACKAGE_FOLDER / "contact").glob("*.py"),
-        *_NUMBA_FOLDER.glob("*.py"),
-    )
-)
+_FOLDERS = (Path(__file__).parents[2] / folder for folder in ("ode", "contact", "contact/numba"))
+_SOURCES = sorted(path for folder in _FOLDERS for path in folder.glob("*.py"))
 SOURCE_CRC = zlib.crc32(b"".join(path.read_bytes() for path in _SOURCES))
 
 
