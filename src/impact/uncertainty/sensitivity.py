@@ -81,16 +81,7 @@ def sensitivity(
     >>> study["first"].values.round(2).tolist()
     [[0.56, 0.43]]
     """
-    (result,) = sensitivities(
-        source,
-        [of],
-        output=output,
-        overwrite=overwrite,
-        overrides=overrides,
-        plugins=plugins,
-        max_points=max_points,
-        execute=execute,
-    )
+    (result,) = sensitivities(**{**locals(), "of": [of]})
     return result
 
 
