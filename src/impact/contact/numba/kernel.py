@@ -40,7 +40,7 @@ from .simd_math import inlined, kept_on_disk
 
 # lanes of a group, and groups advanced in turn
 LANES, GROUPS = 32, 2
-# rows of the workspace: the state, its rates and the watched quantity, the next step and the last one
+# where the rows of the workspace begin: the state, its rates and the watched quantity, the next step, the last one
 (
     S, Y, TIME, WORK, RATE_S, RATE_Y, WATCHED, H, H_LAST,
     # the same before the last trial step
@@ -51,8 +51,7 @@ LANES, GROUPS = 32, 2
     # the largest watched value at a step's end, its components, and the adjacent steps
     LARGEST_WATCHED, PEAK_S, PEAK_Y, STEP_BEHIND, STEP_AHEAD,
     STEPS, HALVINGS, ENDED,
-) = range(30)  # fmt: skip
-WORKSPACE_ROWS = 30
+) = range(0, 30 * LANES, LANES)  # fmt: skip
 
 # numbers of the workspace
 RUNNING, EVENT_REACHED, EVENT_UNREACHABLE, TOO_MANY_STEPS, STEP_UNDERFLOW, NOT_FINITE = map(float, Termination)
@@ -66,8 +65,8 @@ SOURCE_CRC = zlib.crc32(b"".join(path.read_bytes() for path in _SOURCES))
 @inlined
 def state_at(w, row, j):
     """s, y, their rates and the watched quantity of lane j: with row S the current ones, with S_0 those before."""
-    row = row * LANES + j
-    return w[row], w[row + Y * LANES], w[row + RATE_S * LANES], w[row + RATE_Y * LANES], w[row + WATCHED * LANES]
+    row = row + j
+    return w[row], w[row + Y], w[row + RATE_S], w[row + RATE_Y], w[row + WATCHED]
 
 
 @inlined
@@ -76,35 +75,35 @@ def advance(form, w, rtol):
     marks = 0
     for j in range(LANES):
         s, y, rate_s, rate_y, watched = state_at(w, S, j)
-        t, work, h, h_last = w[TIME * LANES + j], w[WORK * LANES + j], w[H * LANES + j], w[H_LAST * LANES + j]
-        strength = w[STRENGTH * LANES + j]
+        t, work, h, h_last = w[TIME + j], w[WORK + j], w[H + j], w[H_LAST + j]
+        strength = w[STRENGTH + j]
         end_s, end_y, more_t, more_work, end_rate_s, end_rate_y, end_watched, error = rk_step(
             form, s, y, rate_s, rate_y, watched, h, strength
         )
-        running = w[ENDED * LANES + j] == RUNNING
+        running = w[ENDED + j] == RUNNING
         accepted, finite = running and error <= rtol, error < np.inf
         h_next = next_step(h, error, rtol) if finite else 0.5 * h
 
         gap, rate_of_gap = event(form, end_s, end_y, end_rate_s, end_rate_y, end_watched, strength)
         marked = not finite or is_event_ahead(gap, rate_of_gap, h_next) or h_next < MIN_STEP
-        marked = marked or is_unreachable(form, end_s, end_rate_s, w[BOUND * LANES + j])
+        marked = marked or is_unreachable(form, end_s, end_rate_s, w[BOUND + j])
         if form.ending == END_AT_PEAK:
-            marked = marked or begins_to_fall(watched, end_watched, w[LARGEST_WATCHED * LANES + j])
+            marked = marked or begins_to_fall(watched, end_watched, w[LARGEST_WATCHED + j])
         marked = running and marked
         marks += 1 if marked else 0
-        w[MARKED * LANES + j], w[LOCAL_ERROR * LANES + j] = 1.0 if marked else 0.0, error
+        w[MARKED + j], w[LOCAL_ERROR + j] = 1.0 if marked else 0.0, error
 
-        w[S_0 * LANES + j], w[Y_0 * LANES + j], w[TIME_0 * LANES + j], w[WORK_0 * LANES + j] = s, y, t, work
-        w[RATE_S_0 * LANES + j], w[RATE_Y_0 * LANES + j], w[WATCHED_0 * LANES + j] = rate_s, rate_y, watched
-        w[H_0 * LANES + j], w[H_LAST_0 * LANES + j] = h, h_last
-        w[S * LANES + j], w[Y * LANES + j] = end_s if accepted else s, end_y if accepted else y
-        w[TIME * LANES + j] = t + more_t if accepted else t
-        w[WORK * LANES + j] = work + more_work if accepted else work
-        w[RATE_S * LANES + j] = end_rate_s if accepted else rate_s
-        w[RATE_Y * LANES + j] = end_rate_y if accepted else rate_y
-        w[WATCHED * LANES + j] = end_watched if accepted else watched
-        w[H_LAST * LANES + j], w[H * LANES + j] = h if accepted else h_last, h_next
-        w[STEPS * LANES + j] += 1.0 if accepted else 0.0
+        w[S_0 + j], w[Y_0 + j], w[TIME_0 + j], w[WORK_0 + j] = s, y, t, work
+        w[RATE_S_0 + j], w[RATE_Y_0 + j], w[WATCHED_0 + j] = rate_s, rate_y, watched
+        w[H_0 + j], w[H_LAST_0 + j] = h, h_last
+        w[S + j], w[Y + j] = end_s if accepted else s, end_y if accepted else y
+        w[TIME + j] = t + more_t if accepted else t
+        w[WORK + j] = work + more_work if accepted else work
+        w[RATE_S + j] = end_rate_s if accepted else rate_s
+        w[RATE_Y + j] = end_rate_y if accepted else rate_y
+        w[WATCHED + j] = end_watched if accepted else watched
+        w[H_LAST + j], w[H + j] = h if accepted else h_last, h_next
+        w[STEPS + j] += 1.0 if accepted else 0.0
     return marks
 
 
@@ -149,14 +148,14 @@ def locate_event(form, start, end, h, h_next, strength, accepted):
 @inlined
 def update_peak(w, j, falls, highest, start, end, s, y):
     """Update the peak where the watched quantity begins to fall, or is highest where the lane ends."""
-    h, h_last = w[H_0 * LANES + j], w[H_LAST_0 * LANES + j]
-    best, peak_s, peak_y = w[LARGEST_WATCHED * LANES + j], w[PEAK_S * LANES + j], w[PEAK_Y * LANES + j]
-    behind, ahead = w[STEP_BEHIND * LANES + j], w[STEP_AHEAD * LANES + j]
-    w[LARGEST_WATCHED * LANES + j] = end[4] if highest else start[4] if falls else best
-    w[PEAK_S * LANES + j] = s if highest else start[0] if falls else peak_s
-    w[PEAK_Y * LANES + j] = y if highest else start[1] if falls else peak_y
-    w[STEP_BEHIND * LANES + j] = h if highest else h_last if falls else behind
-    w[STEP_AHEAD * LANES + j] = 0.0 if highest else h if falls else ahead
+    h, h_last = w[H_0 + j], w[H_LAST_0 + j]
+    best, peak_s, peak_y = w[LARGEST_WATCHED + j], w[PEAK_S + j], w[PEAK_Y + j]
+    behind, ahead = w[STEP_BEHIND + j], w[STEP_AHEAD + j]
+    w[LARGEST_WATCHED + j] = end[4] if highest else start[4] if falls else best
+    w[PEAK_S + j] = s if highest else start[0] if falls else peak_s
+    w[PEAK_Y + j] = y if highest else start[1] if falls else peak_y
+    w[STEP_BEHIND + j] = h if highest else h_last if falls else behind
+    w[STEP_AHEAD + j] = 0.0 if highest else h if falls else ahead
 
 
 @inlined
@@ -166,15 +165,15 @@ def finish_steps(form, w, rtol, is_last):
     for j in range(LANES):
         # everything is read first, also what is not used below, so that the loop has no branch
         start, end = state_at(w, S_0, j), state_at(w, S, j)
-        t_0, work_0, h_last_0 = w[TIME_0 * LANES + j], w[WORK_0 * LANES + j], w[H_LAST_0 * LANES + j]
-        t, work, h, h_last = w[TIME * LANES + j], w[WORK * LANES + j], w[H_0 * LANES + j], w[H_LAST * LANES + j]
-        strength, bound, best = w[STRENGTH * LANES + j], w[BOUND * LANES + j], w[LARGEST_WATCHED * LANES + j]
-        marked, error, ended = w[MARKED * LANES + j] != 0.0, w[LOCAL_ERROR * LANES + j], w[ENDED * LANES + j]
-        halvings = w[HALVINGS * LANES + j] + (1.0 if marked and not error < np.inf else 0.0)
+        t_0, work_0, h_last_0 = w[TIME_0 + j], w[WORK_0 + j], w[H_LAST_0 + j]
+        t, work, h, h_last = w[TIME + j], w[WORK + j], w[H_0 + j], w[H_LAST + j]
+        strength, bound, best = w[STRENGTH + j], w[BOUND + j], w[LARGEST_WATCHED + j]
+        marked, error, ended = w[MARKED + j] != 0.0, w[LOCAL_ERROR + j], w[ENDED + j]
+        halvings = w[HALVINGS + j] + (1.0 if marked and not error < np.inf else 0.0)
         ended = NOT_FINITE if halvings > MAX_HALVINGS else ended
         accepted = marked and error <= rtol
         located, crossed, s, y, more_t, more_work, h_next = locate_event(
-            form, start, end, h, w[H * LANES + j], strength, accepted
+            form, start, end, h, w[H + j], strength, accepted
         )
         accepted = accepted and not crossed
         ended = EVENT_REACHED if located else ended
@@ -189,15 +188,15 @@ def finish_steps(form, w, rtol, is_last):
         ended = STEP_UNDERFLOW if ended == RUNNING and h_next < MIN_STEP else ended
         ended = TOO_MANY_STEPS if ended == RUNNING and is_last else ended
         still_running += 1 if ended == RUNNING else 0
-        w[ENDED * LANES + j], w[HALVINGS * LANES + j], w[H * LANES + j] = ended, halvings, h_next
-        w[S * LANES + j], w[Y * LANES + j] = start[0] if crossed else s, start[1] if crossed else y
-        w[TIME * LANES + j] = t_0 if crossed else t + (more_t if located else 0.0)
-        w[WORK * LANES + j] = work_0 if crossed else work + (more_work if located else 0.0)
-        w[RATE_S * LANES + j] = start[2] if crossed else end[2]
-        w[RATE_Y * LANES + j] = start[3] if crossed else end[3]
-        w[WATCHED * LANES + j] = start[4] if crossed else end[4]
-        w[H_LAST * LANES + j] = h_last_0 if crossed else h_last
-        w[STEPS * LANES + j] -= 1.0 if crossed else 0.0
+        w[ENDED + j], w[HALVINGS + j], w[H + j] = ended, halvings, h_next
+        w[S + j], w[Y + j] = start[0] if crossed else s, start[1] if crossed else y
+        w[TIME + j] = t_0 if crossed else t + (more_t if located else 0.0)
+        w[WORK + j] = work_0 if crossed else work + (more_work if located else 0.0)
+        w[RATE_S + j] = start[2] if crossed else end[2]
+        w[RATE_Y + j] = start[3] if crossed else end[3]
+        w[WATCHED + j] = start[4] if crossed else end[4]
+        w[H_LAST + j] = h_last_0 if crossed else h_last
+        w[STEPS + j] -= 1.0 if crossed else 0.0
     return still_running
 
 
@@ -209,13 +208,13 @@ def begin(form, w, first, count, start, strength, bound, first_step):
         s, y = start[0, i], start[1, i]
         rate_s, rate_y, _, _ = rates(form, s, y, strength[i])
         watched = force(form, s, y, rate_s, strength[i])
-        w[S * LANES + j], w[Y * LANES + j], w[TIME * LANES + j], w[WORK * LANES + j] = s, y, 0.0, 0.0
-        w[RATE_S * LANES + j], w[RATE_Y * LANES + j], w[WATCHED * LANES + j] = rate_s, rate_y, watched
-        w[H * LANES + j], w[H_LAST * LANES + j] = first_step, 0.0
-        w[STRENGTH * LANES + j], w[BOUND * LANES + j] = strength[i], bound[i]
-        w[LARGEST_WATCHED * LANES + j], w[PEAK_S * LANES + j], w[PEAK_Y * LANES + j] = -np.inf, s, y
-        w[STEP_BEHIND * LANES + j], w[STEP_AHEAD * LANES + j] = 0.0, 0.0
-        w[STEPS * LANES + j], w[HALVINGS * LANES + j], w[ENDED * LANES + j] = 0.0, 0.0, RUNNING
+        w[S + j], w[Y + j], w[TIME + j], w[WORK + j] = s, y, 0.0, 0.0
+        w[RATE_S + j], w[RATE_Y + j], w[WATCHED + j] = rate_s, rate_y, watched
+        w[H + j], w[H_LAST + j] = first_step, 0.0
+        w[STRENGTH + j], w[BOUND + j] = strength[i], bound[i]
+        w[LARGEST_WATCHED + j], w[PEAK_S + j], w[PEAK_Y + j] = -np.inf, s, y
+        w[STEP_BEHIND + j], w[STEP_AHEAD + j] = 0.0, 0.0
+        w[STEPS + j], w[HALVINGS + j], w[ENDED + j] = 0.0, 0.0, RUNNING
 
 
 @inlined
@@ -225,52 +224,44 @@ def refine_maximum(form, w):
     span, small, right, slope_right = TIME, H_LAST, WORK, H_0
     unrefined = 0
     for j in range(LANES):
-        s, y, strength = w[PEAK_S * LANES + j], w[PEAK_Y * LANES + j], w[STRENGTH * LANES + j]
+        s, y, strength = w[PEAK_S + j], w[PEAK_Y + j], w[STRENGTH + j]
         rate_s, rate_y, _, _ = rates(form, s, y, strength)
         watched = force(form, s, y, rate_s, strength)
-        w[RATE_S * LANES + j], w[RATE_Y * LANES + j], w[WATCHED * LANES + j] = rate_s, rate_y, watched
-        step = SLOPE_STEP * max(w[STEP_BEHIND * LANES + j], w[STEP_AHEAD * LANES + j])
+        w[RATE_S + j], w[RATE_Y + j], w[WATCHED + j] = rate_s, rate_y, watched
+        step = SLOPE_STEP * max(w[STEP_BEHIND + j], w[STEP_AHEAD + j])
         slope = slope_of_force(form, s, y, rate_s, rate_y, watched, step, strength)
-        reach = w[STEP_AHEAD * LANES + j] if slope > 0.0 else -w[STEP_BEHIND * LANES + j]
-        reach = reach if abs(slope * reach) > FLAT_SLOPE * abs(w[LARGEST_WATCHED * LANES + j]) else 0.0
+        reach = w[STEP_AHEAD + j] if slope > 0.0 else -w[STEP_BEHIND + j]
+        reach = reach if abs(slope * reach) > FLAT_SLOPE * abs(w[LARGEST_WATCHED + j]) else 0.0
         unrefined += 1 if reach != 0.0 else 0
-        w[small * LANES + j], w[slope_right * LANES + j] = step, slope
-        w[span * LANES + j], w[H * LANES + j], w[right * LANES + j] = reach, reach, 0.0
+        w[small + j], w[slope_right + j] = step, slope
+        w[span + j], w[H + j], w[right + j] = reach, reach, 0.0
     for count in range(SECANT_STEPS + 1 if unrefined else 0):
         for j in range(LANES):
+            s, y, strength = w[PEAK_S + j], w[PEAK_Y + j], w[STRENGTH + j]
             s, y, _, _, rate_s, rate_y, watched, _ = rk_step(
-                form,
-                w[PEAK_S * LANES + j],
-                w[PEAK_Y * LANES + j],
-                w[RATE_S * LANES + j],
-                w[RATE_Y * LANES + j],
-                w[WATCHED * LANES + j],
-                w[H * LANES + j],
-                w[STRENGTH * LANES + j],
+                form, s, y, w[RATE_S + j], w[RATE_Y + j], w[WATCHED + j], w[H + j], strength
             )
-            slope = slope_of_force(
-                form, s, y, rate_s, rate_y, watched, w[small * LANES + j], w[STRENGTH * LANES + j]
-            )
-            reach, best = w[span * LANES + j], w[LARGEST_WATCHED * LANES + j]
-            w[LARGEST_WATCHED * LANES + j] = watched if reach != 0.0 and watched > best else best
-            fraction = 1.0 if count == 0 else w[H * LANES + j] / reach
-            fraction_before, slope_before = w[right * LANES + j], w[slope_right * LANES + j]
-            w[right * LANES + j], w[slope_right * LANES + j] = fraction, slope
-            w[H * LANES + j] = secant_update(fraction_before, slope_before, fraction, slope) * reach
+            slope = slope_of_force(form, s, y, rate_s, rate_y, watched, w[small + j], strength)
+            reach, best = w[span + j], w[LARGEST_WATCHED + j]
+            w[LARGEST_WATCHED + j] = watched if reach != 0.0 and watched > best else best
+            fraction = 1.0 if count == 0 else w[H + j] / reach
+            fraction_before, slope_before = w[right + j], w[slope_right + j]
+            w[right + j], w[slope_right + j] = fraction, slope
+            w[H + j] = secant_update(fraction_before, slope_before, fraction, slope) * reach
 
 
 @inlined
 def end_all(form, w, first, count, state, best, steps, end):
     """Write the results of the trajectories of a group."""
     for j in range(min(LANES, count - first)):
-        i, reached = first + j, w[ENDED * LANES + j] == EVENT_REACHED
+        i, reached = first + j, w[ENDED + j] == EVENT_REACHED
         for row in range(4):
-            state[row, i] = w[(S + row) * LANES + j] if reached else np.nan
-        steps[i], end[i] = int(w[STEPS * LANES + j]), int(w[ENDED * LANES + j])
+            state[row, i] = w[S + row * LANES + j] if reached else np.nan
+        steps[i], end[i] = int(w[STEPS + j]), int(w[ENDED + j])
     if form.ending == END_AT_PEAK:
         refine_maximum(form, w)
     for j in range(min(LANES, count - first)):
-        best[first + j] = w[LARGEST_WATCHED * LANES + j] if w[ENDED * LANES + j] == EVENT_REACHED else np.nan
+        best[first + j] = w[LARGEST_WATCHED + j] if w[ENDED + j] == EVENT_REACHED else np.nan
 
 
 def _kernel(form: Form, version: int):
@@ -279,7 +270,7 @@ def _kernel(form: Form, version: int):
     @kept_on_disk
     def integrate(start, strength, bound, first_step, rtol, max_steps, state, best, steps, end):
         count = start.shape[1] if version >= 0 else 0
-        w = np.zeros((GROUPS, WORKSPACE_ROWS * LANES))
+        w = np.zeros((GROUPS, ENDED + LANES))
         # the first trajectory of each group, and the number of trial steps
         first, trials = np.arange(0, GROUPS * LANES, LANES), np.zeros(GROUPS, np.int64)
         for group in range(GROUPS):
