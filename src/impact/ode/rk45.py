@@ -38,7 +38,7 @@ NestedWeights = tuple[tuple[int, Array], ...]
 
 
 def _nested_weights(row: tuple[Fraction, ...]) -> NestedWeights:
-    """Write a row of weights for `_weighted`: each relative to the next, zeros left out."""
+    """Write a row of weights for `_weighted_sum`: each relative to the next, zeros left out."""
     stages = [stage for stage, weight in enumerate(row) if weight]
     next_weights = [*(row[stage] for stage in stages[1:]), Fraction(1)][: len(stages)]
     ratios = (float(row[stage] / other) for stage, other in zip(stages, next_weights, strict=True))

@@ -24,11 +24,6 @@ class PeakCandidate:
     behind: Array
     ahead: Array
 
-    @classmethod
-    def of(cls, start: Array) -> PeakCandidate:
-        """Begin with the starts of all trajectories, without adjacent steps."""
-        return cls(start.copy(), np.zeros(start.shape[1]), np.zeros(start.shape[1]))
-
     def put(self, positions: NDArray[np.intp], y: Array, behind: Array, ahead: Array | float) -> None:
         """Replace the candidates at the given positions."""
         put_columns(self.y, positions, y)
@@ -54,19 +49,15 @@ class Workspace:
 
     def narrow(self, n: int) -> Workspace:
         """Use the same memory for fewer trajectories."""
-        stages = [_narrow(stage, n) for stage in self.stages]
-        return Workspace(stages, _narrow(self.y_end, n), _narrow(self.part, n))
+        arrays = (*self.stages, self.y_end, self.part)
+        *stages, y_end, part = (rows.reshape(-1)[: len(rows) * n].reshape(len(rows), n) for rows in arrays)
+        return Workspace(stages, y_end, part)
 
 
 def put_columns(rows: Array, positions: NDArray[np.intp], values: Array) -> None:
     """Replace columns of the rows; row by row, which is many times faster than by both indices."""
     for row, new in zip(rows, values, strict=True):
         row[positions] = new
-
-
-def _narrow(rows: Array, n: int) -> Array:
-    """Narrow the memory of an array of rows, for rows of length n."""
-    return rows.reshape(-1)[: len(rows) * n].reshape(len(rows), n)
 
 
 @dataclass
@@ -120,7 +111,7 @@ class State:
             steps=np.zeros(n, np.int32),
             termination=np.full(n, RUNNING, np.int8),
             best=np.full(n, -np.inf),
-            peak=PeakCandidate.of(start),
+            peak=PeakCandidate(start.copy(), behind=np.zeros(n), ahead=np.zeros(n)),
             workspace=workspace,
         )
 
