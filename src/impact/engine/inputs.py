@@ -96,10 +96,6 @@ class Inputs:
         material = self.materials.get(parsed.material)
         return np.asarray(None if material is None else getattr(material, parsed.key))
 
-    def materials_of(self, ball: str) -> frozenset[str]:
-        """List the materials that a ball, "1" or "2", has in any cell."""
-        return self._ball_materials[ball]
-
     def index(self, slices: Sequence[slice] | None = None) -> Index:
         """Index a part of the grid, one array along each axis; by default of the whole grid."""
         slices = [slice(None)] * len(self.axes) if slices is None else slices
@@ -116,7 +112,8 @@ class Inputs:
         return {**columns, **scalars, **self.stiffness}
 
     @cached_property
-    def _ball_materials(self) -> dict[str, frozenset[str]]:
+    def materials_of(self) -> dict[str, frozenset[str]]:
+        """The materials that a ball, "1" or "2", has in any cell."""
         names = {ball: ({"material", f"material{ball}"} & {*self.names()}) for ball in "12"}
         return {
             ball: frozenset(str(value) for name in of_ball for value in np.unique(self.values(name)))
@@ -228,7 +225,7 @@ def property_at(inputs: Inputs, ball: str, key: str, index: Index) -> Array:
     materials, material_index = np.unique(material_of_cell, return_inverse=True)
     table = np.array([getattr(inputs.materials[str(material)], key) for material in materials], dtype=float)
     values = table[material_index].reshape(material_of_cell.shape)
-    for material in sorted(inputs.materials_of(ball)):
+    for material in sorted(inputs.materials_of[ball]):
         column = f"materials.{material}.{key}"
         # also where no cell has the material: the shape shows along which axes the property of the ball varies
         if column in names:

@@ -226,7 +226,7 @@ class Plan:
         for name, value in self.config.scalars.items():
             if (parsed := InputName.parse(name)).material:
                 fixed.setdefault(parsed.material, {})[parsed.key] = float(value)
-        used = sorted(self.inputs.materials_of("1") | self.inputs.materials_of("2"))
+        used = sorted(frozenset().union(*self.inputs.materials_of.values()))
         return {name: replace(self.config.materials[name], **fixed.get(name, {})) for name in used}
 
     @property

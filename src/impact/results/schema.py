@@ -353,7 +353,7 @@ def plan_coordinates(plan: Plan) -> xr.Coordinates:
         texts = {"long_name": "requested restitution", "equation": "e = 1 - alpha (v1 - v2)  (24)"}
         derive("e", sources, **texts)
     for ball in "12":
-        densities = (f"materials.{name}.rho" for name in plan.inputs.materials_of(ball))
+        densities = (f"materials.{name}.rho" for name in plan.inputs.materials_of[ball])
         material = ("material", f"material{ball}", *densities)
         equation = "m = (4/3) pi R^3 rho"
         if f"m{ball}" not in names:

@@ -487,5 +487,5 @@ def inputs_of(dataset: xr.Dataset) -> Inputs | None:
         inputs = read_inputs(dataset, [str(dim) for dim in dataset.sizes if dim != "model"])
     except (ResultError, KeyError):
         return None
-    is_complete = all(inputs.materials_of(ball) <= inputs.materials.keys() for ball in "12")
+    is_complete = all(names <= inputs.materials.keys() for names in inputs.materials_of.values())
     return inputs if is_complete else None
