@@ -313,6 +313,15 @@ def test_compare_reports_a_changed_restitution(cli: Run, folder: Path, layout: s
     assert f"model=tsuji-1992, friction={SPRING}, angle=" in done.stdout
 
 
+@pytest.mark.parametrize("friction", [SPRING, [SPRING]])
+def test_a_rerun_repeats_the_friction_laws_of_the_file(
+    whole: xr.Dataset, friction: str | list[str], tmp_path: Path
+) -> None:
+    impact.save(whole.sel(friction=friction), tmp_path / "part.h5")
+    verdict = impact.rerun(tmp_path / "part.h5")
+    assert verdict.equal, str(verdict)
+
+
 def test_a_verdict_has_the_word_of_a_point_as_plain_data() -> None:
     source = {
         "models": ["hertz"],

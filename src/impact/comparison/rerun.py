@@ -78,6 +78,8 @@ def rerun(
         verdict = compare(calibrate_config(config, plugin_set.of(config.models)), stored, tol=tol, subset=subset)
         return replace(verdict, new="the rerun", baseline=name)
     require_sweep(stored, "rerun")
+    if "friction" in stored.coords:
+        changes.append(f"frictions={json.dumps(stored['friction'].values.ravel().tolist())}")
     # any core gives the same result
     changes.append('solver.core="auto"')
     config = stored_config(stored.attrs, changes, plugin_set, name, max_points, allow_changed_plugins=True)
