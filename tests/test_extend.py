@@ -324,9 +324,16 @@ def test_a_refused_extension_is_one_line_and_exit_code_2(cli: Run, stored_sweep:
 
 
 def test_a_part_of_a_result_and_a_history_are_not_extended(stored_sweep: StoredSweep, tmp_path: Path) -> None:
-    impact.save(impact.load(stored_sweep()).isel(e=[0]), tmp_path / "part.h5")
-    with pytest.raises(UsageError, match="got a part of a result, expected the whole result"):
-        impact.extend(tmp_path / "part.h5", ["sweep.m2=[3.0]"])
+    (tmp_path / "c.toml").write_text(BASE, encoding="utf-8")
+    whole = impact.load(stored_sweep())
+    for number, part in enumerate([whole.isel(e=[0]), whole.isel(e=[1, 0]), whole.drop_vars("peak_force")]):
+        path = tmp_path / f"{number}.h5"
+        impact.save(part, path)
+        with pytest.raises(UsageError, match="got a part of a result, or another order, expected the whole"):
+            impact.extend(path, ["sweep.m2=[3.0]"])
+        # a sweep does not take it for its result either
+        with pytest.raises(UsageError, match="exists"):
+            impact.sweep(tmp_path / "c.toml", output=path)
     impact.save(impact.run(at={"e": 0.5}).history, tmp_path / "history.h5")
     with pytest.raises(UsageError, match="time history"):
         impact.extend(tmp_path / "history.h5", ["sweep.m2=[3.0]"])

@@ -37,7 +37,7 @@ from .provenance import stored_config
 from .schema import require_sweep
 from .selection import IndexArray, match_labels
 from .summary import SweepOutcome
-from .sweep import sweep_into
+from .sweep import is_whole, sweep_into
 from .trajectory_table import ExpandedSlab, TrajectoryTable, table_of_result
 from .xarray_backend import load, open_result
 
@@ -143,8 +143,8 @@ def extend_to_file(
             raise ResultError(
                 f"{name}: was written by impact {version}, this is {__version__}; run its sweep again"
             )
-        if before.attrs.get("fingerprint") != old.fingerprint or dict(before.sizes) != old.sizes:
-            raise UsageError(f"{name}: got a part of a result, expected the whole result")
+        if not is_whole(before, old):
+            raise UsageError(f"{name}: got a part of a result, or another order, expected the whole result")
         config = _extended_config(before, old, changes, plugin_set, name, max_points)
         if before.attrs.get("core") in CORES:
             # the existing trajectories were integrated by this core

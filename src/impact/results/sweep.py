@@ -364,10 +364,20 @@ def find_finished(path: Path, plan: Plan) -> SweepOutcome | None:
         dataset = open_result(path)
     except ResultError:
         return None
-    if dataset.attrs.get("fingerprint") != plan.fingerprint or dict(dataset.sizes) != plan.sizes:
+    if not is_whole(dataset, plan):
         dataset.close()
         return None
     return SweepOutcome(dataset, summarize(dataset), plan.trajectories, is_new=False, output=path)
+
+
+def is_whole(dataset: xr.Dataset, plan: Plan) -> bool:
+    """Whether a dataset is the result of a plan: neither a part of it, nor sorted along an axis."""
+    return (
+        dataset.attrs.get("fingerprint") == plan.fingerprint
+        and dict(dataset.sizes) == plan.sizes
+        and all(variable.name in dataset for variable in stored_variables(plan))
+        and all(tuple(dataset[axis.name].values.tolist()) == axis.labels for axis in plan.config.axes)
+    )
 
 
 def _missing_space(error: Exception, output: Path, plan: Plan, counter: ProgressCounter) -> list[str]:
