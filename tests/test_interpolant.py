@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -113,6 +115,24 @@ def test_only_a_small_interval_around_a_kink_or_a_jump_has_no_polynomial(
     is_known = ~np.isnan(values)
     assert np.abs(x[~is_known] - 0.3).max() < 0.03
     np.testing.assert_allclose(values[is_known], function(x - 0.3)[is_known], atol=1e-12)
+
+
+def test_threads_that_divide_intervals_at_the_same_time_have_the_values_of_one() -> None:
+    def function(x: Array) -> Array:
+        return np.asarray(np.abs(x - 0.5))[:, None]
+
+    points = np.random.default_rng(0).uniform(0.01, 3.9, (8, 4))
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    try:
+        with ThreadPoolExecutor(8) as executor:
+            for _ in range(100):
+                interpolant = Interpolant(function, np.linspace(0.001, 4.001, 5), np.ones(1))
+                for x, values in zip(points, executor.map(interpolant, points), strict=True):
+                    known = ~np.isnan(values)
+                    np.testing.assert_allclose(values[known], function(x)[known], atol=1e-9)
+    finally:
+        sys.setswitchinterval(before)
 
 
 def test_an_interval_that_is_not_needed_is_not_divided() -> None:

@@ -178,18 +178,20 @@ class Interpolant:
 
         They do not depend on what was asked for before: the intervals of x are divided as often as it takes.
         """
-        number = self._interval_of(x)
-        while self._refine(np.unique(number[number >= 0])):
-            number = self._interval_of(x)
+        # another thread may replace those of the function
+        intervals, is_divided = self.intervals, True
+        while is_divided:
+            number = _interval_of(x, intervals)
+            intervals, is_divided = self._refined(intervals, np.unique(number[number >= 0]))
         values: Array = np.full((x.size, self.floors.size), np.nan)
         for chosen in np.unique(number[number >= 0]).tolist():
             inside = number == chosen
-            values[inside] = self.intervals[chosen](x[inside])
+            values[inside] = intervals[chosen](x[inside])
         return values
 
     def resolve(self) -> None:
         """Divide all intervals until each is accurate or divided enough."""
-        while self._refine(np.arange(len(self.intervals))):
+        while self._refined(self.intervals, np.arange(len(self.intervals)))[1]:
             if len(self.intervals) > MAX_INTERVALS:
                 self.max_divisions = 0
 
@@ -216,15 +218,9 @@ class Interpolant:
         is_finite = np.isfinite(all_values)
         return all_x[is_finite], all_values[is_finite]
 
-    def _interval_of(self, x: Array) -> NDArray[np.intp]:
-        """Find the number of the interval of each value; -1 outside."""
-        edges = [self.intervals[0].lower, *(interval.upper for interval in self.intervals)]
-        number = np.searchsorted(edges[1:-1], x)
-        return np.where((x >= edges[0]) & (x <= edges[-1]), number, -1)
-
-    def _refine(self, numbers: NDArray[np.intp]) -> bool:
-        """Try intervals that are untried, and divide those that are not accurate; whether any was."""
-        intervals = self.intervals.copy()
+    def _refined(self, old: list[Interval], numbers: NDArray[np.intp]) -> tuple[list[Interval], bool]:
+        """Try intervals that are untried, and divide those that are not accurate; also whether any was."""
+        intervals = old.copy()
         untried = [number for number in numbers.tolist() if intervals[number].values is None]
         if untried:
             values = self.function(np.concatenate([intervals[number].nodes for number in untried]))
@@ -233,8 +229,8 @@ class Interpolant:
         divided = {number for number in numbers.tolist() if self._is_divided(intervals[number])}
         if untried or divided:
             parts = [i.parts() if number in divided else [i] for number, i in enumerate(intervals)]
-            self.intervals = [interval for part in parts for interval in part]
-        return bool(divided)
+            self.intervals = intervals = [interval for part in parts for interval in part]
+        return intervals, bool(divided)
 
     def _is_divided(self, interval: Interval) -> bool:
         """Whether an interval is not accurate, but its parts may be, and are needed."""
@@ -244,6 +240,13 @@ class Interpolant:
         # what fails in most of it, or near its ends, is not worth many divisions
         is_worth = is_finite.all() or (is_finite.mean() > 0.5 and interval.divisions < MAX_DIVISIONS)
         return bool(is_worth) and (self.is_needed is None or self.is_needed(interval.values))
+
+
+def _interval_of(x: Array, intervals: Sequence[Interval]) -> NDArray[np.intp]:
+    """Find the number of the interval of each value; -1 outside."""
+    edges = [intervals[0].lower, *(interval.upper for interval in intervals)]
+    number = np.searchsorted(edges[1:-1], x)
+    return np.where((x >= edges[0]) & (x <= edges[-1]), number, -1)
 
 
 class InterpolatedCollisions:
@@ -257,6 +260,12 @@ class InterpolatedCollisions:
     rtol, max_steps, core : see `integrate_collisions`
     """
 
+    # the exponent and the params of the first call, shape (params, 1); as the group, set once by whichever thread
+    first: tuple[float, Array] | None = None
+    # the number of the param that varies, and what it determines; what follows where none varies
+    group: tuple[int, Interpolant] | None = None
+    constant: CollisionResult | None = None
+
     def __init__(
         self, model: ForceModel, outputs: Sequence[str], *, rtol: float, max_steps: int, core: str
     ) -> None:
@@ -264,40 +273,35 @@ class InterpolatedCollisions:
         self.columns = tuple(column for column in FLOORS if column in needed)
         self.model = model
         self.settings: dict[str, Any] = {"rtol": rtol, "max_steps": max_steps, "core": core}
-        # the exponent and the params of the first call, shape (params, 1)
-        self.first: tuple[float, Array] | None = None
-        # the number of the param that varies, and what it determines; what follows where none varies
-        self.group: tuple[int, Interpolant] | None = None
-        self.constant: CollisionResult | None = None
 
     def __call__(
         self, law: MotionLaw, params: Params, n: int, *, never_separates: Mask | bool = False
     ) -> CollisionResult:
         """Compute n collisions with params of shape (n,); see `integrate_collisions`."""
         table = np.stack([np.broadcast_to(column, n) for column in params]) if params else np.zeros((0, n))
-        if self.first is None:
-            self.first = law.n, table[:, :1]
-        differs = table != self.first[1]
+        first = self.first or vars(self).setdefault("first", (law.n, table[:, :1]))
+        differs = table != first[1]
         varying = np.flatnonzero(differs.any(axis=1))
-        if self.group is None and (varying.size == 1 or len(params) == 1):
+        group = self.group
+        if group is None and (varying.size == 1 or len(params) == 1):
             floors = np.array([FLOORS[column] for column in self.columns])
             number = int(varying[0]) if varying.size else 0
-            self.group = number, Interpolant(self._outcomes, GROUP_EDGES, floors)
-        if self.group is not None:
-            differs[self.group[0]] = False
+            group = vars(self).setdefault("group", (number, Interpolant(self._outcomes, GROUP_EDGES, floors)))
+        if group is not None:
+            differs[group[0]] = False
         # where balls stay together is not known to what polynomials replace
-        direct = differs.any(axis=0) | (law.n != self.first[0]) | never_separates
+        direct = differs.any(axis=0) | (law.n != first[0]) | never_separates
         collisions = CollisionResult.blank(n)
         same = ~direct
-        if self.group is not None:
-            outcomes = self.group[1](table[self.group[0], same])
+        if group is not None:
+            outcomes = group[1](table[group[0], same])
             for name, column in zip(self.columns, outcomes.T, strict=True):
                 with np.errstate(invalid="ignore"):
                     getattr(collisions, name)[same] = np.rint(column) if name == "status" else column
             direct[same] = np.isnan(outcomes).any(axis=1)
         elif same.any():
             if self.constant is None:
-                self.constant = self._integrate(self.first[1], law.n, **self.settings)
+                self.constant = self._integrate(first[1], law.n, **self.settings)
             collisions.put(same, self.constant)
         if direct.any():
             never = np.broadcast_to(never_separates, n)[direct]
