@@ -167,6 +167,26 @@ def test_a_dataset_of_another_program_is_not_a_result(function: Callable[[xr.Dat
         function(xr.Dataset({"a": ("x", [1.0])}))
 
 
+def test_a_result_of_which_no_values_are_left_is_refused() -> None:
+    result = impact.sweep(BASE)
+    for function in (impact.info, impact.report, impact.page, impact.plot, impact.run):
+        with pytest.raises(impact.UsageError, match="this result has no values along model"):
+            function(result.isel(model=slice(0, 0)))
+    fits = impact.calibrate(ROOT / "docs" / "calibrate" / "drops.toml", overrides={"models": ["kelvin-voigt"]})
+    with pytest.raises(impact.UsageError, match="this result has no values along model"):
+        impact.describe(fits.isel(model=slice(0, 0)))
+
+
+def test_a_number_that_is_no_status_is_named() -> None:
+    result = impact.sweep(BASE)
+    for changed in (result.assign(status=result["status"] + 76), result.where(result["m1"] < 0.0)):
+        for function in (impact.info, impact.report):
+            with pytest.raises(
+                impact.ResultError, match="status: got a number that is no status; select points with sel"
+            ):
+                function(changed)
+
+
 def test_what_fails_for_another_reason_stays_the_error_that_it_is() -> None:
     with pytest.raises(TypeError, match="unexpected keyword argument 'modle'"):
         impact.run(modle="hertz")  # type: ignore[call-arg]

@@ -180,9 +180,11 @@ def kind_of(dataset: xr.Dataset) -> Kind:
 
 
 def require_result(dataset: xr.Dataset) -> None:
-    """Raise a UsageError for a dataset of another program, which has no laws."""
+    """Raise a UsageError for a dataset of another program, which has no laws, and for one without values."""
     if kind_of(dataset) == "sweep" and "model" not in dataset.coords:
         raise UsageError("this dataset is not a result of impact: it has no coordinate model")
+    if empty := [str(dim) for dim, size in dataset.sizes.items() if not size]:
+        raise UsageError(f"this result has no values along {', '.join(empty)}")
 
 
 def require_sweep(dataset: xr.Dataset, command: str) -> None:

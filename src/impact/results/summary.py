@@ -121,9 +121,13 @@ class Summary:
         )
         for name, statuses, counts, failed_at in (tally for tally in tallies if tally[0] in values):
             array, n_more = values[name], self.max_failed_at - len(failed_at)
-            times = np.bincount(array.reshape(-1))
-            for code in np.flatnonzero(times).tolist():
-                counts[statuses(code)] = counts.get(statuses(code), 0) + weight * int(times[code])
+            try:
+                times = np.bincount(array.reshape(-1))
+                for code in np.flatnonzero(times).tolist():
+                    counts[statuses(code)] = counts.get(statuses(code), 0) + weight * int(times[code])
+            except (TypeError, ValueError):
+                hint = "select points with sel or isel; where leaves NaN"
+                raise ResultError(f"{name}: got a number that is no status; {hint}") from None
             if n_more > 0 and times[FIRST_FAILURE:].any():
                 failed = (array >= FIRST_FAILURE) & (array != FrictionStatus.NOT_COMBINABLE)
                 for offsets in np.argwhere(failed)[:n_more].tolist():
