@@ -167,6 +167,19 @@ def test_a_dataset_of_another_program_is_not_a_result(function: Callable[[xr.Dat
         function(xr.Dataset({"a": ("x", [1.0])}))
 
 
+@pytest.mark.parametrize("default", ["D", "~P", "L"])
+def test_quantities_of_pint_have_their_units(default: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(unit.formatter, "default_format", default)
+    speeds = unit.Quantity([[100.0, 300.0], [200.0, 400.0]], "mm/s")
+    stiffness = unit.Quantity(1e9, "N / m**1.5")
+    problem = impact.prepare(model="hertz", at={"K": stiffness}, outputs="peak_force")
+    expected = problem(K=1e9, v1=[[0.1, 0.3], [0.2, 0.4]])["peak_force"]
+    for v1 in (speeds, xr.DataArray(speeds, dims=("x", "y"))):
+        np.testing.assert_allclose(problem(v1=v1)["peak_force"], expected, rtol=1e-12)
+    swept = impact.sweep(models="hertz", v1=xr.DataArray(speeds[0], dims="x"), e=unit.Quantity(1.0, ""))
+    assert (swept["v1"].values.tolist(), swept["e"].item()) == ([0.1, 0.3], 1.0)
+
+
 def test_a_result_of_which_no_values_are_left_is_refused() -> None:
     result = impact.sweep(BASE)
     for function in (impact.info, impact.report, impact.page, impact.plot, impact.run):

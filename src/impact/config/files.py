@@ -161,18 +161,24 @@ def _from_library(value: Any) -> object:
     ([0.0, 1.0], 0.5)
     """
     if hasattr(value, "magnitude") and hasattr(value, "units"):
-        number, unit = _from_library(value.magnitude), str(value.units)
-        if unit == "dimensionless":
-            return number
-        return [f"{each!r} {unit}" for each in number] if isinstance(number, list) else f"{number!r} {unit}"
+        # whatever the user's default format of pint is
+        number, unit = _from_library(value.magnitude), format(value.units, "D")
+        return number if unit == "dimensionless" else _with_unit(number, unit)
     if hasattr(value, "iloc") and hasattr(value, "columns"):
         return value.to_dict("list")
+    if hasattr(value, "dims") and hasattr(getattr(value, "data", None), "magnitude"):
+        # a data array of pint, whose `values` lack the unit
+        return _from_library(value.data)
     if not isinstance(value, str | Mapping) and hasattr(value, "values") and hasattr(value, "dtype"):
         # a series, an index or a data array; texts of pandas are in an array of its own
         value = value.values
     if hasattr(value, "tolist"):
         return value.tolist()
     return float(value) if isinstance(value, Fraction | Decimal) else value
+
+
+def _with_unit(number: object, unit: str) -> object:
+    return [_with_unit(each, unit) for each in number] if isinstance(number, list) else f"{number!r} {unit}"
 
 
 def to_plain_value(value: object) -> Any:
