@@ -94,6 +94,12 @@ def test_where_there_is_no_rebound_outputs_are_nan() -> None:
     assert (got["status"].tolist(), np.isnan(got["e_out"]).tolist()) == ([1, 2], [False, True])
 
 
+def test_a_spin_of_a_plane_has_no_result_and_a_status_that_says_so() -> None:
+    sweep = {**BALLS, "u1": 0.3, "mu": 0.2, "m2": np.inf, "R2": np.inf}
+    got = impact.prepare({**FRICTION, "sweep": sweep}, outputs="beta")(omega2=[0.0, 3.0])
+    assert (got["friction_status"].tolist(), np.isnan(got["beta"]).tolist()) == ([1, 15], [False, True])
+
+
 def test_balls_that_adhesion_holds_are_at_the_limit_as_in_a_run() -> None:
     sweep = {"v1": 0.01, "m1": 1e-3, "m2": np.inf, "R1": 0.01, "R2": np.inf, "material": "soft"}
     soft = {"E": 1e6, "nu": 0.3}

@@ -187,9 +187,11 @@ def check_friction(pair: Pair, oblique: ObliqueImpacts) -> NDArray[np.int8]:
     Returns the status before integration, of a shape that broadcasts to that of the impacts: NOT_COMBINABLE for
     the reasons of `friction_problems`, INVALID_PARAMETER for a dynamic friction above the static one, a viscous
     one without it, and an e outside [0, 1] from which a damping is computed, OUT_OF_RANGE where a stiffness or a
-    damping is NaN; an infinite one may be that of a limit of the normal motion, and is judged after that.
+    damping is NaN; an infinite one may be that of a limit of the normal motion, and is judged after that. It is
+    OUT_OF_RANGE, too, where the slip is not finite, as that of a plane with a spin.
     """
     status = np.full((1,) * max(1, len(oblique.impacts.shape)), FrictionStatus.OK, np.int8)
+    status = replace_where(status, ~np.isfinite(oblique.slip), np.int8(FrictionStatus.OUT_OF_RANGE))
     for value in _spring_values(pair, oblique).values():
         status = replace_where(status, ~(value >= 0.0), np.int8(FrictionStatus.OUT_OF_RANGE))
     for mask in _invalid(pair.friction, oblique):
