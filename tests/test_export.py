@@ -804,6 +804,18 @@ def test_a_script_runs_until_two_contact_times_after_the_first_contact(code: str
         assert 3 + 2 * steps_per_contact <= int(steps) <= 3 + 3 * steps_per_contact
 
 
+def test_a_script_of_an_impact_with_hardly_any_rebound_runs_until_the_end_of_its_contact() -> None:
+    """At 7 steps per contact the pull of the dashpot holds the balls for up to 25 steps."""
+    law, at = "lammps-coeff-restitution-hooke", {"e": 0.051, "K": 1e6}
+    step = impact.timestep(law, at=at, steps_per_contact=[7]).rows[0].dt
+    export = impact.export("lammps", law, at=at, dt=step, script=True, code_version="22Jul2025")
+    (steps,) = re.findall(r"^run +(\d+)$", str(export.script), re.MULTILINE)
+    steps_and_phases = {"steps_per_contact": 7.0, "phase": {"linspace": [0.01, 1, 100]}}
+    sweep = {**at, "n": 1.0, "m1": 1.0, "m2": 1.0, "v1": 1.0, **steps_and_phases}
+    result = impact.sweep({"models": law, "sweep": sweep, "solver": {"integrator": "kick-drift"}})
+    assert int(steps) > 3 + result["steps"].values.max() > 3 + 2.5 * 7
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("phase", "value"), list(enumerate(["nan", "inf", "-nan", "nan"])))
 def test_a_restitution_that_is_no_number_differs_at_any_phase(

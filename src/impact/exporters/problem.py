@@ -6,6 +6,8 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from ..array_types import Array
 from ..config.draft import Overrides, Setting
 from ..config.load import Config
@@ -29,7 +31,7 @@ from .registry import first_law, has_law, law_of_code
 
 # phases over which the mean, the least and the largest restitution are taken
 PHASES = 400
-# steps before the contact, and contact times that a script runs
+# steps before the contact, and contact times that a script runs at least
 STEPS_BEFORE, CONTACTS_RUN = 3, 2.5
 # a ball whose radius is not known and does not matter is larger than its peak indentation by this factor
 RADIUS_PER_PEAK = 100.0
@@ -88,6 +90,11 @@ class ExportProblem:
             values |= {name: float(getattr(oblique, name).item()) for name in OBLIQUE_VALUES}
             values |= {name: float(value.item()) for name, value in oblique.parameters.items()}
         names = self.point.config.scalars
+        duration = CONTACTS_RUN * self.law.contact_time
+        if self.code.scheme is not None:
+            # contacts with hardly any rebound may take longer at a step
+            (times,) = self.law.outputs(np.array([dt]), "contact_time")
+            duration = float(np.fmax.reduce(times + dt, axis=None, initial=duration))
         material1, material2 = (
             str(names.get(f"material{ball}", names.get("material", ""))) for ball in ("1", "2")
         )
@@ -101,7 +108,7 @@ class ExportProblem:
             dt=dt,
             gap=(STEPS_BEFORE - phase) * dt * values["v0"],
             friction=self.law.friction,
-            steps=STEPS_BEFORE + math.ceil(CONTACTS_RUN * self.law.contact_time / dt),
+            steps=STEPS_BEFORE + math.ceil(duration / dt),
         )
 
 
