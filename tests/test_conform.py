@@ -18,7 +18,7 @@ from typing import Any
 import pytest
 
 import impact
-from impact.conformance.adapters import FACTS
+from impact.conformance.adapters import FACTS, open_adapter
 from impact.conformance.checks import checks_of
 from impact.conformance.registry import ENGINES
 from impact.conformance.suite import QUESTION_KEYS, read_suite
@@ -340,6 +340,16 @@ def test_a_program_that_does_not_speak_the_protocol_is_refused_in_one_line(
     assert len(done.stderr.splitlines()) == 1, done.stderr
     assert done.stderr.startswith("--adapter: ")
     assert BAD_PROGRAMS[text] in done.stderr
+
+
+def test_what_a_program_prints_before_it_ends_is_read() -> None:
+    """However fast it ends, so that the message does not depend on who is first."""
+    with open_adapter(["echo", "hello"], 5.0) as ask:
+        time.sleep(0.5)
+        with pytest.raises(UsageError, match='got "hello", expected one line of JSON on stdout'):
+            ask(COLLISIONS[0])
+        with pytest.raises(UsageError, match="the adapter ended with exit code 0"):
+            ask(COLLISIONS[1])
 
 
 def test_a_number_that_c_prints_as_nan_is_judged(cli: Run, tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, SupportsFloat
@@ -141,10 +141,9 @@ class _Conversation:
         """Send a question, and wait for the line with the answer."""
         assert self.process.stdin is not None
         name = f"collision {question['id']}"
-        try:
+        # a program that has ended may have printed before
+        with suppress(BrokenPipeError):
             self.process.stdin.write(json.dumps(question).encode() + b"\n")
-        except BrokenPipeError:
-            raise self._ended(name) from None
         line = self._read_line(name)
         try:
             text = line.decode()
