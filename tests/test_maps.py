@@ -447,13 +447,14 @@ def test_only_the_last_row_and_the_first_column_have_tick_labels(many: xr.Datase
 
 
 def test_a_cell_of_a_vector_map_has_an_edge_of_its_colour(over_speed: xr.Dataset, tmp_path: Path) -> None:
-    """Without an edge, viewers show seams between cells."""
+    """Without an edge, or with one thinner than a pixel, viewers show seams between cells."""
     impact.plot(over_speed, kind="map", models=MODELS[:1]).savefig(tmp_path / "map.svg")
     mesh = (tmp_path / "map.svg").read_text(encoding="utf-8").split('<g id="QuadMesh_1">')[1].split("</g>")[0]
     styles = [style.split('"')[0] for style in mesh.split('style="')[1:]]
     coloured = [dict(word.split(": ") for word in style.split("; ")) for style in styles if "fill: #" in style]
     assert len(coloured) == int(over_speed["e_error"].isel(model=0, m2=0).notnull().sum())
     assert all(words.get("stroke") == words["fill"] for words in coloured)
+    assert all(float(words.get("stroke-width", 1.0)) >= 1.0 for words in coloured)
 
 
 @pytest.mark.slow

@@ -232,7 +232,7 @@ class MapData(PlotData):
         entries: dict[float, tuple[Artist, str]] = {}
         for panel_axes, field in zip(axes, values, strict=True):
             # edges in the colour of their cell cover the seams that viewers of vector pictures show between cells
-            edges: dict[str, Any] = {"edgecolors": "face", "linewidth": 0.5}
+            edges: dict[str, Any] = {"edgecolors": "face", "linewidth": 1.0}
             if values.size > MAX_VECTOR_CELLS:
                 edges = {"rasterized": True}
             mesh = panel_axes.pcolormesh(*self.edges, field, norm=norm, cmap=colours, **edges)
