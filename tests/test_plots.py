@@ -522,6 +522,17 @@ def test_points_without_an_order_are_not_joined(v1: list[float], joined: bool) -
     assert all(line.get_marker() not in ("None", None) for line in lines if not joined)
 
 
+def test_a_band_of_points_without_an_order_is_a_bar_at_each() -> None:
+    sweep = {"e": [0.2, 0.5, 0.8], "v1": [1.0, 3.0, 2.0], "zip": [["e", "v1"]], "m1": 1.0, "m2": 1.0}
+    law = {"kuwabara-kono-1987": {"A": 1e-5}}
+    uncertain = {**sweep, "K": {"uniform": [1e6, 2e6]}}
+    result = impact.sweep({"models": "kuwabara-kono-1987", "sweep": uncertain, "design": {"n": 64}, "model": law})
+    axes = impact.plot(result, kind="uncertainty", x="v1").axes[0]
+    assert all(line.get_linestyle() == "None" for line in axes.lines)
+    (bars,) = axes.collections
+    assert [bar[0, 0] for bar in bars.get_segments()] == [1.0, 2.0, 3.0]
+
+
 def test_cases_are_numbered_and_not_joined() -> None:
     sweep = {"e": [0.2, 0.5, 0.8], "v1": [1.0, 2.0, 3.0], "zip": [["e", "v1"]], "m1": 1.0, "m2": 1.0, "K": 6e9}
     result = impact.sweep({"models": "lankarani-nikravesh-1990", "sweep": sweep}).reset_index("e")

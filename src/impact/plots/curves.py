@@ -282,8 +282,14 @@ def _line_style(curve: Curve, panel: Panel, styles: Mapping[str, Mapping[str, An
 
 
 def _draw_band(axes: Axes, curve: Curve, line: Line2D) -> Artist:
-    """Draw the band of a curve, opaque for formats without transparency; returns its symbol in a legend."""
+    """Draw the band of a curve, opaque for formats without transparency; returns its symbol in a legend.
+
+    Points without an order have bars.
+    """
     colour = str(line.get_color())
+    if line.get_linestyle() == "None":
+        axes.vlines(curve.x, curve.least, curve.largest, color=colour, linewidth=0.9, zorder=1.3)
+        return Line2D([], [], color=tint(FAINT), linewidth=0.9)
     shade = tint(BAND_SHADE, colour)
     axes.fill_between(curve.x, curve.least, curve.largest, color=shade, linewidth=0.0, zorder=0.8)
     # the edges are above the bands of other curves

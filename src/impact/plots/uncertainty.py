@@ -35,7 +35,7 @@ def uncertainty_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     if x in dataset.coords and dataset[x].dims == (SAMPLE,):
         raise UsageError(f"{argument('x', x)}: is an uncertain input, expected another axis")
     keep = (SAMPLE, "friction") if "friction" in dataset[name].dims else (SAMPLE,)
-    line, x_name, not_drawn, _ = take_line(dataset, replace(choice, x=x or SAMPLE), keep)
+    line, x_name, not_drawn, is_ordered = take_line(dataset, replace(choice, x=x or SAMPLE), keep)
     line = read(line, [name])
     meaning = "Delivered restitution" if name == "e_out" else words_of(line[name].attrs, name).capitalize()
     curves: list[Curve] = []
@@ -68,6 +68,7 @@ def uncertainty_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
             y_unit=OUTPUTS[name].unit,
             y_name=name,
             band_name="5 to 95 % of the samples",
+            joined=is_ordered,
             **x_axis_fields(line[x]),
         )
     title = safe_text(str(dataset.attrs.get("title", "")), 140)
