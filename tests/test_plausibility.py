@@ -136,6 +136,18 @@ def test_the_report_has_the_notes() -> None:
     assert "<p>Note: none of 2 points is an impact: v1 &lt;= v2, the balls do not approach</p>" in page
 
 
+def test_a_factored_result_of_more_than_a_million_points_has_the_note_on_depth(tmp_path: Path) -> None:
+    """Their statuses are counted in another way."""
+    axes = {"m1": {"geomspace": [1.0, 10.0, 1025]}, "v1": {"geomspace": [1.0, 100.0, 1024]}}
+    sweep = {"e": 0.5, **axes, "m2": 1.0, "R1": 0.05, "R2": 0.05, "material": "soft"}
+    materials = {"soft": {"E": 5e6, "nu": 0.49}}
+    config = {"models": "tsuji-1992", "sweep": sweep, "materials": materials, "output": {"layout": "factored"}}
+    outcome = impact.sweep_to_file(config, tmp_path / "large.h5")
+    deep = int((outcome.dataset["peak_indentation"].values > 0.1 * 0.05).sum())
+    (note,) = result_notes(outcome.summary)
+    assert note.startswith(f"{LIMIT} at {deep:,} of {1024 * 1025:,} points, at most 304%")
+
+
 MANY_AXES = {
     "models": ["hertz", "gharib-hurmuzlu-2012", "kelvin-voigt"],
     "solver": {"rtol": 1e-4},

@@ -409,6 +409,7 @@ def store_result(
         result = lazy_dataset(result, table, variables)
         if plan.stored_points > NO_SUMMARY_POINTS:
             summary, record = summarize_table(result, table)
+            summary = with_depths(summary, result)
             template = template.assign_attrs(summary=record.model_dump_json(exclude_defaults=True))
         else:
             for slab in expanded_slabs(table, variables):
