@@ -43,10 +43,9 @@ def fit_status(law: xr.Dataset) -> str:
     return str(law["fit_status"].attrs["flag_meanings"]).split()[int(law["fit_status"])]
 
 
-def fitted_laws(dataset: xr.Dataset) -> list[dict[str, Any]]:
-    """List the laws as plain data, the best first, with their parameters by path in the config."""
+def fitted_laws(dataset: xr.Dataset) -> Iterator[dict[str, Any]]:
+    """Yield the laws as plain data, the best first, with their parameters by path in the config."""
     paths = json.loads(dataset.attrs["fit_paths"])
-    laws = []
     for rank, key in enumerate(map(str, dataset["model"].values), 1):
         law = dataset.sel(model=key)
         parameters = {}
@@ -55,17 +54,14 @@ def fitted_laws(dataset: xr.Dataset) -> list[dict[str, Any]]:
             if int(parameter["identifiable"]) >= 0:
                 numbers = {name: float(parameter[name]) for name in ("estimate", "lower", "upper")}
                 parameters[path] = {**numbers, "identifiable": bool(parameter["identifiable"])}
-        laws.append(
-            {
-                "model": key,
-                "rank": rank,
-                "status": fit_status(law),
-                "parameters": parameters,
-                "determined": [group for group in str(law["determined"].item()).split("; ") if group],
-                **{name: float(law.get(name, math.nan)) for name in CRITERIA},
-            }
-        )
-    return laws
+        yield {
+            "model": key,
+            "rank": rank,
+            "status": fit_status(law),
+            "parameters": parameters,
+            "determined": [group for group in str(law["determined"].item()).split("; ") if group],
+            **{name: float(law.get(name, math.nan)) for name in CRITERIA},
+        }
 
 
 def fit_rows(dataset: xr.Dataset) -> list[tuple[str, ...]]:
@@ -219,7 +215,7 @@ class Fits(Displayed):
 
     def as_dict(self) -> dict[str, Any]:
         """The laws with their parameters by config path, and the largest residuals."""
-        return {"models": fitted_laws(self.dataset), "largest_residuals": largest_residuals(self.dataset)}
+        return {"models": list(fitted_laws(self.dataset)), "largest_residuals": largest_residuals(self.dataset)}
 
     def records(self) -> Sequence[Mapping[str, Any]]:
         """A row for each parameter of each law."""

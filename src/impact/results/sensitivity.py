@@ -84,7 +84,7 @@ def _list_studies(dataset: xr.Dataset) -> Iterator[dict[str, Any]]:
             study = law.isel(dict(zip(axes, index, strict=True)))
             point = {dim: study[dim].item() for dim in dims if dim in LAW_DIMS or dim in axes}
             probabilities = [f"{probability:g}" for probability in study["quantile"].values]
-            rows = (study.isel(input=position) for position in range(study.sizes["input"]))
+            columns = (study[name].values.tolist() for name in ("input", *INDICES))
             yield {
                 **{dim: point.pop(dim) for dim in LAW_DIMS if dim in point},
                 "at": point,
@@ -95,8 +95,7 @@ def _list_studies(dataset: xr.Dataset) -> Iterator[dict[str, Any]]:
                 "sd": float(study["sd"]),
                 "quantiles": dict(zip(probabilities, study["quantiles"].values.tolist(), strict=True)),
                 "indices": [
-                    {"input": str(row["input"].item())} | {name: float(row[name]) for name in INDICES}
-                    for row in rows
+                    dict(zip(("input", *INDICES), row, strict=True)) for row in zip(*columns, strict=True)
                 ],
             }
 
