@@ -170,7 +170,8 @@ class Impact(Displayed):
         }
         # a property that varies is an input of the point as well
         for name, value in {**self.point, **materials}.items():
-            unit, meaning = self._unit_and_meaning(name)
+            rule = InputName.parse(name).quantity({self.model.key: self.model})
+            unit, meaning = ("1", "") if rule is None else (self._with_numbers(rule.unit), rule.meaning)
             note = "first value of its axis" if name in self.first else ""
             inputs.append((name, prefixed(value, unit, INPUT_DIGITS), "; ".join(filter(None, (meaning, note)))))
         inputs += self._derived_rows((*INPUT_QUANTITIES, *OBLIQUE_QUANTITIES), INPUT_DIGITS)
@@ -257,14 +258,6 @@ class Impact(Displayed):
         for heading, group in self.groups().items():
             rows += [*([("",)] if rows else []), (Styled(heading, "bold"),), *group]
         return [Table(rows, no_wrap=(0, 1))]
-
-    def _unit_and_meaning(self, name: str) -> tuple[str, str]:
-        """Find the unit and meaning of an input, which may be a parameter of a law or a property of a material."""
-        try:
-            rule = InputName.parse(name).quantity({self.model.key: self.model})
-        except KeyError:
-            rule = None
-        return ("1", "") if rule is None else (self._with_numbers(rule.unit), rule.meaning)
 
     def _with_numbers(self, unit: str) -> str:
         """A unit with the values of n and of the parameters that its exponents have."""
