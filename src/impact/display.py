@@ -205,9 +205,7 @@ def encode_frame(frame: pd.DataFrame, suffix: str, form: TableForm | None = None
         return _latex(frame, form).encode()
     if form.digits is not None:
         digits = form.digits
-        frame = frame.map(
-            lambda cell: float(number(cell, digits)) if isinstance(cell, float) and cell == cell else cell
-        )
+        frame = frame.map(lambda cell: float(f"{cell:.{digits}g}") if isinstance(cell, float) else cell)
     if suffix == ".parquet":
         buffer = io.BytesIO()
         try:

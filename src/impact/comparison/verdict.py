@@ -174,14 +174,11 @@ class Verdict(Displayed):
                 return f"{count}, none differs"
             at = f" at {closest.location}" if closest.location else ""
             return f"{count}, largest difference {number(closest.ratio, 2)} x tolerance: {closest.name}{at}"
-        names_by_kind: dict[DifferenceKind, dict[str, None]] = {}
-        for fault in self.faults:
-            names_by_kind.setdefault(fault.kind, {})[safe_text(fault.name, 60)] = None
-        for variable in self.differing:
-            names_by_kind.setdefault("values", {})[safe_text(variable.name, 60)] = None
+        named = [(str(fault.kind), fault.name) for fault in self.faults]
+        named += [("values", variable.name) for variable in self.differing]
         parts = []
-        for kind in (kind for kind in DIFFERENCE_KINDS if kind in names_by_kind):
-            names = [name for name in names_by_kind[kind] if name]
+        for kind in (kind for kind in DIFFERENCE_KINDS if kind in dict(named)):
+            names = [*dict.fromkeys(safe_text(name, 60) for of, name in named if of == kind and name)]
             more = f" and {len(names) - MAX_NAMES} more" if len(names) > MAX_NAMES else ""
             parts.append(f"{kind} ({', '.join(names[:MAX_NAMES])}{more})" if names else kind)
         return f"not equal: {', '.join(parts)}"

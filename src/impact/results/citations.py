@@ -35,11 +35,10 @@ ARTICLES = (
     re.compile(r"(?P<howpublished>.*)"),
 )
 # what LaTeX does not print as it is, besides letters of Greek and raised or lowered characters
-SYMBOLS = {
-    **{chr(code): text for code, text in LATEX_CHARACTERS.items()},
-    **{"µ": r"$\mu$", "√": r"$\surd$", "∞": r"$\infty$", "≤": r"$\le$", "≥": r"$\ge$", "≈": r"$\approx$"},
-    **{"−": "$-$", "<": "$<$", ">": "$>$"},
-}
+SYMBOLS = LATEX_CHARACTERS | str.maketrans(
+    {"µ": r"$\mu$", "√": r"$\surd$", "∞": r"$\infty$", "≤": r"$\le$", "≥": r"$\ge$", "≈": r"$\approx$"}
+    | {"−": "$-$", "<": "$<$", ">": "$>$"}
+)
 
 
 @dataclass(frozen=True)
@@ -170,7 +169,7 @@ def _escape(text: str) -> str:
     >>> print(_escape("χ of e² and v₀, 3 %"))
     $\chi$ of e$^2$ and v$_0$, 3 \%
     """
-    return "".join(SYMBOLS.get(letter) or _mathematics(letter) for letter in text)
+    return "".join(map(_mathematics, text.translate(SYMBOLS)))
 
 
 def _mathematics(letter: str) -> str:
