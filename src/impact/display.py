@@ -207,13 +207,11 @@ def encode_frame(frame: pd.DataFrame, suffix: str, form: TableForm | None = None
         digits = form.digits
         frame = frame.map(lambda cell: float(f"{cell:.{digits}g}") if isinstance(cell, float) else cell)
     if suffix == ".parquet":
-        buffer = io.BytesIO()
         try:
-            frame.to_parquet(buffer, index=False, engine="pyarrow")
+            return bytes(frame.to_parquet(index=False, engine="pyarrow"))
         except ImportError:
             needs = 'needs pyarrow, which is not installed: pip install "impact-sweep[parquet]"'
             raise UsageError(f".parquet {needs}") from None
-        return buffer.getvalue()
     separator = "," if form.decimal == "point" else ";"
     text = frame.to_csv(index=False, lineterminator="\n", sep=separator, decimal=DECIMALS[form.decimal])
     return str(text).encode()

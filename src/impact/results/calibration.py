@@ -116,11 +116,8 @@ def fit_notes(dataset: xr.Dataset) -> list[str]:
     """List what a reader has to know besides the table, one line for each note."""
     best = dataset.isel(model=0)
     notes = [*_noise_notes(dataset)]
-    if (
-        "p_value" in best
-        and float(best["p_value"]) < REJECTED_P
-        and dataset.attrs.get("loss", "linear") == "linear"
-    ):
+    is_linear = dataset.attrs.get("loss", "linear") == "linear"
+    if is_linear and float(best.get("p_value", math.nan)) < REJECTED_P:
         notes.append(
             f"the best law is rejected (p < {REJECTED_P:g}): try other laws, "
             'noise = "excess" with a column specimen where specimens differ, or loss = "huber" against outliers'
