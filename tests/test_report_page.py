@@ -25,7 +25,7 @@ import xarray as xr
 
 import impact
 from impact.contact.models import catalogue
-from impact.errors import UsageError
+from impact.errors import ImpactError, UsageError
 from impact.formatting import percentage
 from impact.plots.kinds import KINDS, find_kind
 from impact.results.ranking import recommend
@@ -494,6 +494,12 @@ def test_only_the_loop_needs_the_file_of_a_plug_in(tmp_path: Path) -> None:
     assert "The figure loop is left out: the result: made with mine of my.py" in text
     assert CAPTIONS["loop"] not in text
     assert CAPTIONS["loop"] in build(result, [tmp_path / "my.py"])
+
+
+def test_a_plug_in_that_cannot_be_read_is_refused(tmp_path: Path) -> None:
+    result = swept(["hertz"])
+    with pytest.raises(ImpactError, match=r"absent\.py: cannot be read"):
+        build(result, [tmp_path / "absent.py"])
 
 
 def test_a_figure_without_stored_values_is_left_out() -> None:

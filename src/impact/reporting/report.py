@@ -92,6 +92,8 @@ def report(
     True
     """
     check_page_path(output, [dataset, *plugins], overwrite=overwrite)
+    # the error of one that cannot be read would leave out every figure
+    read_plugins(plugins)
     text = _report_of(result_of(dataset), plugins, models, sections)
     if output is not None:
         write_file(Path(output), text.encode(), overwrite=overwrite)
