@@ -173,6 +173,18 @@ def test_too_many_points_are_refused_before_memory_or_a_file_is_used(forked: For
         impact.sweep(blocks, overrides=[full], max_points=79_999)
 
 
+def test_few_trajectories_are_limited_as_well() -> None:
+    config = {
+        "models": "tsuji-1992",
+        "frictions": ["coulomb-1785", "cundall-strack-1979"],
+        "sweep": {"e": [0.5, 0.9], "v1": 1.0, "u1": 0.3, "m1": 1.0, "m2": np.inf, "R1": 0.1, "K": 6e9, "mu": 0.3},
+        "friction": {"cundall-strack-1979": {"kt_over_kn": 0.8}},
+    }
+    with pytest.raises(UsageError, match="got 6 trajectories to integrate, expected at most 5"):
+        impact.sweep(config, max_points=5)
+    assert impact.sweep(config, max_points=6).sizes["e"] == 2
+
+
 # ---- progress
 
 

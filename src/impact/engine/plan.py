@@ -133,13 +133,13 @@ class Plan:
 
     def check_count(self, most: int, name: str) -> None:
         """Refuse too many trajectories before any array is allocated; `name` is that of the config."""
-        if self.points <= most:
+        if self.points * (1 + len(self.frictions)) <= most:
             return
         axes = (law_axes(self.inputs, law, self.config.solver.collapse) for law in self.laws)
         # with fewer cells, equal ones are found, and the number of trajectories is not known yet
         cells = [math.prod(self.inputs.shape[axis] for axis in of_law) for of_law in axes]
         total = sum(count for count in cells if count > MAX_CELLS)
-        if total > most:
+        if total > most or (total := self.trajectories) > most:
             raise UsageError(
                 f"{name}: sweep: got {total:,} trajectories to integrate, expected at most {most:,} "
                 f"({argument('max_points')})"
