@@ -822,6 +822,11 @@ def test_threads_integrate_in_the_process_of_the_command_and_jobs_in_others(
         assert keywords["backend"].shares_memory is shares_memory
 
 
+def test_any_number_of_jobs_is_taken() -> None:
+    with execution(True, 10**300) as keywords, keywords["backend"].start() as executor:
+        assert executor is not None
+
+
 def test_every_paragraph_of_help_fills_its_lines(cli: Run) -> None:
     paragraph = re.search(r"\n\s*\n( loop, history.*?)\n\s*\n", cli("plot", "--help").stdout, re.DOTALL)
     assert paragraph is not None

@@ -84,7 +84,8 @@ class _ProcessPool(ProcessPoolExecutor):
 
 @contextlib.contextmanager
 def _process_pool(jobs: int) -> Iterator[Executor]:
-    pool = _ProcessPool(jobs, multiprocessing.get_context("spawn"), _initialize_worker)
+    # a semaphore counts no further
+    pool = _ProcessPool(min(jobs, 2**30), multiprocessing.get_context("spawn"), _initialize_worker)
     try:
         yield pool
     except BaseException as error:
