@@ -352,6 +352,16 @@ def test_what_a_program_prints_before_it_ends_is_read() -> None:
             ask(COLLISIONS[1])
 
 
+def test_words_that_have_no_effect_are_refused(cli: Run) -> None:
+    for words, message in (
+        (["--adapter", " "], "--adapter: got ' ', expected FILE.py:FUNCTION or \"PROGRAM ARGUMENTS\"\n"),
+        (["--adapter", "rigid.py:collide", "--program", "absent"], "--program: set without an engine"),
+    ):
+        done = cli("conform", *words)
+        assert done.returncode == 2
+        assert done.stderr.startswith(message)
+
+
 def test_a_number_that_c_prints_as_nan_is_judged(cli: Run, tmp_path: Path) -> None:
     text = (
         ANSWER

@@ -116,7 +116,7 @@ def _command(adapter: object) -> list[str]:
             if not path.is_file():
                 raise AdapterError(f"{path}: {'is no file' if path.exists() else 'does not exist'}")
             return [sys.executable, str(SERVE), str(Path(adapter).absolute())]
-    if not isinstance(adapter, str | Sequence) or not adapter:
+    if not isinstance(adapter, str | Sequence) or not "".join(map(str, adapter)).strip():
         raise AdapterError(f'got {adapter!r}, expected FILE.py:FUNCTION or "PROGRAM ARGUMENTS"')
     try:
         words = shlex.split(adapter) if isinstance(adapter, str) else [str(word) for word in adapter]

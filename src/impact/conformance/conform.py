@@ -73,6 +73,8 @@ def conform(
     adapters = [adapter] if isinstance(adapter, str) or callable(adapter) else list(adapter)
     if not names and not adapters:
         raise UsageError(f"expected the name of an engine, see impact conform --list, or {argument('adapter')}")
+    if program is not None and not names:
+        raise UsageError(f"{argument('program')}: set without an engine of impact conform --list")
     if not timeout > 0.0:
         raise UsageError(f"{argument('timeout')}: got {number(timeout)}, expected a number of seconds > 0")
     requested = _check_tolerances(tol)
