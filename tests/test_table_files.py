@@ -126,6 +126,10 @@ def test_a_wrong_form_of_a_table_is_one_line_and_writes_nothing(
 def test_rows_of_a_picture_without_numbers_are_refused(stored: Path, tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="rows: set without a table, expected data="):
         impact.plot_to_files(stored, output=tmp_path / "a.png", rows=5)
+    with pytest.raises(UsageError, match="data_form: set without a table, expected data="):
+        impact.plot_to_files(stored, output=tmp_path / "a.png", data_form="long")
+    with pytest.raises(UsageError, match="data_form: got tall, expected wide or long"):
+        impact.plot_to_files(stored, output=tmp_path / "a.png", data_form="tall")
     # the separator is that of the picture
     assert impact.plot_to_files(stored, output=tmp_path / "a.png", decimal="comma").pictures
 

@@ -342,12 +342,14 @@ def plot_to_files(
     output = Path(output) if output is not None else result.with_suffix(".png")
     check_picture(output)
     table = Path(data) if data is not None else None
+    if data_form not in ("wide", "long"):
+        raise UsageError(f"{argument('data_form')}: got {data_form}, expected wide or long")
+    if data is None and data_form != "wide":
+        raise UsageError(f"{argument('data_form')}: set without a table, expected {argument('data', 'FILE.csv')}")
     # the decimal separator is that of the picture too
     replace(table_form, decimal="point").check_used(table, "data")
     if table is not None:
         check_suffix(table, "data")
-        if data_form not in ("wide", "long"):
-            raise UsageError(f"{argument('data_form')}: got {data_form}, expected wide or long")
     # the default kind depends on the result, which is read after the paths are checked
     targets = [_with_kind(path, kind, kinds) for path in (output, table) if path for kind in kinds or [""]]
     check_outputs(targets, [result, points], overwrite=overwrite)
