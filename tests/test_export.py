@@ -72,6 +72,8 @@ def test_a_parameter_that_cannot_be_found_is_reported() -> None:
     at, fields = {"e": 0.7, "v1": 1.0}, {"code_version": "3.8.0", "dt": "20 us"}
     with pytest.raises(UsageError, match="parameter: e does not set the contact time of liggghts-hertz"):
         impact.export("liggghts", at=at, parameter="e", **fields)
+    with pytest.raises(UsageError, match='parameter: liggghts-hertz has no parameter ""'):
+        impact.export("liggghts", at=at, parameter="", **fields)
     missing = impact.export(
         "lammps",
         "lammps-tsuji-without-root",

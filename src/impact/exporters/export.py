@@ -219,14 +219,14 @@ def export(
     # with friction that changes e, no step delivers the e that is asked for
     if code.scheme is not None and problem.requested_e > 0.0 and not problem.law.is_coupled:
         advised = timestep.needed_steps(problem.law, ADVISED_TOL)
-    if parameter and code.scheme is None:
+    if parameter is not None and code.scheme is None:
         raise UsageError(f"{argument('parameter')}: what {code.title} delivers at a time step is not predicted")
     needed, name = None, parameter
     if parameter is None and given and advised is not None and advised.dt < dt:
         name = timestep.time_parameter(problem.point.config, problem.model)
     # where nobody asked for it, a law whose time scale has no such parameter is exported without
-    with nullcontext() if parameter else suppress(UsageError):
-        if name:
+    with nullcontext() if parameter is not None else suppress(UsageError):
+        if name is not None:
             needed = timestep.needed_parameter(problem.point, name, dt, ADVISED_TOL, problem.law, advised)
     needed_text = str(needed or (timestep.missing_parameter(parameter, ADVISED_TOL) if parameter else ""))
     header = tuple(_header(problem, collision, at_dt, advised, needed_text))

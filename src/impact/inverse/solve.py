@@ -234,10 +234,13 @@ def solve(
     return _best_over_axis(problem, wanted) if config.axes else _all_roots(problem, wanted)
 
 
-def unknown_of(model: ForceModel, name: str, friction: FrictionLaw | None = None) -> Parameter:
+def unknown_of(
+    model: ForceModel, name: str, friction: FrictionLaw | None = None, origin: str = "name"
+) -> Parameter:
     """Describe the input to solve for as a parameter with its unit and bounds.
 
-    A parameter of the friction law has its config name, `friction.KEY.NAME`, of which NAME is enough.
+    A parameter of the friction law has its config name, `friction.KEY.NAME`, of which NAME is enough. `origin` is
+    the argument that names it.
 
     >>> from impact.contact.models import find
     >>> from impact.contact.frictions import find_friction
@@ -260,7 +263,7 @@ def unknown_of(model: ForceModel, name: str, friction: FrictionLaw | None = None
         laws = law_name(model.key, friction.key if friction else "")
         needs_friction = friction is None and (name == "mu" or InputName.parse(name).friction)
         hint = f"expected {argument('friction', 'KEY')}" if needs_friction else did_you_mean(name, list(unknowns))
-        raise UsageError(f'{argument("name")}: {laws} has no parameter "{name}"; {hint}')
+        raise UsageError(f'{argument(origin)}: {laws} has no parameter "{name}"; {hint}')
     return unknowns[name]
 
 

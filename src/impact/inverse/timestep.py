@@ -684,7 +684,7 @@ def _seek(law: FixedStepLaw, name: str) -> tuple[Parameter, str, float]:
     moduli = [f'"materials.{material}.E"' for material in _materials(config) if _takes_moduli(config, law.model)]
     if name == "E" and moduli:
         raise UsageError(f"{argument('parameter')}: got E, expected that of a material: {' or '.join(moduli)}")
-    unknown = unknown_of(law.model, name)
+    unknown = unknown_of(law.model, name, origin="parameter")
     path = config_name(law.model, unknown)
     return unknown, path, float(law.impact.K[0] if name == "K" else config.scalars[path])
 
