@@ -262,6 +262,7 @@ def test_a_usage_error_is_one_line_and_exit_code_2(forked: ForkServer, folder: P
         (["--tol", "much"], prefix + 'got "much", expected VALUE or NAME=VALUE, such as 1e-8, 5% or v1_post'),
         (["--tol", "nan"], prefix + 'got "nan", expected'),
         (["--tol", "e_out=x"], prefix + 'got "e_out=x"'),
+        (["--tol", "=1e-6"], prefix + 'got "=1e-6", expected VALUE or NAME=VALUE'),
         (["--tol", "-1"], "--tol -1.0: expected a number >= 0"),
         (["--tol", "status=1"], "--tol status: has no tolerance"),
         (["--tol", "1", "--tol", "2"], prefix + "got all twice, expected each name once"),

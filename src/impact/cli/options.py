@@ -85,9 +85,9 @@ def parse_tolerance(word: str) -> NamedValue:
     >>> parse_tolerance("1e-8"), parse_tolerance("v1_post=5%")
     (NamedValue(name='all', value=1e-08), NamedValue(name='v1_post', value=0.05))
     """
-    name, _, value = word.rpartition("=")
+    name, equals, value = word.rpartition("=")
     read = _float_or_nan(value)
-    if math.isnan(read):
+    if math.isnan(read) or (equals and not name):
         raise invalid_value(word, "VALUE or NAME=VALUE, such as 1e-8, 5% or v1_post=1e-6")
     return NamedValue(name or "all", read)
 
