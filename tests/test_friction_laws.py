@@ -183,9 +183,15 @@ def test_the_catalogue_is_listed_and_a_law_is_described(cli: Run) -> None:
     card = " ".join(cli("models", "simbody-hunt-crossley", "--frictions").stdout.split())
     assert "[friction.simbody-hunt-crossley]" in card
     assert 'default "positive"' in card
-    refused = cli("models", "--frictions", "--family", "elastic")
-    assert refused.returncode == 2
-    assert "--frictions: got it with --family" in refused.stderr
+    for words, message in (
+        ("--frictions --family elastic", "--frictions: got it with --family"),
+        ("--frictions --plugin absent.py", "--frictions: got it with --plugin"),
+        ("--check absent.py --search hertz", "--check: got it with --search"),
+        ("hertz --family dashpot", "hertz: got it with --family"),
+        ("family:elastic --family dashpot", "--family: got the pattern family:elastic as well"),
+    ):
+        refused = cli("models", *words.split())
+        assert (refused.returncode, refused.stderr) == (2, f"{message}, expected one of the two\n")
 
 
 # ---- values by hand

@@ -49,17 +49,23 @@ def models(
     as_json: options.Json = False,
 ) -> None:
     """List the contact force models, or the friction laws: equations, references, domains, restitution."""
-    if frictions and (family or check):
-        raise UsageError(
-            f"--frictions: got it with {'--family' if family else '--check'}, expected one of the two"
-        )
+    is_law = key is not None and search is None and not (key.startswith("family:") or {*"*?["} & {*key})
+    selected = {"--family": family, "--plugin": plugins}
+    for name, is_set, excluded in (
+        ("--frictions", frictions, selected | {"--check": check}),
+        ("--check", check is not None, selected | {"--search": search}),
+        (key, is_law, {"--family": family}),
+    ):
+        for other, value in excluded.items():
+            if is_set and value is not None:
+                raise UsageError(f"{name}: got it with {other}, expected one of the two")
     if check is not None:
         with_file, others = impact.models([check]), impact.models()
         of_file = [model for name, model in with_file.items() if name not in others and key in (None, name)]
         _check_contract(of_file or [with_file.find(str(key))], as_json=as_json)
         return
     shown: Displayed
-    if key is not None and search is None and not (key.startswith("family:") or {*"*?["} & {*key}):
+    if key is not None and is_law:
         laws: Frictions | Models = impact.frictions() if frictions else impact.models(plugins or ())
         if key not in laws and key in impact.frictions():
             laws = impact.frictions()

@@ -328,6 +328,8 @@ def models(
     all_models = catalogue(read_plugins(plugins).models)
     families = sorted({model.family for model in all_models.values()})
     if pattern.startswith("family:"):
+        if family is not None:
+            raise UsageError(f"{argument('family')}: got the pattern {pattern} as well, expected one of the two")
         pattern, family = "*", pattern.removeprefix("family:")
     require_known([] if family is None else [family], families, f"{argument('family')}: no family")
     candidates = {key: model for key, model in all_models.items() if family in (None, model.family)}
