@@ -94,7 +94,9 @@ def page(
 
 def _page_of(dataset: xr.Dataset, models: Sequence[str] | None) -> str:
     if "model" not in dataset.dims or SAMPLE in dataset.dims or not axes_of(dataset):
-        raise UsageError("expected the result of a sweep over an axis; impact report writes a page of any result")
+        raise UsageError(
+            "expected the result of a sweep over an axis; impact report writes one of any but a history"
+        )
     positions = law_positions(models, dataset)
     table = table_of_result(dataset)
     if table is None:
