@@ -420,7 +420,8 @@ def test_an_e_of_the_user_that_a_law_ignores_is_a_note(
         if law != LINEAR_LAW:
             impact.export("mujoco", source=source, at=at, code_version="3.3.0")
     shown = [str(warning.message) for warning in caught if "not an input" in str(warning.message)]
-    assert shown == [f"{IGNORED}--for dampratio --target e_out=0.6 finds the parameter"] * notes
+    way = f"{IGNORED}--for dampratio --target e_out=0.6, with the same inputs, finds the parameter"
+    assert shown == [way] * notes
 
 
 def test_an_e_that_is_set_without_a_config_is_the_choice_of_the_user() -> None:

@@ -338,7 +338,9 @@ def warn_of_ignored_e(config: Config, e_out: float) -> None:
         return
     if e != e or e_out != e_out or number(e_out) == number(e):
         return
-    way = f"impact solve --model {law.key} --for {law.damping} --target e_out={number(e)} finds the parameter"
+    # the parameter depends on masses, speeds and the material, which a config may set
+    way = f"impact solve --model {law.key} --for {law.damping} --target e_out={number(e)}"
+    way += ", with the same inputs, finds the parameter"
     warn(f"e = {number(e)} is not an input of {law.key}, which delivers {number(e_out)}; {way}")
 
 
