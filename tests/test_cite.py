@@ -27,6 +27,8 @@ def test_the_bibtex_of_the_catalogue_has_each_law_once_and_balanced_braces() -> 
         shown = re.sub(r"\\[{}&%$#_]|\$[^$]+\$", "", fields)
         assert shown.count("{") == shown.count("}"), key
         assert not re.search(r"[&%$#_]", shown), key
+        # the authors are not a part of another field
+        assert "and others (" not in fields.partition("annote")[0], key
 
 
 def test_bibtex_has_no_character_that_pdflatex_refuses() -> None:

@@ -133,7 +133,7 @@ EXACT_HYSTERESIS = hysteresis(
     title="Exact hysteresis",
     year=2002,
     equation="F = K δⁿ (1 + χ δ̇/v₀),  χ(1 + e) = ln[(1 + χ)/(1 − e χ)]  (23)",
-    reference="Gonthier Y, McPhee J, Lange C, Piedboeuf JC (2002) CSME Forum, Queen's University; Gonthier "
+    reference="Gonthier Y, McPhee J, Lange C, Piedboeuf JC (2002) CSME Forum, Queen's University; Gonthier Y "
     "and others (2004) Multibody Syst. Dyn. 11, 209",
     evidence=derived(
         "the first integral of the motion, docs/paper.md",
