@@ -24,6 +24,7 @@ from impact.exporters.registry import CODES, first_law, installed_version
 from impact.exporters.verification import Verification, extrapolate
 
 from .conftest import Run, assert_refused, assert_same_output, default_law, examples_of, write_program
+from .fork_server import ForkServer
 
 # two balls whose effective mass is 0.75 kg and whose effective radius is 0.03 m
 BALLS = {"v1": 1.0, "v2": 0.0, "m1": 1.0, "m2": 3.0, "R1": 0.04, "R2": 0.12}
@@ -119,6 +120,12 @@ def test_the_default_law_is_the_first_that_the_installed_release_has(cli: Run, t
 def test_the_default_law_of_the_newest_release_is_the_first_of_the_list(name: str) -> None:
     code = CODES[name]
     assert first_law(code, list(code.laws), code.newest) == default_law(name)
+
+
+def test_without_a_temporary_folder_the_release_is_not_asked_for(forked: ForkServer, tmp_path: Path) -> None:
+    code = "import tempfile\ntempfile.tempdir = '/no/such/folder'"
+    done = forked("export", "--to", "lammps", cwd=tmp_path, code=code)
+    assert (done.returncode, done.stderr) == (0, "")
 
 
 @pytest.mark.slow

@@ -62,12 +62,12 @@ def find_program(name: str, requested: str | None = None) -> str | None:
 
 def output_of(command: Sequence[str]) -> str:
     """Return what a command prints on stdout, run in an empty folder; "" if it cannot be run."""
-    # LIGGGHTS writes a log into the folder in which it is asked for its help
-    with tempfile.TemporaryDirectory(prefix="impact-version-") as folder:
-        try:
+    try:
+        # LIGGGHTS writes a log into the folder in which it is asked for its help
+        with tempfile.TemporaryDirectory(prefix="impact-version-") as folder:
             return run_program(command, folder, VERSION_TIMEOUT_S).stdout
-        except (OSError, subprocess.SubprocessError):
-            return ""
+    except (OSError, subprocess.SubprocessError):
+        return ""
 
 
 def printed_version(option: str, pattern: str) -> Callable[[str], str | None]:
