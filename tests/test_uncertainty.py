@@ -540,6 +540,17 @@ def test_without_another_axis_the_picture_is_the_distribution_function(samples: 
     np.testing.assert_allclose(axes.lines[0].get_ydata(), (np.arange(64) + 0.5) / 64)
 
 
+def test_a_part_of_a_study_is_described_and_drawn() -> None:
+    sweep = {"v1": {"uniform": [0.5, 1.5]}, "m1": {"uniform": [1, 2]}, "m2": 1.0, "K": 1e6, "n": 1.5}
+    study = impact.sensitivity({"models": ["hertz"], "design": {"n": 8}, "sweep": sweep}, of="peak_force")
+    text = str(impact.describe(study.isel(quantile=[0])))
+    assert ", 5 % " in text
+    assert "50 %" not in text
+    assert "sweep.m1" in str(impact.describe(study.isel(input=1)))
+    (axes,) = impact.plot(study, sel={"input": "sweep.m1"}).axes
+    assert [label.get_text() for label in axes.get_yticklabels()] == ["$m_1$"]
+
+
 def test_a_law_has_no_studies_along_parameters_of_other_laws() -> None:
     config = {
         "models": ["kelvin-voigt", "kuwabara-kono-1987"],

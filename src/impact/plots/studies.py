@@ -261,13 +261,13 @@ def sensitivity_bars(dataset: xr.Dataset, choice: Choice) -> BarData:
         else:
             ends = {"values": "", "lower": "_lower", "upper": "_upper"}
             indices = {
-                field: {name: tuple(law.data[f"{name}{end}"].values.tolist()) for name in BARS}
+                field: {name: tuple(law.data[f"{name}{end}"].values.ravel().tolist()) for name in BARS}
                 for field, end in ends.items()
             }
             panels.append(BarPanel(law.label, law.model, friction=law.friction, **indices))
     if not panels:
         raise UsageError(f"nothing to draw: {'; '.join(not_drawn)}")
-    inputs = tuple(str(name).removeprefix("sweep.").removeprefix("model.") for name in data["input"].values)
+    inputs = tuple(str(name).removeprefix("sweep.").removeprefix("model.") for name in np.ravel(data["input"]))
     meaning = OUTPUTS[data.attrs["of"]].short_meaning
     conditions = *distribution_texts(data), conditions_of(data.drop_vars("quantile"))
     return BarData(

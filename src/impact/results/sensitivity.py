@@ -83,8 +83,8 @@ def _list_studies(dataset: xr.Dataset) -> Iterator[dict[str, Any]]:
         for index in np.ndindex(*(law.sizes[dim] for dim in axes)):
             study = law.isel(dict(zip(axes, index, strict=True)))
             point = {dim: study[dim].item() for dim in dims if dim in LAW_DIMS or dim in axes}
-            probabilities = [f"{probability:g}" for probability in study["quantile"].values]
-            columns = (study[name].values.tolist() for name in ("input", *INDICES))
+            probabilities = [f"{probability:g}" for probability in np.ravel(study["quantile"])]
+            columns = (np.ravel(study[name]).tolist() for name in ("input", *INDICES))
             yield {
                 **{dim: point.pop(dim) for dim in LAW_DIMS if dim in point},
                 "at": point,
@@ -93,7 +93,7 @@ def _list_studies(dataset: xr.Dataset) -> Iterator[dict[str, Any]]:
                 "failed": int(study["failed"]),
                 "mean": float(study["mean"]),
                 "sd": float(study["sd"]),
-                "quantiles": dict(zip(probabilities, study["quantiles"].values.tolist(), strict=True)),
+                "quantiles": dict(zip(probabilities, np.ravel(study["quantiles"]).tolist(), strict=True)),
                 "indices": [
                     dict(zip(("input", *INDICES), row, strict=True)) for row in zip(*columns, strict=True)
                 ],
@@ -135,8 +135,11 @@ def _describe_study(study: Mapping[str, Any]) -> str:
     mean_text, totals = quantity(mean, OUTPUTS[of].unit), {row["input"]: row["total"] for row in study["indices"]}
     if not any(map(math.isfinite, totals.values())):
         return f"{of}: {mean_text}; it does not depend on the uncertain inputs"
-    lower, median, upper = (number(study["quantiles"][q]) for q in ("0.05", "0.5", "0.95"))
-    text = f"{of}: mean {mean_text}, sd {number(study['sd'], 3)}, 5 % {lower}, 50 % {median}, 95 % {upper}"
+    text = f"{of}: mean {mean_text}, sd {number(study['sd'], 3)}"
+    for probability in (0.05, 0.5, 0.95):
+        # a part of a study may lack some
+        if f"{probability:g}" in study["quantiles"]:
+            text += f", {100 * probability:g} % {number(study['quantiles'][f'{probability:g}'])}"
     irrelevant = [name for name, total in totals.items() if total == 0.0]
     if irrelevant:
         text += f"; it does not depend on {', '.join(irrelevant)}"
