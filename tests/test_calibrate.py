@@ -514,6 +514,9 @@ def test_inputs_of_calibrations_that_differ_are_named_in_one_order() -> None:
 
 def test_laws_are_compared_by_name_whatever_their_rank(drops: xr.Dataset) -> None:
     assert impact.compare(drops.isel(model=[1, 0]), drops).equal
+    # nor does the order of the parameters matter
+    verdict = impact.compare(drops.isel(parameter=[1, 0], other_parameter=[1, 0]), drops)
+    assert verdict.equal, str(verdict)
     nothing = impact.compare(drops.isel(model=[0]), drops.isel(model=[1]), subset=True)
     assert nothing.headline == "not equal: nothing in common"
     assert "the two have no law in common" in {fault.text for fault in nothing.faults}

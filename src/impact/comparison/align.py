@@ -246,7 +246,7 @@ def _format_value(value: Any) -> str:
 
 
 def align_calibrations(new: xr.Dataset, baseline: xr.Dataset, *, subset: bool) -> Alignment:
-    """Align two calibrations by their laws, whose order does not matter."""
+    """Align two calibrations by their laws and parameters, whose order does not matter."""
     faults = [*_data_faults(new, baseline)]
     is_same_data = all(fault.kind != "labels" for fault in faults)
     common = common_labels(new, baseline, "model")
@@ -257,6 +257,8 @@ def align_calibrations(new: xr.Dataset, baseline: xr.Dataset, *, subset: bool) -
     if not common:
         faults.append(Difference("nothing in common", "", "the two have no law in common"))
     new, baseline = new.sel(model=common), baseline.sel(model=common)
+    if is_same_data:
+        new = new.sel({dim: baseline[dim].values for dim in ("parameter", "other_parameter")})
     names = [name for name in CALIBRATION if name in new and name in baseline] if common and is_same_data else []
     scales = {name: _scale(name, baseline) for name in names}
     return _align(new, baseline, scales, faults)
@@ -319,13 +321,15 @@ def changed_config(name: str, label: str, new: Any, baseline: Any) -> Difference
 def _data_faults(new: xr.Dataset, baseline: xr.Dataset) -> Iterator[Difference]:
     """List the differences between the measurements, the parameters, their bounds and the noise."""
     bounds = [read_attribute(dataset.attrs, "fit_bounds") for dataset in (new, baseline)]
-    if list(bounds[0]) != list(bounds[1]):
-        got, expected = (safe_text(", ".join(table), 400) for table in bounds)
+    parameters = [list(map(str, dataset["parameter"].values)) for dataset in (new, baseline)]
+    if sorted(parameters[0]) != sorted(parameters[1]):
+        got, expected = (safe_text(", ".join(names), 400) for names in parameters)
         yield Difference("labels", "parameter", f"parameter: {got}, in BASELINE {expected}")
     else:
-        for name in bounds[0]:
-            if bounds[0][name] != bounds[1][name]:
-                yield changed_config(name, f"bounds of {name}:", bounds[0][name], bounds[1][name])
+        for name in parameters[0]:
+            a, b = (table.get(name) for table in bounds)
+            if a != b:
+                yield changed_config(name, f"bounds of {name}:", a, b)
     # version 1.0 had no other loss
     for key, default in (("noise", None), ("loss", "linear")):
         a, b = (dataset.attrs.get(key, default) for dataset in (new, baseline))
