@@ -84,7 +84,7 @@ def _list_studies(dataset: xr.Dataset) -> Iterator[dict[str, Any]]:
             study = law.isel(dict(zip(axes, index, strict=True)))
             point = {dim: study[dim].item() for dim in dims if dim in LAW_DIMS or dim in axes}
             probabilities = [f"{probability:g}" for probability in np.ravel(study["quantile"])]
-            columns = (np.ravel(study[name]).tolist() for name in ("input", *INDICES))
+            columns = (study[name].values.tolist() for name in ("input", *INDICES))
             yield {
                 **{dim: point.pop(dim) for dim in LAW_DIMS if dim in point},
                 "at": point,
