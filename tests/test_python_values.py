@@ -8,7 +8,7 @@ from concurrent.futures import Executor, Future
 from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args, get_type_hints
 
 import numpy as np
 import pandas as pd
@@ -188,6 +188,11 @@ def test_a_result_of_which_no_values_are_left_is_refused() -> None:
     fits = impact.calibrate(ROOT / "docs" / "calibrate" / "drops.toml", overrides={"models": ["kelvin-voigt"]})
     with pytest.raises(impact.UsageError, match="this result has no values along model"):
         impact.describe(fits.isel(model=slice(0, 0)))
+
+
+@pytest.mark.parametrize("name", ["run", "prepare", "solve", "timestep", "export"])
+def test_a_result_is_a_source_to_type_checkers_too(name: str) -> None:
+    assert xr.Dataset in get_args(get_type_hints(getattr(impact, name))["source"])
 
 
 def test_a_number_that_is_no_status_is_named() -> None:

@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any, Literal, NoReturn, TypeAlias
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 from scipy.optimize import elementwise, minimize_scalar
 
@@ -163,7 +164,7 @@ def solve(
     target: Mapping[str, object],
     *,
     friction: str | None = None,
-    source: str | Path | Mapping[str, object] | None = None,
+    source: str | Path | Mapping[str, object] | xr.Dataset | None = None,
     at: Mapping[str, object] | None = None,
     over: Mapping[str, object] | None = None,
     overrides: Sequence[str] | Mapping[str, object] = (),

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any, SupportsFloat
 
 import numpy as np
+import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import elementwise
 
@@ -289,7 +290,7 @@ class TimestepResult(Displayed):
 def timestep(
     model: str,
     *,
-    source: str | Path | Mapping[str, object] | None = None,
+    source: str | Path | Mapping[str, object] | xr.Dataset | None = None,
     at: Mapping[str, object] | None = None,
     steps_per_contact: ArrayLike = (),
     dt: ArrayLike = (),

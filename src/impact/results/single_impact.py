@@ -273,7 +273,7 @@ def _flag(name: str, values: Mapping[str, float]) -> str:
 
 
 def run(
-    source: str | Path | Mapping[str, object] | None = None,
+    source: str | Path | Mapping[str, object] | xr.Dataset | None = None,
     *,
     model: str | None = None,
     friction: str | None = None,
