@@ -93,8 +93,9 @@ class PreparedProblem:
     """The outputs of a law as a function of its inputs; call it with values or arrays of those that change.
 
     A call takes inputs by config name, numbers or arrays that broadcast against each other, bare or with units;
-    a parameter of the law needs no key of it. The others are those of the config. It returns a dict of `outputs`
-    and of their statuses: floats, or arrays of the shape of the inputs; NaN where the law has no result.
+    a parameter of the law needs no key of it. The others are those of the config, also of what varies together
+    there, as in a zip group. It returns a dict of `outputs` and of their statuses: floats, or arrays of the shape
+    of the inputs; NaN where the law has no result.
 
     Parameters
     ----------
