@@ -38,9 +38,8 @@ class History:
     them (the latter negative), by quadrature of the force. `e_kinetic` is tau_r/tau_c, equation (2), and
     `e_energetic` the root of -W_r/W_c, equation (3).
 
-    Of an oblique impact there are also `slip` [m/s] and `f`, the friction force on ball 2 [N]. `mode` is 0 while
-    the contact sticks, and the sign of the friction force while it slides; 2 or -2 where the force of the spring
-    follows its limit without sliding.
+    Of an oblique impact there are also `slip` [m/s], `f`, the friction force on ball 2 [N], and `mode`, what the
+    contact does, see `impact.contact.variables.HISTORY`.
     """
 
     t: Array

@@ -90,8 +90,7 @@ class Ranked:
     served : the ranges of e, or with a target of the angle if there is one, in which all points are within the
         tolerance; None unless it varies along one axis
     friction : key of the friction law; "" for a model alone
-    output : the output that is ranked
-    along : the input that `served` has ranges of
+    criterion : the output that is ranked, and the input that `served` has ranges of
     units : those of the parameters, by path, where they are known
     """
 
@@ -106,8 +105,7 @@ class Ranked:
     e_out: float
     served: tuple[tuple[float, float], ...] | None
     friction: str = ""
-    output: str = "e_out"
-    along: str = "e"
+    criterion: Criterion = BY_ERROR
     units: Mapping[str, str] = field(default_factory=dict, repr=False, compare=False)
 
     @property
@@ -122,11 +120,10 @@ class Ranked:
     @property
     def record(self) -> dict[str, Any]:
         """The fields as plain data, with words, without those of friction and of a target that do not apply."""
-        left_out = ("output", "along", "friction", "units")
+        left_out, output = ("criterion", "friction", "units"), self.criterion.output
         record = {name: value for name, value in vars(self).items() if name not in left_out}
         record |= {inputs: with_words(record[inputs]) for inputs in ("parameters", "at")}
-        if self.output != "e_out":
-            record = {self.output if name == "e_out" else name: value for name, value in record.items()}
+        record = {output if name == "e_out" else name: value for name, value in record.items()}
         return record | {"share": self.share} | ({"friction": self.friction} if self.friction else {})
 
     @property
@@ -149,14 +146,14 @@ class Ranked:
         >>> Ranked("hertz", {}, 10, 1, 0, 0.45, 0.9, {"e": 1 / 9}, 1.0, ((8 / 9, 1.0),)).row[-2:]
         ('e=0.111111: e_out 1', '0.888889 to 1')
         """
-        shown = Criterion(self.output).shown
+        shown, output = self.criterion.shown, self.criterion.output
         # the digits of an error of the integrator mean nothing
         errors = (
             "<1e-9" if 0.0 < error < MIN_ERROR_FLOOR else shown(error, 3)
             for error in (self.max_error, self.mean_error)
         )
         has_worst = self.at and self.max_error > MIN_ERROR_FLOOR
-        worst = f"{describe_point(self.at, 6)}: {self.output} {shown(self.e_out, 4)}" if has_worst else "–"
+        worst = f"{describe_point(self.at, 6)}: {output} {shown(self.e_out, 4)}" if has_worst else "–"
         return (self.name, percentage(self.share), *errors, f"{self.failed:,}", worst, self._served_text)
 
     @property
@@ -164,7 +161,7 @@ class Ranked:
         """The first ranges that it serves."""
         if self.served is None:
             return "–"
-        unit = InputName.parse(self.along).unit
+        unit = InputName.parse(self.criterion.along).unit
         ranges = [" to ".join(prefixed(end, unit, 6) for end in dict.fromkeys(ends)) for ends in self.served]
         more = f" and {len(ranges) - MAX_RANGES:,} more" if len(ranges) > MAX_RANGES else ""
         return ", ".join(ranges[:MAX_RANGES]) + more or "nowhere"
@@ -559,8 +556,7 @@ def _rank_law(law_data: xr.Dataset, tol: float, criterion: Criterion) -> Ranked:
         e_out,
         served,
         friction,
-        criterion.output,
-        along,
+        criterion,
         {path: unit for path, unit in units.items() if not names_in(unit)},
     )
 
