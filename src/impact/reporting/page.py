@@ -189,20 +189,12 @@ def _stored_values(dataset: xr.Dataset, inputs: Inputs) -> Iterator[dict[str, An
         raise UsageError(f"e_out depends on {', '.join(map(str, others))} in this result; select one value of it")
     _check_size(dataset["e_out"].size * len(names) * VALUE_BYTES)
     for position in range(dataset.sizes["model"]):
-        values = {
-            name: dataset[name].isel(model=position).transpose(*dims, missing_dims="ignore") for name in names
-        }
-        yield {
-            "is_table": False,
-            "cells": None,
-            "columns": {
-                name: {
-                    **_encoded(np.asarray(array.values, float)),
-                    "axes": [dims.index(str(dim)) for dim in array.dims],
-                }
-                for name, array in values.items()
-            },
-        }
+        columns = {}
+        for name in names:
+            values = dataset[name].isel(model=position).transpose(*dims, missing_dims="ignore")
+            axes = [dims.index(str(dim)) for dim in values.dims]
+            columns[name] = {**_encoded(np.asarray(values.values, float)), "axes": axes}
+        yield {"is_table": False, "cells": None, "columns": columns}
 
 
 def _array(values: Array) -> dict[str, Any]:
