@@ -111,15 +111,10 @@ def materials(
     if as_json:
         print(dump(shown))
         return
-    rows = [
-        (
-            key,
-            *(float(record[p]) / size if p in record else "–" for p, (_, size) in DISPLAY_UNITS.items()),
-            record["about"],
-            record["source"],
-        )
-        for key, record in shown.items()
-    ]
+    rows = []
+    for key, record in shown.items():
+        values = (float(record[p]) / size if p in record else "–" for p, (_, size) in DISPLAY_UNITS.items())
+        rows.append((key, *values, record["about"], record["source"]))
     headings = ("material", *(f"{key} [{unit}]" for key, (unit, _) in DISPLAY_UNITS.items()), "what", "source")
     print_blocks([Table(rows, headings, text=(0, -2, -1))])
 

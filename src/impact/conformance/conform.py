@@ -187,14 +187,8 @@ def betas_of_law(
     """
     inputs = [_inputs(question) for question in questions]
     cases = {name: [values[name] for values in inputs] for name in inputs[0]}
-    result = sweep(
-        {
-            "models": model,
-            "frictions": law,
-            "sweep": {"cases": cases, "n": 1.0},
-            "friction": {law: dict(parameters)},
-        }
-    )
+    table = {law: dict(parameters)}
+    result = sweep({"models": model, "frictions": law, "sweep": {"cases": cases, "n": 1.0}, "friction": table})
     return dict(zip((str(question["id"]) for question in questions), result["beta"].values.ravel(), strict=True))
 
 

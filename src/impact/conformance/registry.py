@@ -126,10 +126,7 @@ class Engines(Displayed):
 
     def sections(self, width: int) -> Iterator[Block]:
         headings = ("engine", "version", "install", "settings")
-        rows = [
-            (row["engine"], row["version"] or "not installed", row["install"], row["settings"])
-            for row in self.records()
-        ]
+        rows = [[row[name] or "not installed" for name in headings] for row in self.records()]
         yield Table(rows, headings, text=(0, 1, 2, 3))
 
 

@@ -92,10 +92,8 @@ class ContractResult(list[ClauseResult], Displayed):
         return {"model": self.model.key, "holds": self.holds, "clauses": self.records()}
 
     def records(self) -> Sequence[Mapping[str, Any]]:
-        return [
-            {"clause": result.clause, "holds": result.holds, "worst": result.worst, "bound": result.bound}
-            for result in self
-        ]
+        names = ("clause", "holds", "worst", "bound")
+        return [{name: getattr(result, name) for name in names} for result in self]
 
     def rows(self) -> list[tuple[str | Styled, ...]]:
         """Write a row for each clause, under HEADINGS; the model is named once."""

@@ -126,10 +126,7 @@ class Drawing:
         kind, choice, _ = plan
         options = {"x": choice.x, "y": choice.y, "variable": choice.variable}
         words = [f"--{name}={value}" for name, value in options.items() if value is not None]
-        words += [
-            f"--sel={name}={value!r}" if isinstance(value, float) else f"--sel={name}={value}"
-            for name, value in (choice.sel or {}).items()
-        ]
+        words += [f"--sel={name}={value}" for name, value in (choice.sel or {}).items()]
         if choice.models and len(choice.models) < self.model_count:
             words += [f"--model={key}" for key in choice.models]
         words += [f"--friction={key}" for key in choice.frictions or ()]

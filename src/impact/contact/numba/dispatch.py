@@ -121,14 +121,6 @@ def integrate_compiled(
         bound = motion.overdamped_speed(strength, law.n, form.drag / form.coordinate_power)
     solution = Solution.blank(n)
     rows = (np.ascontiguousarray(start), np.ascontiguousarray(strength), np.ascontiguousarray(bound))
-    kernel(form)(
-        *rows,
-        rk45.first_step(problem, rtol),
-        rtol,
-        max_steps,
-        solution.state,
-        solution.maximum,
-        solution.steps,
-        solution.termination,
-    )
+    ends = (solution.state, solution.maximum, solution.steps, solution.termination)
+    kernel(form)(*rows, rk45.first_step(problem, rtol), rtol, max_steps, *ends)
     return solution
