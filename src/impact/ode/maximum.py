@@ -28,7 +28,7 @@ def begins_to_fall(value: Array, value_end: Array, best: Array) -> Mask:
     return (value_end < value) & (value > best)
 
 
-def secant_update(left: Array, d_left: Array, right: Array, d_right: Array) -> Array:
+def secant_update(left: Array, d_left: Array, right: Array | float, d_right: Array) -> Array:
     """The root of the secant through two slopes, as a fraction of the step; `right` where it is outside."""
     root = right - d_right * (right - left) / (d_right - d_left)
     return choose((root >= 0.0) & (root <= 1.0), root, right)

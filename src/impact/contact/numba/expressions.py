@@ -1,29 +1,30 @@
 """The equations of motion of the forms, and a Runge-Kutta step of them, for a single trajectory.
 
 Every function is compiled into its caller, for the constants of a form, and has no branch that depends on a value.
-Formulas of the NumPy back end are `shared` with it.
+It shares formulas with the NumPy back end.
 """
 
 from __future__ import annotations
 
-from ...ode import events, maximum, rk45
+from ...ode.events import at_event, before_event, event_offset, is_event_ahead, linear_offset, trapezoid
+from ...ode.maximum import begins_to_fall, secant_update
+from ...ode.rk45 import error_norm, next_step, step_factor
 from ...ode.tableau import A as FRACTIONS, E as DIFFERENCES
-from .. import force_expressions, motion, velocity_coordinates
-from ..motion import ERROR_FLOOR, MAX_S, MIN_RELEASE_S, RELEASE_STEP
+from ..force_expressions import damped, dragged
+from ..motion import ERROR_FLOOR, MAX_S, MIN_RELEASE_S, RELEASE_STEP, release_event
+from ..velocity_coordinates import rate_of_force, rate_of_log, velocity_of_force
 from .dispatch import END_AT_GAP, END_AT_NO_FORCE, END_AT_PEAK, EQ_DAMPED, EQ_DRAGGED, EQ_FORCE, EQ_LOG, EQ_SPRING
-from .simd_math import exponential, inlined, shared, whole_power
+from .simd_math import exponential, inlined, share, whole_power
 
 A = tuple(tuple(map(float, row)) for row in FRACTIONS)
 E = tuple(map(float, DIFFERENCES))
 
-damped, dragged = shared(force_expressions.damped), shared(force_expressions.dragged)
-rate_of_log, rate_of_force = shared(velocity_coordinates.rate_of_log), shared(velocity_coordinates.rate_of_force)
-velocity_of_force, release_event = shared(velocity_coordinates.velocity_of_force), shared(motion.release_event)
-step_factor, next_step, error_norm = shared(rk45.step_factor), shared(rk45.next_step), shared(rk45.error_norm)
-is_event_ahead, event_offset = shared(events.is_event_ahead), shared(events.event_offset)
-before_event, at_event = shared(events.before_event), shared(events.at_event)
-linear_offset, trapezoid = shared(events.linear_offset), shared(events.trapezoid)
-begins_to_fall, secant_update = shared(maximum.begins_to_fall), shared(maximum.secant_update)
+for formula in (
+    *(damped, dragged, rate_of_log, rate_of_force, velocity_of_force, release_event),
+    *(step_factor, next_step, error_norm, begins_to_fall, secant_update),
+    *(is_event_ahead, event_offset, before_event, at_event, linear_offset, trapezoid),
+):
+    share(formula)
 
 
 @inlined

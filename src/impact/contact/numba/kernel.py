@@ -15,27 +15,12 @@ from pathlib import Path
 
 import numpy as np
 
-from ...ode.maximum import FLAT_SLOPE, SECANT_STEPS, SLOPE_STEP
+from ...ode.events import at_event, before_event, event_offset, is_event_ahead, linear_offset, trapezoid
+from ...ode.maximum import FLAT_SLOPE, SECANT_STEPS, SLOPE_STEP, begins_to_fall, secant_update
 from ...ode.problem import Termination
-from ...ode.rk45 import MAX_HALVINGS, MIN_STEP
+from ...ode.rk45 import MAX_HALVINGS, MIN_STEP, next_step
 from .dispatch import END_AT_PEAK, Form
-from .expressions import (
-    at_event,
-    before_event,
-    begins_to_fall,
-    event,
-    event_offset,
-    force,
-    is_event_ahead,
-    is_unreachable,
-    linear_offset,
-    next_step,
-    rates,
-    rk_step,
-    secant_update,
-    slope_of_force,
-    trapezoid,
-)
+from .expressions import event, force, is_unreachable, rates, rk_step, slope_of_force
 from .simd_math import inlined, kept_on_disk
 
 # lanes of a group, and groups advanced in turn

@@ -19,13 +19,9 @@ inlined = njit(**JIT_OPTIONS)
 kept_on_disk = compiled(nogil=True, **OPTIONS)
 
 
-def shared(formula, of_numbers=None):
-    """A formula of the NumPy back end, compiled for numbers into its callers, which may be such formulas too.
-
-    With `of_numbers`, another formula for numbers takes its place.
-    """
+def share(formula, of_numbers=None):
+    """Compile a formula of the NumPy back end, or another one for numbers in its place, into what calls it."""
     overload(formula, jit_options=JIT_OPTIONS, strict=False)(lambda *arguments: of_numbers or formula)
-    return inlined(of_numbers or formula)
 
 
 def _reinterpreted(target, source):
@@ -52,12 +48,12 @@ def _larger_quotient(this, divisor, other, other_divisor):
 
 
 # versions for numbers of the functions that the shared formulas call
-shared(events.choose, lambda condition, this, other: this if condition else other)
-shared(events.smaller, lambda this, other: this if this < other else other)
-shared(rk45.larger, lambda this, other: this if this > other else other)
-shared(rk45.larger_quotient, _larger_quotient)
-shared(rk45.bits, lambda number: _bits_of(number))
-shared(rk45.from_bits, lambda whole: _float_of(whole))
+share(events.choose, lambda condition, this, other: this if condition else other)
+share(events.smaller, lambda this, other: this if this < other else other)
+share(rk45.larger, lambda this, other: this if this > other else other)
+share(rk45.larger_quotient, _larger_quotient)
+share(rk45.bits, lambda number: _bits_of(number))
+share(rk45.from_bits, lambda whole: _float_of(whole))
 
 ONE_BITS = int(np.float64(1.0).view(np.int64))
 # a number whose last bit has the value 1, so that adding it rounds to an integer
