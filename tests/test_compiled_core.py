@@ -272,7 +272,7 @@ import ctypes
 ctypes.CDLL(None).capset((ctypes.c_uint32 * 2)(0x20080522, 0), (ctypes.c_uint32 * 6)())
 from impact.contact.numba.compile_cache import compiled
 
-@compiled()
+@compiled
 def twice(x):
     return 2.0 * x
 

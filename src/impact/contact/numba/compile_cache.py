@@ -89,21 +89,16 @@ def cache_folder() -> str | None:
         return None
 
 
-def compiled(**options):
+def compiled(function, **options):
     """As `numba.njit`, with the machine code in a cache on disk where possible."""
-
-    def decorate(function):
-        dispatcher = njit(**options)(function)
-        # with NUMBA_DISABLE_JIT=1 njit returns the function itself
-        if dispatcher is function:
-            return function
+    dispatcher = njit(**options)(function)
+    # with NUMBA_DISABLE_JIT=1 njit returns the function itself
+    if dispatcher is not function:
         try:
             dispatcher._cache = CheckedCache(function)
         except (RuntimeError, OSError):
             _warn_once("compiled code is not kept: no folder for it can be written to; NUMBA_CACHE_DIR names one")
-        return dispatcher
-
-    return decorate
+    return dispatcher
 
 
 @cache

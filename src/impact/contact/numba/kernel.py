@@ -19,9 +19,10 @@ from ...ode.events import at_event, before_event, event_offset, is_event_ahead, 
 from ...ode.maximum import FLAT_SLOPE, SECANT_STEPS, SLOPE_STEP, begins_to_fall, secant_update
 from ...ode.problem import Termination
 from ...ode.rk45 import MAX_HALVINGS, MIN_STEP, next_step
+from .compile_cache import compiled
 from .dispatch import END_AT_PEAK, Form
 from .expressions import event, force, is_unreachable, rates, rk_step, slope_of_force
-from .simd_math import inlined, kept_on_disk
+from .simd_math import OPTIONS, inlined
 
 # lanes of a group, and groups advanced in turn
 LANES, GROUPS = 32, 2
@@ -252,7 +253,6 @@ def end_all(form, w, first, count, state, best, steps, end):
 def _kernel(form: Form, version: int):
     """The integrator of a form; the form and the number of the source files are constants in it."""
 
-    @kept_on_disk
     def integrate(start, strength, bound, first_step, rtol, max_steps, state, best, steps, end):
         count = start.shape[1] if version >= 0 else 0
         w = np.zeros((GROUPS, ENDED + LANES))
@@ -277,7 +277,7 @@ def _kernel(form: Form, version: int):
                     else:
                         active -= 1
 
-    return integrate
+    return compiled(integrate, nogil=True, **OPTIONS)
 
 
 # by form; each is compiled at its first call

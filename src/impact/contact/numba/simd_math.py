@@ -10,13 +10,11 @@ from numba import njit, types
 from numba.extending import intrinsic, overload
 
 from ...ode import events, rk45
-from .compile_cache import compiled
 
 # products and sums may be fused, which only makes them more exact; otherwise the arithmetic is that of IEEE 754
 OPTIONS: Any = {"fastmath": {"contract"}, "error_model": "numpy"}
 JIT_OPTIONS: Any = {"forceinline": True, **OPTIONS}
 inlined = njit(**JIT_OPTIONS)
-kept_on_disk = compiled(nogil=True, **OPTIONS)
 
 
 def share(formula, of_numbers=None):
