@@ -77,9 +77,14 @@ class _ProcessPool(ProcessPoolExecutor):
     """Processes that receive no SIGINT, which a terminal sends to all: only the driver handles it."""
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        # submit may start a process
-        with _interrupts_blocked():
+        if not hasattr(signal, "pthread_sigmask"):
             return super().submit(fn, *args, **kwargs)
+        # a process that is started here inherits the block; this process receives the signal afterwards
+        previous_mask = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+        try:
+            return super().submit(fn, *args, **kwargs)
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, previous_mask)
 
 
 @contextlib.contextmanager
@@ -96,19 +101,6 @@ def _process_pool(jobs: int) -> Iterator[Executor]:
         raise
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
-
-
-@contextlib.contextmanager
-def _interrupts_blocked() -> Iterator[None]:
-    """Block SIGINT: processes started meanwhile inherit the block; this process receives the signal afterwards."""
-    if not hasattr(signal, "pthread_sigmask"):
-        yield
-        return
-    previous_mask = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, previous_mask)
 
 
 def _initialize_worker() -> None:
