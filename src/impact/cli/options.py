@@ -33,10 +33,10 @@ def call(function: Callable[..., ResultT], options: Mapping[str, Any], **argumen
     >>> call(solve, {"at": [NamedValue("e", 0.5)], "sel": None, "as_json": True}, model="hertz")
     ('hertz', {'e': 0.5}, 'none')
     """
-    for name in inspect.signature(function).parameters.keys() & options.keys() - arguments.keys():
+    for name in inspect.signature(function).parameters:
+        if name in arguments or options.get(name) is None:
+            continue
         match options[name]:
-            case None:
-                continue
             case NamedValue() as word:
                 arguments[name] = dict([word])
             case [NamedValue(), *_] as words:
