@@ -30,12 +30,13 @@ from .draft import (
     settings_of,
 )
 from .files import as_table, override_text, set_value
-from .grid import MAX_POINTS, Axis, build_grid, chunk_problems, design_problems, draw_columns, unit_samples
+from .grid import MAX_POINTS, Axis, build_grid, chunk_problems
 from .input_names import InputName, paths_with
 from .library import library
 from .lines import validation_problems
 from .quantities import Column, ConfigProblem, Distribution, FitRange, KeyPath
 from .rules import check_rules, materials_of
+from .samples import design_problems, draw_columns, unit_samples
 
 # what a config is read for: only a calibration has measurements and parameters to fit, only a sweep has axes
 Purpose = Literal["sweep", "calibrate"]
