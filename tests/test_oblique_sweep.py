@@ -313,6 +313,15 @@ def test_compare_reports_a_changed_restitution(cli: Run, folder: Path, layout: s
     assert f"model=tsuji-1992, friction={SPRING}, angle=" in done.stdout
 
 
+def test_the_file_of_a_selected_friction_law_is_described(whole: xr.Dataset, tmp_path: Path) -> None:
+    for name, friction in (("axis", [SPRING]), ("selected", SPRING)):
+        impact.save(whole.sel(friction=friction), tmp_path / f"{name}.h5")
+    of_axis, of_selected = (impact.info(tmp_path / f"{name}.h5").as_dict() for name in ("axis", "selected"))
+    for key in ("points", "status", "friction_status"):
+        assert of_selected[key] == of_axis[key]
+    assert of_selected["variables"]["beta"]["largest"] == of_axis["variables"]["beta"]["largest"]
+
+
 @pytest.mark.parametrize("friction", [SPRING, [SPRING]])
 def test_a_rerun_repeats_the_friction_laws_of_the_file(
     whole: xr.Dataset, friction: str | list[str], tmp_path: Path

@@ -454,12 +454,14 @@ def parts_of_laws(
     without these axes. Without the dimension of models it is all.
     """
     law_dims = [dim for dim in LAW_DIMS if dim in dims] if "model" in dims else []
-    keys = [dataset[dim].values.tolist() for dim in law_dims]
+    keys = [np.atleast_1d(dataset[dim].values).tolist() for dim in law_dims]
     columns = {dim: columns_along(dataset, dim) for dim in (dataset.dims if law_dims else ())}
     for place in np.ndindex(*map(len, keys)):
         names = [str(of_dim[position]) for of_dim, position in zip(keys, place, strict=True)]
         others = {dim: first for dim, along in columns.items() if is_foreign(along, *names)}
-        yield place, dataset.isel({**dict(zip(law_dims, place, strict=True)), **others})
+        # a friction law that was selected is no dimension
+        at = {dim: position for dim, position in zip(law_dims, place, strict=True) if dim in dataset.dims}
+        yield tuple(at.values()), dataset.isel({**at, **others})
 
 
 def count_points(dataset: xr.Dataset) -> int:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ..contact.materials import sphere_mass
 from ..contact.status import FIRST_FAILURE, FrictionStatus, Status
+from ..contact.variables import OUTPUTS
 from ..display import Block, Displayed, Table, Wrapped
 from ..engine.inputs import Inputs, input_at, property_at, smaller_radius_at
 from ..engine.trajectories import axes_of_arrays, probe_index
@@ -228,7 +229,9 @@ def _distinct_parts(dataset: xr.Dataset, name: str) -> tuple[list[tuple[xr.Varia
     whole = dataset.variables[name]
     # selecting from few variables is fast; along which axes a variable varies depends on the model
     few = dataset[[name, *({"model"} & dataset.coords.keys())]]
-    parts = [distinct_points(part, name) for _, part in parts_of_laws(few, whole.dims)]
+    # of a pair also where its friction law was selected, and is no dimension
+    dims = {*whole.dims, *(("friction",) if name in OUTPUTS and OUTPUTS[name].of_friction else ())}
+    parts = [distinct_points(part, name) for _, part in parts_of_laws(few, dims)]
     # a variable that is only read may have any size
     return parts, not is_computed(whole) or sum(part.size for part, _ in parts) <= MAX_SUMMARY_POINTS
 
