@@ -448,3 +448,37 @@ def test_an_indentation_that_is_large_beside_a_ball_is_noted(act: str) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         acts[act](at={"R1": 0.1, "R2": 0.1, "v1": 0.1, "e": 0.8})
+
+
+def test_a_part_of_a_result_runs_a_law_without_the_parameters_of_the_others(tmp_path: Path, cli: Run) -> None:
+    sweep = {
+        "e": [0.3, 0.6],
+        "v1": 1.0,
+        "m1": 1.0,
+        "m2": 2.0,
+        "R1": 0.01,
+        "R2": 0.02,
+        "K": 1e6,
+        "u1": 0.4,
+        "mu": 0.2,
+    }
+    config = {
+        "models": ["tsuji-1992", "kuwabara-kono-1987"],
+        "frictions": ["coulomb-1785", "cundall-strack-1979"],
+        "sweep": sweep,
+        "model": {"kuwabara-kono-1987": {"A": [1e-5, 1e-4]}},
+        "friction": {"cundall-strack-1979": {"k_t": [1e3, 1e5]}},
+    }
+    result = impact.sweep(config)
+    part = result.isel({"e": 1, "kuwabara-kono-1987.A": 1, "friction.cundall-strack-1979.k_t": 1})
+    for model in part["model"].values.tolist():
+        for friction in part["friction"].values.tolist():
+            values = impact.run(part, model=model, friction=friction).values
+            for name in ("e_out", "beta"):
+                laws = {"model": model, "friction": friction}
+                expected = part[name].sel({dim: laws[dim] for dim in part[name].dims}).item()
+                assert values[name] == pytest.approx(expected, rel=1e-9)
+    impact.save(result, tmp_path / "whole.h5")
+    impact.expand(tmp_path / "whole.h5", tmp_path / "part.h5", sel={"kuwabara-kono-1987.A": 1e-4})
+    process = cli("run", "part.h5", "--model", "tsuji-1992", "--friction", "coulomb-1785", cwd=tmp_path)
+    assert process.returncode == 0

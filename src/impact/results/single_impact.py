@@ -667,7 +667,10 @@ def single_point(
             continue
         parsed = InputName.parse(name)
         if not _has_input(draft, parsed):
-            raise _unknown_input(draft, name)
+            if name in fixed:
+                raise _unknown_input(draft, name)
+            # a parameter of another law, which the part of a result has as well
+            continue
         path, value = parsed.path, parsed.word(value)
         if name == "K" and law is not None and has_other_stiffness(draft, law):
             # K of a model with another exponent than [sweep] is that of its own table
