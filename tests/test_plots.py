@@ -694,6 +694,9 @@ def test_the_style_of_the_user_is_respected(coarse: xr.Dataset, tmp_path: Path) 
     assert impact.plot(coarse, style="grayscale").axes
     with pytest.raises(UsageError, match=r"style=\"none\.mplstyle\": no such file"):
         impact.plot(coarse, style="none.mplstyle")
+    (tmp_path / "c.toml").write_text("models = ['hertz']\n", encoding="utf-8")
+    with pytest.raises(UsageError, match="contains no setting of matplotlib"):
+        impact.plot(coarse, style=tmp_path / "c.toml")
     sheet.write_bytes(b"font.size: \xff\n")
     with pytest.raises(UsageError, match="cannot be read"):
         impact.plot(coarse, style=sheet)

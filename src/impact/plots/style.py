@@ -74,9 +74,12 @@ def _style_of(style: str | Path | None) -> Mapping[Any, Any]:
     if not Path(style).is_file():
         raise UsageError(f"{argument('style', style)}: no such file, and no style of matplotlib")
     try:
-        return rc_params_from_file(str(style), use_default_template=False)
+        settings = rc_params_from_file(str(style), use_default_template=False)
     except (OSError, ValueError, KeyError) as error:
         raise UsageError(f"{argument('style', style)}: cannot be read: {error}") from None
+    if not settings:
+        raise UsageError(f"{argument('style', style)}: contains no setting of matplotlib")
+    return settings
 
 
 def tint(share: float, colour: str | None = None) -> tuple[float, float, float]:
