@@ -151,6 +151,11 @@ def test_a_wrong_table_is_refused_with_its_line(folder: Path, cli: Run, csv: str
             "data.sigma: got 1e-320, expected a number from 1e-30 to 1e+100",
         ),
         ('file = "drops.csv"', 'noise = "scale"', "data: got neither file nor columns"),
+        (
+            'file = "drops.csv"',
+            'decimal = ","\ncolumns = { e_out = [0.4, 0.5, 0.6] }',
+            "data.decimal: set without a file, whose form it is",
+        ),
         ('file = "drops.csv"', 'file = "drops.csv"\nloss = "square"', "data.loss"),
         (
             "[model.kuwabara-kono-1987]",

@@ -352,6 +352,8 @@ def test_angles_of_a_ranking_are_in_degrees() -> None:
     assert law.row[5].endswith(f"rebound_angle {math.degrees(law.e_out):.4g}°")
     with pytest.raises(impact.ImpactError, match=re.escape('tol: got "1 m", expected a unit of rad')):
         impact.recommend(result, target=target, tol="1 m")
+    with pytest.raises(impact.UsageError, match=re.escape('got 20 rad; did you mean "20 deg"?')):
+        impact.recommend(result, target={"rebound_angle": 20})
 
 
 # ---- calibrate

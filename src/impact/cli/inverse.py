@@ -81,7 +81,7 @@ def timestep(
         options.value(
             "NAME",
             "How a step is computed: kick-drift, drake-tamsi (also LAGGED and SIMILAR), drake-sap "
-            "(where --for takes relaxation_time too) or pybullet. "
+            "(where --for takes relaxation_time too), pybullet, or mujoco-cone with mujoco-elliptic. "
             "\\[default: drake-tamsi for laws of Drake, else kick-drift]",
             complete_scheme,
         ),

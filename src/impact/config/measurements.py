@@ -17,6 +17,7 @@ from ..contact.variables import OUTPUTS
 from ..errors import ConfigError
 from ..formatting import law_name, number, quantity, safe_text
 from .columns import (
+    CSV_KEYS,
     Columns,
     also,
     columns_of_table,
@@ -462,6 +463,8 @@ def read_measurements(draft: Draft) -> Draft:
     lines, n_points = table.get("lines"), len(points.lines)
     if "file" in table and lines is None:
         problems.append((path, "set together with file, expected one of the two"))
+    unused = () if "file" in table else CSV_KEYS.keys() & table.keys()
+    problems += [(("data", key), "set without a file, whose form it is") for key in sorted(unused)]
     if isinstance(lines, list) and len(lines) != n_rows:
         problems.append((("data", "lines"), f"got {len(lines)} values, expected {n_rows}, one for each point"))
     elif isinstance(lines, list):

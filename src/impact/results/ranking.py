@@ -337,7 +337,10 @@ def only_target(target: Mapping[str, object]) -> tuple[str, object]:
 
 def target_value(name: str, value: object) -> float:
     """Read the target of an output, a number that may have a unit."""
-    return read_number(value, Quantity(OUTPUTS[name].unit, OUTPUTS[name].meaning), argument("target", key=name))
+    output = OUTPUTS[name]
+    # of an angle to the normal
+    most = 0.5 * math.pi if output.unit == "rad" else math.inf
+    return read_number(value, Quantity(output.unit, output.meaning, -most, most), argument("target", key=name))
 
 
 def rank_laws(
