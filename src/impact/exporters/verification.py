@@ -210,16 +210,12 @@ def _with_friction(
     turn = abs(tangential) * problem.law.contact_time / (collision["R1"] + collision["R2"])
     turning = max(turning, turn)
     is_turning = problem.code.shortens_arms or not problem.has_wall
-    of_e = exact if problem.has_wall and not problem.law.is_coupled else max(exact, turning * speed / v0)
-    # friction that slides changes by the same part as the normal impulse, which is (1 + e) m v0
-    share = float(np.max(np.divide(1.0 + predicted.ravel(), 1.0 + np.array(verification.predicted))))
-    of_beta = turning * max(1.0, speed / abs(slip)) + share * of_e
     return replace(
         verification,
-        uncertainty=of_e,
+        uncertainty=exact if problem.has_wall and not problem.law.is_coupled else max(exact, turning * speed / v0),
         beta_measured=tuple(run.get("beta", math.nan) for row in runs for run in row),
         beta_predicted=tuple(predicted.ravel().tolist()),
-        beta_uncertainty=max(exact, of_beta) if is_turning else exact,
+        beta_uncertainty=max(exact, turning * max(1.0, speed / abs(slip))) if is_turning else exact,
     )
 
 
