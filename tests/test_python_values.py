@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import pickle
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future
+from contextlib import contextmanager
 from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
@@ -205,11 +206,20 @@ def test_a_number_that_is_no_status_is_named() -> None:
                 function(changed)
 
 
-def test_what_fails_for_another_reason_stays_the_error_that_it_is() -> None:
+def test_what_fails_for_another_reason_stays_the_error_that_it_is(tmp_path: Path) -> None:
     with pytest.raises(TypeError, match="unexpected keyword argument 'modle'"):
         impact.run(modle="hertz")  # type: ignore[call-arg]
     with pytest.raises(ZeroDivisionError):
         impact.sweep(BASE, executor=Broken())
+    with pytest.raises(ZeroDivisionError):
+        # a type with an argument that is no element
+        impact.sweep_to_file(BASE, tmp_path / "r.h5", backend=broken_backend())
+
+
+@contextmanager
+def broken_backend() -> Iterator[Any]:
+    raise ZeroDivisionError
+    yield
 
 
 class Broken(Executor):

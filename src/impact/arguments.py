@@ -117,9 +117,9 @@ def _wrong_type(value: Any, annotation: Any) -> str:
         # a type such as ArrayLike is for type checkers
         if not isinstance(kind, type) or isinstance(value, ABSTRACT.get(kind, kind)):
             columns = [value, value.values()] if kind is Mapping else [value] if kind is Sequence else []
-            elements = (
-                (each, of) for column, of in zip(columns, get_args(alternative), strict=True) for each in column
-            )
+            # other types have arguments, too
+            pairs = zip(columns, get_args(alternative), strict=False)
+            elements = ((each, of) for column, of in pairs for each in column)
             element = next(filter(None, starmap(_wrong_type, elements)), "")
             if not element:
                 return ""
