@@ -143,7 +143,7 @@ def test_what_a_page_cannot_show_is_refused_in_one_line(results: dict[str, xr.Da
         "K": 1e9,
     }
     cases = {
-        "over an axis; impact report writes one of any but a history": impact.run().history,
+        "over an axis; impact report takes other results, but no time history": impact.run().history,
         "take more than 10 MB; take a part first, by models or impact expand": impact.sweep(large),
         'no model "hertz" in this result': results["table"],
     }

@@ -68,10 +68,12 @@ def prepare_for_users(member: Any) -> Any:
 
 def _show_defaults(kind: type[Any]) -> None:
     """Let `help` show the defaults of a dataclass, such as {}, in place of `<factory>`."""
-    made = {field.name: field.default_factory() for field in fields(kind) if field.default_factory is not MISSING}
+    defaults = {
+        field.name: field.default_factory() for field in fields(kind) if field.default_factory is not MISSING
+    }
     signature = inspect.signature(vars(kind)["__init__"])
     parameters = [
-        each.replace(default=made.get(each.name, each.default)) for each in signature.parameters.values()
+        each.replace(default=defaults.get(each.name, each.default)) for each in signature.parameters.values()
     ]
     vars(kind)["__init__"].__signature__ = signature.replace(parameters=parameters)
 

@@ -95,7 +95,7 @@ class Table:
         console.print(table)
 
     def _widths(self, columns: Sequence[Sequence[str]], width: int) -> Sequence[int | None]:
-        """Choose the widths of columns that fold at spaces, the widest first. None each without room for words."""
+        """Choose the widths of columns that fold at spaces, the widest first; None where words have no room."""
         from rich.cells import cell_len
 
         most = [max(map(cell_len, texts)) for texts in columns]

@@ -41,7 +41,7 @@ StiffnessRule = Literal["", "constant", "mindlin", "liggghts", "kratos", "classi
 # Kratos does, by the damping ratio of the contact force; c_t; as MuJoCo does, b_t and the impedance
 DampingRule = Literal["", "xt", "liggghts", "betas", "kratos", "c_t", "cone"]
 HERTZ = 1.5
-# the exponents of the contact forces whose stiffness is kt_over_kn times a tangential one, or goes with 8 G* a
+# the exponents n of contact forces with which kt_over_kn, or 8 G* a, gives a tangential stiffness
 EXPONENTS = {"constant": (1.0,), "mindlin": (HERTZ,), "liggghts": (1.0, HERTZ)}
 # the parameters that set the stiffness of the tangential spring
 STIFFNESS_PARAMETERS = ("k_t", "kt_over_kn")

@@ -124,16 +124,16 @@ def explore(
         # JupyterLab handles changes in several threads, and each draws the present values
         with DRAWING:
             message.value = COMPUTING
-            found = find_kind(menus["kind"].value)
-            along = found.inputs_along(menus["x"].value, menus["y"].value)
+            kind = find_kind(menus["kind"].value)
+            along = kind.inputs_along(menus["x"].value, menus["y"].value)
             for name, control in controls.items():
-                control.disabled = name in along or name in {"x", "y"}.difference(found.along)
+                control.disabled = name in along or name in {"x", "y"}.difference(kind.along)
             chosen = {name: control.value for name, control in controls.items() if not control.disabled}
             at = {name: value_shown(chosen.pop(name), dataset[name].values) for name in sliders if name in chosen}
             off_grid = {name: value for name, value in at.items() if value not in dataset[name].values}
             try:
                 result = dataset
-                if off_grid and config and found.source != "history":
+                if off_grid and config and kind.source != "history":
                     of_laws = select_laws(dataset, chosen["models"], chosen.get("frictions"))
                     result = integrate_at(of_laws, config, at, plugin_set)
                 figure = plot(result, sel=at, width=WIDTH_INCHES, plugins=plugins, **chosen)

@@ -95,7 +95,7 @@ def page(
 def _page_of(dataset: xr.Dataset, models: Sequence[str] | None) -> str:
     if "model" not in dataset.dims or SAMPLE in dataset.dims or not axes_of(dataset):
         raise UsageError(
-            "expected the result of a sweep over an axis; impact report writes one of any but a history"
+            "expected the result of a sweep over an axis; impact report takes other results, but no time history"
         )
     positions = law_positions(models, dataset)
     table = table_of_result(dataset)

@@ -75,7 +75,7 @@ def describe_design(dataset: xr.Dataset) -> str:
     return f"{drawn} of {', '.join(distribution_texts(dataset))}"
 
 
-def _list_studies(dataset: xr.Dataset) -> Iterator[dict[str, Any]]:
+def _iterate_studies(dataset: xr.Dataset) -> Iterator[dict[str, Any]]:
     """Yield each study as plain data: of each law at each point, once along parameters of other laws."""
     dims, design = list(map(str, dataset["mean"].dims)), read_attribute(dataset.attrs, "design")
     for _, law in parts_of_laws(dataset, dims, first=0):
@@ -150,7 +150,7 @@ def _describe_study(study: Mapping[str, Any]) -> str:
 
 def study_texts(dataset: xr.Dataset) -> Iterator[tuple[str, str, list[tuple[str, ...]]]]:
     """Yield the point of each study, the distribution of the output, and the rows under INDEX_HEADINGS."""
-    for study in _list_studies(dataset):
+    for study in _iterate_studies(dataset):
         laws = {dim: study[dim] for dim in LAW_DIMS if dim in study}
         yield describe_point(laws | study["at"]), _describe_study(study), _index_rows(study)
 
@@ -163,13 +163,13 @@ class Studies(Displayed):
 
     def as_dict(self) -> dict[str, Any]:
         """The studies with the distribution of the output and the indices of each uncertain input."""
-        return {"studies": list(_list_studies(self.dataset))}
+        return {"studies": list(_iterate_studies(self.dataset))}
 
     def records(self) -> Sequence[Mapping[str, Any]]:
         """A row for each uncertain input of each study."""
         return [
             {dim: study[dim] for dim in LAW_DIMS if dim in study} | {**study["at"], "of": study["of"], **indices}
-            for study in _list_studies(self.dataset)
+            for study in _iterate_studies(self.dataset)
             for indices in study["indices"]
         ]
 
