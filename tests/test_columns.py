@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -45,6 +46,10 @@ DIALECTS = {
     "1;12,5;0,91;0,01;a;;\n2;100;0,85;0,01;a;kalt, 2.5 mm;\n3;250,25;0,8;0,02;b;;\n",
     "spaces around quotes": re.sub("[^,\n]+", ' "\\g<0>" ', PLAIN).replace(",", ";"),
     "separator line": "sep=;\n" + PLAIN.replace(",", ";"),
+    "slash before a unit": PLAIN.replace("[cm/s]", "/ (cm/s)"),
+    "slash and no brackets": PLAIN.replace(" [cm/s]", "/cm/s"),
+    "word before a unit": PLAIN.replace("[cm/s]", "in cm/s"),
+    "spaces": PLAIN.replace(",", "  "),
 }
 
 
@@ -85,6 +90,23 @@ EXPECTED = (
 def test_the_same_measurements_have_the_same_bits_in_every_dialect(folder: Path, dialect: str) -> None:
     (folder / "a.csv").write_text(DIALECTS[dialect], encoding="utf-8", newline="")
     assert values(measurements({"file": "a.csv"})) == EXPECTED
+
+
+@pytest.mark.parametrize("form", [{}, {"delimiter": ","}, {"delimiter": ";", "fmt": "%.4f"}])
+def test_a_file_of_numpy_has_its_names_in_a_comment(folder: Path, form: dict[str, Any]) -> None:
+    names = form.get("delimiter", " ").join(("v1 [cm/s]", "e_out", "sigma"))
+    rows = [[12.5, 0.91, 0.01], [100.0, 0.85, 0.01], [250.25, 0.8, 0.02]]
+    np.savetxt(folder / "a.csv", rows, header=f"drops of 3 balls\n{names}", **form)
+    assert values(measurements({"file": "a.csv"}))[:3] == EXPECTED[:3]
+
+
+def test_a_comment_without_names_is_no_header(folder: Path) -> None:
+    assert refused("# two balls\n1.0,0.5\n2.0,0.4\n") == [
+        "a.csv:2: got no known column, expected names of inputs or outputs, such as v1 [m/s] or e_out"
+    ]
+    # a ratio of masses is another column, not a mass in square metres
+    (folder / "a.csv").write_text(PLAIN.replace("specimen", "m1/m2"), encoding="utf-8")
+    assert values(measurements({"file": "a.csv"}))[:3] == EXPECTED[:3]
 
 
 def test_a_mapping_and_a_data_frame_have_the_bits_of_a_file() -> None:

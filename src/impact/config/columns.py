@@ -42,13 +42,17 @@ from .quantities import (
 from .tables import LABORATORY
 
 MAX_CSV_BYTES = 2_000_000  # size of a CSV file, whose values a result stores
-SQUARE_BRACKETS, ROUND_BRACKETS = (
-    re.compile(rf"(.*?)\s*{ends}", re.DOTALL) for ends in (r"\[(.*)\]", r"\((.*)\)")
-)
+# the unit in a header: "v1 [m/s]", "v1 / (m/s)", "v1 in m/s" or "v1 (m/s)"
+UNIT_FORMS = [
+    re.compile(rf"(.*?)\s*{unit}", re.DOTALL)
+    for unit in (r"\[(.*)\]", r"(?:/|\bin\s)\s*\((.*)\)", r"(?:/|\bin\s)\s*([^()]*)", r"\((.*)\)")
+]
 # a cell of a number with each decimal sign, which may have a unit; and one whose comma may separate thousands
 NUMBER_WITH = {
     sign: re.compile(rf"[-+]?[0-9]*[{sign}][0-9]+(?:[eE][-+]?[0-9]+)?(?:\s*[^\s0-9.,].*)?") for sign in DECIMALS
 }
+# a line without words
+NUMBERS = re.compile(r"[^A-DF-Za-df-z]*")
 THOUSANDS = re.compile(r"[-+]?[1-9][0-9]{0,2}(?:,[0-9]{3})+")
 # keys that say how a CSV file is written, and their values; what is missing is recognised
 CSV_KEYS = {"separator": SEPARATORS, "decimal": DECIMALS}
@@ -182,12 +186,25 @@ def read_csv(
 ) -> Columns:
     """Read the columns of a CSV file, whose first line has their names and their units.
 
-    Blank lines, and lines that begin with #, have no meaning. An empty separator or decimal sign is recognised.
-    Unless further names are `wanted`, some name has to be known. A ConfigError shows nothing of the content of a
-    file in which no name is.
+    Blank lines, and lines that begin with #, have no meaning, except for names just before the first values, which
+    `numpy.savetxt` writes as a comment. An empty separator or decimal sign is recognised. Unless further names are
+    `wanted`, some name has to be known. A ConfigError shows nothing of the content of a file in which no name is.
     """
+    looked_for = {split_header(name)[0] for name in wanted or ()} | {*(wanted or ())}
+
+    def is_looked_for(header: str) -> bool:
+        name, _ = split_header(header)
+        return name in looked_for or header in looked_for or is_known(name)
+
     text = io.StringIO(read_text(path, "CSV", MAX_CSV_BYTES), newline=None)
-    numbered = [(n, line) for n, line in enumerate(text, 1) if line.strip() and not line.lstrip().startswith("#")]
+    lines = [(number, line) for number, line in enumerate(text, 1) if line.strip()]
+    numbered = [(number, line) for number, line in lines if not line.lstrip().startswith("#")]
+    if numbered and numbered[0] != lines[0] and NUMBERS.fullmatch(numbered[0][1]):
+        # numpy.savetxt writes names as a comment
+        number, comment = lines[lines.index(numbered[0]) - 1]
+        comment = comment.lstrip("# \t")
+        if any(map(is_looked_for, re.split(r'[\s,;"]+', comment))):
+            numbered.insert(0, (number, comment))
     # a line that Excel understands
     named = re.fullmatch(r"sep=([,;\t])\s*", numbered[0][1]) if numbered else None
     if named is not None:
@@ -195,12 +212,6 @@ def read_csv(
     if len(numbered) < 2:
         got = "one line" if numbered else "none"
         raise ConfigError(f"{path}: got {got}, expected a line of names and at least one of values")
-    looked_for = {split_header(name)[0] for name in wanted or ()} | {*(wanted or ())}
-
-    def is_looked_for(header: str) -> bool:
-        name, _ = split_header(header)
-        return name in looked_for or header in looked_for or is_known(name)
-
     mark = separator or _find_separator(path, numbered, is_looked_for)
     rows = _split(path, numbered, mark)
     (first, headers), *_ = rows.items()
@@ -233,6 +244,8 @@ def _split(path: Path, numbered: Sequence[tuple[int, str]], separator: str) -> d
     """Split lines into cells, by the number of the line."""
     # csv knows spaces before a quoted cell, and none after it
     lines = (re.sub(rf'(?<!")" +(?={separator}|$)', '"', line) for _, line in numbered)
+    if separator == " ":
+        lines = (" ".join(_words(line)) for _, line in numbered)
     reader = csv.reader(lines, delimiter=separator, strict=True, skipinitialspace=separator != "\t")
     rows = {}
     try:
@@ -241,6 +254,11 @@ def _split(path: Path, numbered: Sequence[tuple[int, str]], separator: str) -> d
         return rows
     except csv.Error as error:
         raise ConfigError(f"{path}:{numbered[reader.line_num - 1][0]}: not CSV: {error}") from None
+
+
+def _words(line: str) -> list[str]:
+    """Split a line at spaces, but not before a unit in brackets."""
+    return re.sub(r"\s+(?=[\[(])", "", line).split()
 
 
 def _find_separator(path: Path, numbered: Sequence[tuple[int, str]], is_looked_for: Callable[[str], bool]) -> str:
@@ -263,8 +281,12 @@ def _find_separator(path: Path, numbered: Sequence[tuple[int, str]], is_looked_f
         raise ConfigError(
             f"{path}:{numbered[0][0]}: got columns separated {each}, expected one; {choice} settles it"
         )
-    # a file of one column has none
-    return next(iter(readings), ";")
+    if readings:
+        return next(iter(readings))
+    # spaces separate what no other sign does, as those of numpy.savetxt; a file of one column has no separator
+    header, *rows = (_words(line) for _, line in numbered)
+    is_table = len(header) > 1 and all(len(row) == len(header) for row in rows)
+    return " " if is_table and any(map(is_looked_for, header)) else ";"
 
 
 def _with_decimal_points(columns: Columns, decimal: str, looked_for: Sequence[str]) -> Columns:
@@ -304,19 +326,22 @@ def _with_decimal_points(columns: Columns, decimal: str, looked_for: Sequence[st
 
 
 def split_header(text: str) -> tuple[str, str]:
-    """Split a header into a name and a unit, which is in square brackets, or in round ones if it is a known one.
+    """Split a header into a name and a unit, which is in square brackets, or in another form if it is a known one.
 
     >>> split_header("v1 [mm/s]"), split_header("v1 (cm/s)"), split_header("e (mean)"), split_header("e_out [-]")
     (('v1', 'mm/s'), ('v1', 'cm/s'), ('e (mean)', ''), ('e_out', '1'))
+    >>> split_header("v1 / (m/s)"), split_header("v1/m/s"), split_header("E in GPa"), split_header("m1/m2")
+    (('v1', 'm/s'), ('v1', 'm/s'), ('E', 'GPa'), ('m1/m2', ''))
     """
     text = text.strip()
-    match = SQUARE_BRACKETS.fullmatch(text) or ROUND_BRACKETS.fullmatch(text)
-    unit = match[2].strip() if match else ""
-    if match is None or not match[1] or (text.endswith(")") and unit != "-" and not is_unit(unit)):
-        return text, ""
-    if unit.lower() in ("%", "percent", "per cent", "pct"):
-        unit = "%"
-    return match[1], "1" if unit == "-" else unit
+    for match in filter(None, (form.fullmatch(text) for form in UNIT_FORMS)):
+        unit = match[2].strip()
+        if unit.lower() in ("%", "percent", "per cent", "pct"):
+            unit = "%"
+        # m1/m2 is a ratio of masses
+        if match[1] and (text.endswith("]") or unit == "-" or (is_unit(unit) and unit not in SWEEP_INPUTS)):
+            return match[1], "1" if unit == "-" else unit
+    return text, ""
 
 
 def near_miss(header: str, known: Iterable[str]) -> str:
