@@ -267,6 +267,11 @@ REFUSED = {
         {},
         "a.csv:1: not UTF-8: byte 0xff; save it as UTF-8",
     ),
+    "a workbook": (
+        b"PK\x03\x04\x14\0\x06\0",
+        {},
+        "a.csv: not a text file, expected a CSV file; save a table as CSV",
+    ),
     "no such header": (
         V + "1,1\n",
         {"columns": {"m1": "masse"}},

@@ -26,6 +26,8 @@ MAX_JSON_LENGTH = 64_000_000  # characters of a mapping as JSON, which may hold 
 MAX_KEY_PARTS = 64  # dots of a key: TOML parsers take quadratic time for longer ones
 # first bytes of a result
 RESULT_MAGIC = b"impact result\n"
+# workbooks of Excel and LibreOffice, old workbooks, and files of Parquet
+NO_TEXT = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0", b"PAR1")
 _PART = rf"""(?:{BARE_KEY}|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')"""
 LONG_KEY = re.compile(rf"(?<![\w.-])(?:{_PART}[ \t]*+\.[ \t]*+){{{MAX_KEY_PARTS + 1}}}")
 
@@ -69,6 +71,8 @@ def read_text(path: Path, kind: str = "TOML", most: int = MAX_CONFIG_BYTES) -> s
         raise ConfigError(f"{name}: empty, expected a {kind} file")
     if content.startswith(RESULT_MAGIC):
         raise ConfigError(f"{name}: {file_hint(path, content)}")
+    if content.startswith(NO_TEXT):
+        raise ConfigError(f"{name}: not a text file, expected a {kind} file; save a table as CSV")
     if len(content) > most:
         raise ConfigError(f"{name}: larger than {most:,} bytes")
     try:
