@@ -242,6 +242,16 @@ def test_an_extension_replaces_the_result_and_can_be_extended_again(
     assert [child.name for child in tmp_path.iterdir()] == ["r.h5"]
 
 
+def test_an_extension_that_is_complete_is_not_resumed_and_no_error(cli: Run, stored_sweep: StoredSweep) -> None:
+    path = stored_sweep()
+    command = ("extend", path, "--set", "sweep.m2=[3.0]", "--resume")
+    assert cli(*command).returncode == 0
+    seal, again = impact.load(path).encoding["seal"], cli(*command)
+    assert again.returncode == 0
+    assert again.stderr == f"{path}: already contains this sweep; nothing to do\n"
+    assert impact.load(path).encoding["seal"] == seal
+
+
 def assert_refused(path: Path, overrides: list[str], expected: str) -> None:
     """An extension is refused for a reason, and its folder is not modified."""
     before, names = path.read_bytes(), sorted(path.parent.iterdir())

@@ -135,7 +135,7 @@ def extend(
     """Add values to the axes of a result; only what it does not hold is integrated."""
     with execution(quiet, jobs, threads) as keywords:
         outcome = options.call(impact.extend_to_file, locals(), **keywords)
-    if not quiet:
+    if outcome.is_new and not quiet:
         reason = "; layout full holds none of them" if outcome.extended_layout == "full" else ""
         count = f"{outcome.integrated:,} of {outcome.trajectories:,} trajectories were integrated for it"
         exits.print_line(count + reason)

@@ -37,7 +37,7 @@ from .provenance import stored_config
 from .schema import require_sweep
 from .selection import IndexArray, match_labels
 from .summary import SweepOutcome
-from .sweep import is_whole, sweep_into
+from .sweep import find_finished, is_whole, sweep_into
 from .trajectory_table import ExpandedSlab, TrajectoryTable, table_of_result
 from .xarray_backend import load, open_result
 
@@ -107,7 +107,7 @@ def extend_to_file(
     Parameters
     ----------
     result, overrides, output, overwrite, plugins, max_points : see `extend`
-    resume : continue with the work folder of an interrupted extension
+    resume : continue with the work folder of an interrupted extension; a complete one is not repeated
     backend, on_progress, should_stop : see `sweep_to_file`
 
     Returns
@@ -163,10 +163,12 @@ def extend_to_file(
             history=history,
             replaces=target == source,
         )
-        _check_changes(old, new, name)
-        new.check_count(max_points, name)
-        _check_none_lost(new)
-        outcome = sweep_into(target, new, connected)
+        outcome = find_finished(target, new) if resume and not overwrite else None
+        if outcome is None:
+            _check_changes(old, new, name)
+            new.check_count(max_points, name)
+            _check_none_lost(new)
+            outcome = sweep_into(target, new, connected)
     run.check_stop(f"{target} is complete")
     layout = "full" if table is None else "factored"
     return replace(outcome, integrated=sum(new.integrated.values()), extended_layout=layout)
