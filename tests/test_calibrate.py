@@ -525,6 +525,25 @@ def test_laws_are_compared_by_name_whatever_their_rank(drops: xr.Dataset) -> Non
     assert impact.compare(drops.isel(model=[0]), drops, subset=True).equal
 
 
+def test_curves_of_calibrations_are_compared_at_equal_inputs(drops: xr.Dataset) -> None:
+    part = drops.isel(grid=[2, 0])
+    assert impact.compare(part, drops).headline == "not equal: labels (grid)"
+    assert impact.compare(part, drops, subset=True).equal
+    changed = drops.assign(curve=drops["curve"] + (drops["grid"] == drops["grid"][2]))
+    assert impact.compare(part, changed, subset=True).headline == "not equal: values (curve)"
+    other = impact.compare(part, drops.isel(grid=[1]), subset=True)
+    assert other.headline == "not equal: nothing in common (grid)"
+
+
+@pytest.mark.slow
+def test_a_rerun_repeats_the_laws_and_the_curves_of_the_file(tmp_path: Path) -> None:
+    whole = impact.calibrate(FOLDER / "drops.toml", overrides=["solver.rtol=1e-6"])
+    for number, part in enumerate(({"model": [0, 2]}, {"model": [3]}, {"grid": slice(3)})):
+        impact.save(whole.isel(part), tmp_path / f"{number}.h5")
+        verdict = impact.rerun(tmp_path / f"{number}.h5")
+        assert verdict.equal, str(verdict)
+
+
 @pytest.mark.slow
 def test_the_value_of_a_parameter_that_is_not_identified_is_not_judged() -> None:
     fit = impact.calibrate(FOLDER / "dashpot.toml", overrides=["solver.rtol=1e-6"])

@@ -247,21 +247,39 @@ def _format_value(value: Any) -> str:
 
 def align_calibrations(new: xr.Dataset, baseline: xr.Dataset, *, subset: bool) -> Alignment:
     """Align two calibrations by their laws and parameters, whose order does not matter."""
-    faults = [*_data_faults(new, baseline)]
-    is_same_data = all(fault.kind != "labels" for fault in faults)
     common = common_labels(new, baseline, "model")
+    faults = []
     for study, side in ((new, "NEW"), (baseline, "BASELINE")):
         only = ", ".join(key for key in map(str, study["model"].values) if key not in common)
         if only and not subset:
             faults.append(Difference("labels", "model", f"model: in {side} only: {safe_text(only, 400)}"))
     if not common:
         faults.append(Difference("nothing in common", "", "the two have no law in common"))
-    new, baseline = new.sel(model=common), baseline.sel(model=common)
+    new, baseline = (_of_laws(study, common, subset=subset) for study in (new, baseline))
+    data_faults = [*_data_faults(new, baseline)]
+    is_same_data = all(fault.kind != "labels" for fault in data_faults)
+    faults = [*data_faults, *faults]
     if is_same_data:
         new = new.sel({dim: baseline[dim].values for dim in ("parameter", "other_parameter")})
-    names = [name for name in CALIBRATION if name in new and name in baseline] if common and is_same_data else []
+        for dim in sorted({"output_name", "grid"} & {*new.dims} & {*baseline.dims}):
+            labels = [new[dim].values], [baseline[dim].values]
+            positions = match_labels(*labels)
+            faults += _unmatched_labels(*labels, [dim], positions, subset=subset)
+            new, baseline = new.isel({dim: positions[0]}), baseline.isel({dim: positions[1]})
+    both = [name for name in CALIBRATION if name in new and name in baseline] if is_same_data else []
+    names = [name for name in both if new[name].size]
     scales = {name: _scale(name, baseline) for name in names}
     return _align(new, baseline, scales, faults)
+
+
+def _of_laws(study: xr.Dataset, keys: Sequence[str], *, subset: bool) -> xr.Dataset:
+    """Select laws of a calibration; of a subset, without parameters of other laws and weights among other laws."""
+    study = study.sel(model=keys)
+    if not subset:
+        return study
+    own = study["parameter"].values[(study["identifiable"] >= 0).any("model").values]
+    is_whole = np.isclose(study["weight"].sum().item(), 1.0)
+    return study.sel(parameter=own, other_parameter=own).drop_vars([] if is_whole else "weight")
 
 
 def align_boards(new: xr.Dataset, baseline: xr.Dataset, *, subset: bool) -> Alignment:
