@@ -44,6 +44,12 @@ def test_bounds_and_measurements_are_read_in_si(folder: Path) -> None:
     assert config.data.sigma == {"e_out": (0.01, 0.02, 0.03)}
 
 
+def test_the_acceleration_of_gravity_is_that_of_heights_and_times(folder: Path) -> None:
+    (folder / "fit.toml").write_text(CONFIG.replace("[data]", "[data]\ng = 1.62"), encoding="utf-8")
+    with pytest.raises(ConfigError, match=r"drops.csv:1: got data.g without heights and times of flight"):
+        read_config(folder / "fit.toml", purpose="calibrate")
+
+
 def test_units_of_columns_are_converted(folder: Path) -> None:
     text = "v1 [mm/s], contact_time [us], sigma_contact_time [ns]\n1000, 20, 5\n2000, 10, 5\n500, 30, 5\n"
     (folder / "drops.csv").write_text(text, encoding="utf-8")

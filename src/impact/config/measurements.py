@@ -125,6 +125,9 @@ def _read_columns(columns: Columns, draft: Draft) -> tuple[_Points, list[_Proble
     if not problems and points.of_kind("laboratory"):
         g = GRAVITY.read_or_nan(draft.table("data").get("g", STANDARD_GRAVITY))
         points, problems = _with_derived(points, rows, STANDARD_GRAVITY if math.isnan(g) else g)
+    elif not problems and "g" in draft.table("data") and "lines" not in draft.table("data"):
+        # with lines, what follows from a file is in its place
+        problems.append(("", None, "got data.g without heights and times of flight, which alone use it"))
     return points, problems
 
 
