@@ -433,6 +433,7 @@ BAD_COMMANDS = {
     ("--adapter", f"{EXAMPLES / 'rigid.py'}:collide", "--suite", "conformance-9"): 'no set "conformance-9"',
     ("--adapter", f"{EXAMPLES / 'rigid.py'}:collide", "-o", "page.pdf"): "expected a name that ends in .html",
     ("--list", "--program", "no_such_python"): 'no program "no_such_python"',
+    ("pymunk", "--list"): "--list: got more than this option, expected it alone",
     ("pymunk", "--program", "no_such_python"): 'no program "no_such_python"',
     ("yade", "--program", "no_such_yade"): 'no program "no_such_yade"',
     (

@@ -516,6 +516,7 @@ def test_every_law_of_a_code_is_in_the_list(cli: Run) -> None:
     ("words", "message"),
     [
         ((), "--to: expected a code; impact export --list shows them"),
+        (("--list", "--to", "lammps"), "--list: got more than this option, expected it alone"),
         (("--to", "lamps"), '--to: no code "lamps"; did you mean "lammps"?'),
         (("--to", "isaac"), '--to: no code "isaac"; did you mean "physx"?'),
         (("--to", "mujoco", "--model", "hertz"), 'MuJoCo has no law "hertz"; known: mujoco-solref'),

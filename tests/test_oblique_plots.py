@@ -353,9 +353,11 @@ def test_the_area_of_a_friction_loop_is_the_energy_lost(beads: xr.Dataset, cli: 
         assert cli("run", *source, *friction, "--history", name, cwd=tmp_path).returncode == 0
     done = cli("plot", "oblique.h5", "-k", "friction-loop", "-o", "a.svg", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
-    failed = cli("plot", "central.h5", "-k", "friction-loop", "-o", "b.svg", cwd=tmp_path)
-    message = "this time history has no friction; run a config with frictions = [...]\n"
-    assert (failed.returncode, failed.stderr) == (2, message)
+    impact.save(impact.sweep(models="hertz", e=0.5), tmp_path / "sweep.h5")
+    message = "this impact has no friction; run or sweep a config with frictions = [...]\n"
+    for name in ("central.h5", "sweep.h5"):
+        failed = cli("plot", name, "-k", "friction-loop", "-o", "b.svg", cwd=tmp_path)
+        assert (failed.returncode, failed.stderr) == (2, message)
 
 
 def test_other_pictures_do_not_depend_on_friction(beads: xr.Dataset) -> None:

@@ -174,6 +174,7 @@ def test_models_and_sections_of_a_page_are_chosen(cli: Run, tmp_path: Path, figu
     assert all("--model=gharib-hurmuzlu-2012" in command for command in commands if "kind=loop" not in command)
     for wrong, message in (
         (["--section", "figurs"], '--section: no section "figurs"; did you mean "figures"?'),
+        (["--section", "friction"], "--section friction: this result has no friction"),
         (["--model", "gharib-hurmuzlu-2013"], 'no model "gharib-hurmuzlu-2013" in this result; did you mean'),
     ):
         done = cli("report", "r.h5", *wrong, "-o", "b.html", cwd=tmp_path)

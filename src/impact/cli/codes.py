@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import inspect
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Annotated
 
@@ -60,6 +62,7 @@ def export(
     With --verify, exit 1 if the code delivers another e, exit 2 if it is not installed.
     """
     if show_codes:
+        _check_alone(export, locals(), "show_codes", "as_json")
         _print_codes(as_json)
         return exits.EXIT_OK
     if to is None:
@@ -73,6 +76,13 @@ def export(
     elif output is None:
         print(result.text, end="")
     return exits.EXIT_OK if result.verification is None or result.verification.agrees else exits.EXIT_NOT_EQUAL
+
+
+def _check_alone(command: Callable[..., int], given: Mapping[str, object], *accepted: str) -> None:
+    """Refuse what a list of a command would ignore."""
+    parameters = inspect.signature(command).parameters
+    if any(given[name] != parameters[name].default for name in parameters.keys() - accepted):
+        raise UsageError("--list: got more than this option, expected it alone")
 
 
 def _print_codes(as_json: bool) -> None:
@@ -122,6 +132,7 @@ def conform(
     Exit 0 if no check failed, 1 if one did, 2 if the engine cannot be run. Several engines make one board.
     """
     if show_engines:
+        _check_alone(conform, locals(), "show_engines", "as_json", "program")
         show(impact.conform_engines(program), as_json=as_json)
         return exits.EXIT_OK
     board = options.call(impact.conform, locals(), engine=engines or ())

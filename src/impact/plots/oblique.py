@@ -98,7 +98,7 @@ def psi_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
 def friction_loop_curves(histories: Sequence[xr.Dataset], choice: Choice) -> CurveData:
     """Draw friction over the slip displacement of one impact: the area under a curve is the work of friction."""
     if any("f" not in history for history in histories):
-        raise UsageError("this time history has no friction; run a config with frictions = [...]")
+        raise UsageError("this impact has no friction; run or sweep a config with frictions = [...]")
     moved = [_with_displacement(history) for history in histories]
     return curves_over("Friction over slip", moved, [("xi", "f", "")], choice, of_friction=True)
 

@@ -128,6 +128,8 @@ def _report_of(
     dataset = select_laws(dataset, models)
     if dataset.sizes["model"] < model_count:
         part_notes = [f"this page shows {dataset.sizes['model']} of the {model_count} models of the result"]
+    if {*(sections or ())} == {"friction"} and "friction" not in dataset.dims:
+        raise UsageError(f"{argument('sections', 'friction')}: this result has no friction")
     sections = sections or SECTIONS
     summary = with_depths(summarize(dataset, MAX_FAILED), dataset)
     fits = _fits_section(dataset) if kind_of(dataset) == "calibration" else None
