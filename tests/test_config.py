@@ -215,6 +215,12 @@ BAD = [
      ['x.toml: sweep: missing, expected a table [sweep] of what to sweep: e or alpha, v1, m1, m2, material, ...',
       *(f"x.toml:{line}: {key}: unknown key; it belongs under [sweep]" for line, key in ((3, "e"), (4, "v1"), (5, "m1"), (6, "m2"))),
       'x.toml:7: material: unknown key; it belongs under [sweep]']),
+    ("e = 0.5", "E = 1e9\nrtol = 1e-9\ntitle = 'x'\nC = 3\nk_t = 1e6\ne = 0.5",
+     [f"x.toml:{line}: sweep.{key}: unknown key; it belongs {home}" for line, key, home in (
+         (4, "E", "under [materials.NAME]"), (5, "rtol", "under [solver]"), (6, "title", "before all tables"),
+         (7, "C", "under [model.KEY], where KEY is that of its law"),
+         (8, "k_t", "under [friction.KEY], where KEY is that of its law"))]),
+    ("nu = 0.3", "nu = 0.3\nK = 1e9", ["x.toml:12: materials.steel.K: unknown key; it belongs under [sweep]"]),
     ("rho = 7850", "rho = 7850\n[solver]\ncollapse = 1",
      ["x.toml:14: solver.collapse: got 1, expected true or false"]),
     ("rho = 7850", "rho = 7850\n[solver]\nrtol = 1\nmax_steps = 0\nrotl = 1",

@@ -30,6 +30,14 @@ KEYS_BY_TABLE: Mapping[str, Iterable[str]] = {
     "solver": vars(tables.Solver()),
     "output": vars(tables.Output()),
 }
+# where keys that are in another table belong
+HOMES: Mapping[str, Iterable[str]] = {
+    "under [sweep]": tables.Sweep.model_fields,
+    "under [materials.NAME]": tables.MaterialTable.model_fields,
+    "under [solver]": KEYS_BY_TABLE["solver"],
+    "under [output]": KEYS_BY_TABLE["output"],
+    "before all tables": ("models", "frictions", "title"),
+}
 # other words that users may write for a key
 KEY_SYNONYMS = {
     "restitution": "e",
@@ -172,8 +180,9 @@ def validation_problems(error: ValidationError, models: Mapping[str, ForceModel]
 def _unknown_key_hint(location: KeyPath, models: Mapping[str, ForceModel]) -> str:
     """Suggest a known key for an unknown one; `location` is its path, with tags."""
     name = str(location[-1])
-    if len(location) == 1 and name in tables.Sweep.model_fields:
-        return "it belongs under [sweep]"
+    home = next((home for home, keys in HOMES.items() if name in keys), None)
+    if home is not None and (len(location) < 3 or location[0] in ("materials", "model", "friction")):
+        return f"it belongs {home}"
     keys: Iterable[str]
     match location[:-1]:
         case (*_, quantities.RANGE):
@@ -192,6 +201,12 @@ def _unknown_key_hint(location: KeyPath, models: Mapping[str, ForceModel]) -> st
             keys = tables.laws_of(table, models)
         case ("model" | "friction" as table, key):
             keys = tables.law_quantities(tables.laws_of(table, models)[str(key)])
+        case ("sweep",) if owners := [
+            table
+            for table in tables.LAW_TABLES
+            if any(name in tables.law_quantities(law) for law in tables.laws_of(table, models).values())
+        ]:
+            return f"it belongs under [{owners[0]}.KEY], where KEY is that of its law"
         case (table, *_):
             keys = KEYS_BY_TABLE[str(table)]
     return did_you_mean(name, list(keys), KEY_SYNONYMS)
