@@ -457,6 +457,16 @@ def test_lack_of_memory_keeps_what_is_finished_and_is_a_storage_error(cli: Run, 
     )
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="no limit of the size of files")
+def test_no_temporary_file_is_a_storage_error() -> None:
+    conform = f"exec {sys.executable} -m impact conform --adapter docs/conform/rigid.py:collide"
+    done = subprocess.run(
+        ["sh", "-c", f"ulimit -f 0; {conform}"], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stdout) == (4, "")
+    assert re.fullmatch(r"cannot write: No usable temporary directory found in .*\n", done.stderr)
+
+
 SHORT_OF_MEMORY = """
 import resource
 pages = int(open("/proc/self/statm").read().split()[0])
