@@ -168,6 +168,18 @@ def test_a_dataset_of_another_program_is_not_a_result(function: Callable[[xr.Dat
         function(xr.Dataset({"a": ("x", [1.0])}))
 
 
+@pytest.mark.parametrize("act", [impact.recommend, impact.report, impact.page])
+def test_an_axis_that_no_sweep_has_is_refused(act: Callable[[xr.Dataset], object], result: xr.Dataset) -> None:
+    stacked = result.stack(p=("model", "e"))
+    for other in (stacked, result.stack(p=("e",)), xr.concat([result, result], "p")):
+        with pytest.raises(
+            impact.UsageError, match=r"p: expected an axis of a sweep|expected the result of a sweep"
+        ):
+            act(other)
+    with pytest.raises(impact.UsageError, match="model is not an axis"):
+        impact.compare(stacked, result)
+
+
 @pytest.mark.parametrize("default", ["D", "~P", "L"])
 def test_quantities_of_pint_have_their_units(default: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(unit.formatter, "default_format", default)

@@ -174,6 +174,8 @@ def check_comparable(dataset: xr.Dataset, name: str) -> None:
             raise UsageError(f"{name}: has no coordinate {coordinate}, expected a whole result")
         if coordinate != "model" and dataset[coordinate].dtype.kind not in "fiu":
             raise UsageError(f"{name}: {coordinate}: got {dataset[coordinate].dtype}, expected numbers")
+    if not {*dataset["model"].dims} <= {"model"}:
+        raise UsageError(f"{name}: model is not an axis, expected a whole result")
     axes = {dim for key, v in dataset.variables.items() if is_input(key) for dim in v.dims}
     for variable in OUTPUTS:
         if variable in dataset and dataset[variable].dtype.kind not in "fiu":

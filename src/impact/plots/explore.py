@@ -24,7 +24,7 @@ from ..engine.plugins import Plugins, read_plugins
 from ..errors import ImpactError, UsageError, require_known
 from ..formatting import prefixed, safe_text
 from ..results.provenance import changed_plugins, config_of_part, stored_config
-from ..results.schema import kind_of
+from ..results.schema import kind_of, require_axes
 from ..results.selection import chosen_laws, in_si, select, select_laws
 from ..results.sweep import sweep_in_memory
 from ..results.xarray_backend import result_of
@@ -85,6 +85,7 @@ def explore(
     except ImportError:
         raise UsageError('needs ipywidgets; pip install "impact-sweep[notebook]"') from None
     dataset = result_of(dataset)
+    require_axes(dataset)
     if "model" not in dataset.dims:
         is_board = kind_of(dataset) == "board"
         advice = "impact.report writes the page of a board" if is_board else "impact.plot draws a time history"

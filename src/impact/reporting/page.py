@@ -31,6 +31,7 @@ from ..plots.explore import axes_of, axis_label, shown_values
 from ..plots.slices import conditions_of, parameter_text, scalars_of, unit_of
 from ..plots.style import is_geometric, model_styles
 from ..results.layouts import read_inputs
+from ..results.schema import require_axes
 from ..results.selection import law_positions
 from ..results.trajectory_table import TrajectoryTable, table_of_result
 from ..results.xarray_backend import open_result, result_of
@@ -93,6 +94,7 @@ def page(
 
 
 def _page_of(dataset: xr.Dataset, models: Sequence[str] | None) -> str:
+    require_axes(dataset)
     if "model" not in dataset.dims or SAMPLE in dataset.dims or not axes_of(dataset):
         raise UsageError(
             "expected the result of a sweep over an axis; impact report takes other results, but no time history"

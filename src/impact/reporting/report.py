@@ -38,7 +38,7 @@ from ..results.board import BOARD_HEADINGS, Board, board_rows, check_rows, engin
 from ..results.calibration import FIT_HEADINGS, calibration_title, describe_data, fit_notes, fit_rows
 from ..results.provenance import stored_config
 from ..results.ranking import DEFAULT_TOL, Ranking, rank_laws
-from ..results.schema import FIT_STATUSES, count_points, exponents_of, kind_of
+from ..results.schema import FIT_STATUSES, count_points, exponents_of, kind_of, require_axes
 from ..results.selection import select_laws
 from ..results.sensitivity import INDEX_HEADINGS, describe_design, study_texts
 from ..results.slabs import MAX_SUMMARY_POINTS, is_large
@@ -124,6 +124,7 @@ def _report_of(
         return _board_page(dataset)
     if "model" not in dataset.dims:
         raise UsageError("got a time history, expected the result of a sweep")
+    require_axes(dataset)
     model_count, part_notes = dataset.sizes["model"], []
     dataset = select_laws(dataset, models)
     if dataset.sizes["model"] < model_count:

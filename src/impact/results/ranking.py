@@ -25,7 +25,7 @@ from ..display import Block, Displayed, Table, html_of
 from ..errors import UsageError, did_you_mean
 from ..formatting import argument, law_name, percentage, prefixed, safe_text
 from .replay_command import describe_point
-from .schema import columns_along, parts_of_laws, plain_unit, require_sweep
+from .schema import columns_along, parts_of_laws, plain_unit, require_axes, require_sweep
 from .selection import as_keys, require_outputs, select, select_laws
 from .slabs import Slab, distinct_points, is_computed, over_varying_dims, read_slab, slabs, varying_dims
 from .xarray_backend import result_of
@@ -311,6 +311,7 @@ def recommend(
     """
     dataset = result_of(dataset)
     require_sweep(dataset, "recommend")
+    require_axes(dataset)
     criterion = BY_ERROR
     if target is not None:
         name, value = only_target(target)

@@ -27,7 +27,7 @@ from ..contact.variables import AXES, HISTORY, LAW_DIMS, OUTPUTS, Variable, by_n
 from ..engine.inputs import input_at
 from ..engine.plan import Plan
 from ..errors import UsageError
-from ..formatting import number
+from ..formatting import number, safe_text
 
 Kind = Literal["sweep", "history", "calibration", "sensitivity study", "board"]
 
@@ -192,6 +192,14 @@ def require_sweep(dataset: xr.Dataset, command: str) -> None:
     kind = kind_of(dataset)
     if kind in STUDIES:
         raise UsageError(f"{command}: this is a {kind}, expected the result of a sweep")
+
+
+def require_axes(dataset: xr.Dataset) -> None:
+    """Raise a UsageError for an axis that no sweep has, such as that of `stack`, whose labels are tuples."""
+    for dim in {dim: None for name in OUTPUTS if name in dataset for dim in dataset[name].dims}:
+        if dim not in dataset.coords or hasattr(dataset.indexes.get(dim), "levels"):
+            axis = safe_text(str(dim))
+            raise UsageError(f"{axis}: expected an axis of a sweep, with numbers or names; unstack or select it")
 
 
 def scale_of(variable: Variable, read: Callable[[str], NDArray[Any]], *, has_peak: bool) -> NDArray[np.float64]:
