@@ -38,6 +38,7 @@ def result() -> xr.Dataset:
     "half",
     [
         np.float64(0.5),
+        np.longdouble(0.5),
         np.array(0.5),
         Fraction(1, 2),
         Decimal("0.5"),
@@ -56,6 +57,7 @@ def test_a_number_of_any_library_is_an_input(half: object, result: xr.Dataset) -
     "axis",
     [
         np.array([0.25, 0.5]),
+        np.array([0.25, 0.5], np.longdouble),
         pd.Series([0.25, 0.5]),
         pd.Index([0.25, 0.5]),
         xr.DataArray([0.25, 0.5], dims="e"),

@@ -12,6 +12,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from pydantic_core import PydanticCustomError
 
 from ..errors import ConfigError, ImpactError, MissingFileError, UsageError
@@ -176,6 +177,11 @@ def _from_library(value: Any) -> object:
     if not isinstance(value, str | Mapping) and hasattr(value, "values") and hasattr(value, "dtype"):
         # a series, an index or a data array; texts of pandas are in an array of its own
         value = value.values
+    if getattr(getattr(value, "dtype", None), "char", "") == "g":
+        # a long double stays one where it is too large for a float
+        with np.errstate(over="ignore"):
+            narrow = value.astype(float)
+        value = narrow if np.array_equal(np.isinf(narrow), np.isinf(value)) else value
     if hasattr(value, "tolist"):
         return value.tolist()
     return float(value) if isinstance(value, Fraction | Decimal) else value
