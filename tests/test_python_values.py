@@ -559,6 +559,20 @@ def test_a_sweep_takes_its_inputs_by_name() -> None:
     }
 
 
+@pytest.mark.parametrize("overrides", [{"sweep.e": 0.7}, ["sweep.e=0.7"], {"sweep.e.linspace": [0.1, 0.7, 2]}])
+def test_an_input_is_given_once(overrides: Any) -> None:
+    with pytest.raises(impact.UsageError, match=r"^e: set together with overrides.*sweep.e"):
+        impact.sweep(e=0.5, overrides=overrides)
+    with pytest.raises(impact.UsageError, match=r"^models: set together with overrides"):
+        impact.sweep(models="hertz", overrides={"models": "tsuji-1992"})
+
+
+@pytest.mark.parametrize("huge", [Fraction(10**400), Decimal("sNaN")])
+def test_a_number_that_no_float_holds_is_named(huge: object) -> None:
+    with pytest.raises(impact.ConfigError, match=f"m2: got a {type(huge).__name__}, expected a number > 0 kg"):
+        impact.sweep(m2=huge)
+
+
 def test_a_radius_replaces_the_mass_of_the_starter_config() -> None:
     swept = impact.sweep(models="hertz", e=0.5, R1=0.01, R2=0.01)
     expected = impact.run(model="hertz", at={"e": 0.5, "R1": 0.01, "R2": 0.01}).values

@@ -184,7 +184,11 @@ def _from_library(value: Any) -> object:
         value = narrow if np.array_equal(np.isinf(narrow), np.isinf(value)) else value
     if hasattr(value, "tolist"):
         return value.tolist()
-    return float(value) if isinstance(value, Fraction | Decimal) else value
+    if isinstance(value, Fraction | Decimal):
+        # one that no float holds, or a signaling NaN
+        with contextlib.suppress(OverflowError, ValueError):
+            return float(value)
+    return value
 
 
 def _with_unit(number: object, unit: str) -> object:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import itertools
 import os
 import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -125,7 +126,11 @@ def sweep(
     laws = {key: value for key, value in (("models", models), ("frictions", frictions)) if value is not None}
     changes = [Setting((key,), value, key) for key, value in laws.items()]
     changes += [Setting(("sweep", name), value, name) for name, value in inputs.items()]
-    settings = [*settings_of(overrides), *changes]
+    settings = settings_of(overrides)
+    for setting, change in itertools.product(settings, changes):
+        if setting.path[: len(change.path)] == change.path:
+            raise UsageError(f"{change.shown}: set together with {setting.shown}, expected one of the two")
+    settings += changes
     if output is None and (resume or overwrite):
         raise UsageError("resume and overwrite: got no output, expected one as well")
     reject_law_key(source, "models")
