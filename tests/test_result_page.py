@@ -209,6 +209,23 @@ def test_values_at_points_of_the_grid_are_those_of_the_program(
 
 
 @pytest.mark.slow
+def test_balls_that_miss_each_other_have_an_answer_and_two_walls_have_none(browser: Page, tmp_path: Path) -> None:
+    """Also where e = 1 - alpha v0 is above 1, and where the trajectory of a cell has an answer."""
+    sweep = {"alpha": 0.2, "v1": [-1.0, 1.0], "m1": [1.0, math.inf], "m2": [2.0, math.inf], "K": 1e9}
+    config = {"models": "gharib-hurmuzlu-2012", "sweep": sweep, "output": {"layout": "factored"}}
+    impact.sweep_to_file(config, tmp_path / "table.h5")
+    result = impact.load(tmp_path / "table.h5")
+    assert np.bincount(result["status"].values.ravel())[[1, 2, 15]].tolist() == [3, 4, 1]
+    show(browser, tmp_path / "table.h5", tmp_path / "page.html")
+    cells = list(np.ndindex(2, 2, 2))
+    for output in OUTPUTS:
+        expression = f"{json.dumps(cells)}.map(cell => String(value('{output}', laws[0], cell)))"
+        theirs = np.array([float(text) for text in browser.evaluate(expression)])
+        ours = result[output].transpose("model", "v1", "m1", "m2").values.ravel()
+        np.testing.assert_allclose(theirs, ours, rtol=2e-14, atol=1e-14, err_msg=output)
+
+
+@pytest.mark.slow
 def test_sliders_laws_the_cursor_and_the_numbers_follow_the_controls(
     results: dict[str, xr.Dataset], browser: Page, tmp_path: Path
 ) -> None:

@@ -40,8 +40,12 @@ function value(output, law, at) {
     return {v1_post: v1 - impulse / m1, v2_post: v2 + impulse / m2};
   };
   if (!law) return output === "e_out" ? asked : after(asked)[output] ?? NaN;
-  const isFailed = law.is_table && (
+  const K = law.is_table && column(law, "K", at);
+  const length = law.is_table && (m * v0 / K * v0) ** (1 / (column(law, "n", at) + 1));
+  // balls that miss each other have an answer, two walls have none
+  const isFailed = law.is_table && !isMissed && (
     column(law, "status", at) >= page.first_failure || (law.asks_for_e && Number.isNaN(asked))
+      || [m, K, length, m * v0 * v0, length / v0].some(size => !(size > 0 && size < Infinity))
   );
   const e_out = isFailed || isMissed ? NaN : column(law, "e_out", at);
   if (output === "e_out") return e_out;
@@ -53,7 +57,6 @@ function value(output, law, at) {
   if (isFailed) return NaN;
   if (isMissed) return 0;
   if (!law.is_table) return column(law, output, at);
-  const length = (m * v0 / column(law, "K", at) * v0) ** (1 / (column(law, "n", at) + 1));
   const unit = output === "peak_force" ? m * v0 * v0 / length : length / v0;
   return column(law, output, at) * unit;
 }
