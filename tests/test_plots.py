@@ -209,6 +209,12 @@ def test_an_error_needs_a_restitution_asked_for() -> None:
     with pytest.raises(UsageError, match="needs a requested e"):
         get_curve_data(result, "error")
     assert [curve.model for curve in single_panel(get_curve_data(result, "restitution")).curves] == ["hertz"]
+    # where the balls do not approach, e is asked for
+    sweep = {"e": [0.5, 1.0], "v1": [-1.0, 1.0], "m1": 1.0, "m2": 1.0, "K": 6e9}
+    missed = impact.sweep({"models": "hertz", "sweep": sweep})
+    with pytest.raises(UsageError, match=r"no model has a restitution here; choose other values \(sel\)"):
+        get_curve_data(missed, "error")
+    assert get_curve_data(missed, "error", sel={"v1": 1.0}).panels
 
 
 @pytest.fixture(scope="module")

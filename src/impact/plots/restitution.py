@@ -57,6 +57,8 @@ def error_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     line = read_line(dataset, choice, "e_error")
     signed = _law_curves(line, choice, {"e_error": ""})
     if not _without_empty(signed):
+        if requested_curve(line.data, line.coordinate):
+            raise UsageError(f"no model has a restitution here; choose other values ({argument('sel')})")
         raise UsageError("this result has no error of the restitution, which needs a requested e; sweep e")
     panel = Panel("", "Error", tuple(signed), bands=BANDS, y_name="e_error")
     absolute = replace(
