@@ -442,7 +442,7 @@ class FixedStepLaw:
         oblique = self.oblique if self.is_coupled or "beta" in names else None
         fixed_step = {
             simulate.STEP: step,
-            simulate.STEPS_PER_CONTACT: np.full(step.shape, self.contact_time / dt.min()),
+            simulate.STEPS_PER_CONTACT: np.repeat(self.contact_time / dt, self.phases),
             simulate.PHASE: np.tile(phase, dt.size),
         }
         errors: dict[str, str] = {}
