@@ -369,6 +369,10 @@ def test_the_page_prints_what_the_commands_print(cli: Run) -> None:
         (("--for", "dampratio", "--target", "e_out=0.6", "--over", "v1=1:2"), "expected NAME=FIRST:LAST:COUNT"),
         (("--for", "dampratio", "--target", "e_out=0.6", "--over", "v9=1:2:3"), "v9"),
         (("--for", "dampratio", "--target", "e_out=0.6", "--at", "v1=-1"), "the balls do not approach"),
+        (
+            ("--model", "kuwabara-kono-1987", "--for", "A", "--target", "e_out=0.6", "--at", "v1=1e300"),
+            "no e_out at any value of A: a derived quantity is not finite",
+        ),
     ],
 )
 def test_bad_input_is_one_line(cli: Run, words: tuple[str, ...], message: str) -> None:

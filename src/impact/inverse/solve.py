@@ -487,13 +487,15 @@ class SolveProblem:
             del columns[self.name]
         inputs = trial_inputs(self.config, columns)
         impacts = build_impacts(inputs, self.model, inputs.index())
-        if self.unknown.name == "K":
-            size = float(impacts.K[0])
-        elif self.unknown.name.startswith("friction."):
-            size = 1.0 / float(impacts.in_own_units(np.ones(1), self.unknown.unit)[0])
-        else:
-            size = 1.0 / float(impacts.dimensionless(self.model, self.unknown.name)[0])
-        return size if 0.0 < size < math.inf else 1.0
+        # a derived quantity may be zero or infinite
+        with np.errstate(all="ignore"):
+            if self.unknown.name == "K":
+                size = impacts.K[0]
+            elif self.unknown.name.startswith("friction."):
+                size = 1.0 / impacts.in_own_units(np.ones(1), self.unknown.unit)[0]
+            else:
+                size = 1.0 / impacts.dimensionless(self.model, self.unknown.name)[0]
+        return float(size) if 0.0 < size < math.inf else 1.0
 
     def result(self, target: float, status: SolveStatus, roots: Iterable[Root], values: Array) -> SolveResult:
         """Make the result of roots, with the range of some values of the variable."""
