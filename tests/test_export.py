@@ -542,6 +542,14 @@ def test_every_law_of_a_code_is_in_the_list(cli: Run) -> None:
             for e, shown in (("abc", "abc"), ("2", "2.0"), ("nan", "nan"), ("\x1b[31m", "\\x1b[31m"))
         ),
         (("--to", "liggghts", "--at", "e=0.01"), "e: got 0.01, expected 0.05 < e <= 1"),
+        (
+            ("--to", "liggghts", "--model", "liggghts-hooke", "--at", "e=0.5", "--at", "vc=0.005"),
+            "vc: got 0.005, expected 0.01 m/s or more",
+        ),
+        (
+            ("--to", "liggghts", "--at", "e=0.5", "--set", "materials.table1.nu=-0.2"),
+            "nu1: got -0.2, expected 0 or more",
+        ),
         (("--to", "liggghts", "--at", "K=1e8"), "expected a material, not K"),
         *(
             (("--to", "lammps", "--code-version", version), f'--code-version: got "{version}", expected the date')

@@ -21,8 +21,8 @@ OPTIONS = {
 }
 # tangential model, by key of the catalogue
 FRICTIONS = {"liggghts-history": "history", "liggghts-no-history": "no_history"}
-# LIGGGHTS refuses a restitution of this or less
-LEAST_E = 0.05
+# LIGGGHTS refuses a restitution of this or less, and a characteristic velocity [m/s] below this
+LEAST_E, LEAST_SPEED = 0.05, 0.01
 # Young's moduli [Pa] below the first and above the second have to be allowed
 SOFT, HARD = 5e6, 1e9
 TEMPLATE = (
@@ -74,6 +74,9 @@ def parameters(c: Collision) -> dict[str, float | str]:
     e = 1.0 if c.model.key == "liggghts-edinburgh" else c["e"]
     if not LEAST_E < e <= 1.0:
         raise UsageError(f"e: got {number(e)}, expected {LEAST_E} < e <= 1: LIGGGHTS refuses others")
+    for name in ("nu1", "nu2"):
+        if c[name] < 0.0:
+            raise UsageError(f"{name}: got {number(c[name])}, expected 0 or more: LIGGGHTS refuses it")
 
     def pairs(value: float) -> str:
         return "peratomtypepair 2 " + " ".join([repr(value)] * 4)
@@ -86,6 +89,8 @@ def parameters(c: Collision) -> dict[str, float | str]:
     }
     model, _ = OPTIONS[c.model.key]
     if model == "hooke":
+        if c["vc"] < LEAST_SPEED:
+            raise UsageError(f"vc: got {number(c['vc'])}, expected {LEAST_SPEED} m/s or more: LIGGGHTS refuses it")
         properties["characteristicVelocity"] = f"scalar {c['vc']!r}"
     if model == "edinburgh":
         properties |= {
