@@ -155,6 +155,21 @@ def test_a_law_that_depends_on_the_speed_has_a_trajectory_for_each_angle_of_a_re
     }
 
 
+@pytest.mark.parametrize(
+    "axes",
+    [{"R2": [0.01, 0.02, np.inf]}, {"cases": {"inertia_factor2": [0.4, 0.4, 0.6]}}],
+    ids=["a plane", "a shell"],
+)
+def test_masses_that_matter_for_some_balls_alone_have_trajectories_of_their_own(axes: dict[str, object]) -> None:
+    # where both balls have one factor of inertia, m_t/m is 2/7 for all masses
+    source = oblique(v1=1.0, u1=0.5, mu=0.3, **axes, m1=[0.1, 0.2, 0.5])
+    each = impact.sweep(source, overrides={"solver.collapse": False})
+    assert np.nanmax(np.abs(each.friction_residual)) < 1e-8
+    assert_same_bits(impact.sweep(source), each)
+    factored = {"output.layout": "factored", "output.variables": ["beta"]}
+    assert_same_bits(impact.sweep(source, overrides=factored), each[["beta"]])
+
+
 # ---- the same bits, in any way
 
 

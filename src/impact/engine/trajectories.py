@@ -191,7 +191,10 @@ def probe_index(inputs: Inputs, swept_names: Iterable[str] = ()) -> Index:
 
     Values computed there have length 1 along the axes on which they do not depend: the shape shows which.
     """
-    full_axes = {axis for name in swept_names for axis in inputs.axes_of(name)}
+    # by a plane, or by another factor of inertia, the effective tangential mass depends on the masses
+    planes = [name for name in ("R1", "R2") if inputs.axes_of(name) and np.inf in inputs.values(name)]
+    names = (*swept_names, *planes, "inertia_factor1", "inertia_factor2")
+    full_axes = {axis for name in names for axis in inputs.axes_of(name)}
     sizes = (size if axis in full_axes else min(size, 2) for axis, size in enumerate(inputs.shape))
     return np.ix_(*map(np.arange, sizes))
 
