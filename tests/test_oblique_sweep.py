@@ -13,7 +13,7 @@ import impact
 from impact.contact.status import FrictionStatus, Status
 from impact.engine.executors import choose_executor
 from impact.engine.run import Run as SweepRun
-from impact.errors import ConfigError, UnfinishedError
+from impact.errors import ConfigError, ImpactWarning, UnfinishedError
 from impact.results.sweep import read_plan, sweep_into
 
 from .conftest import Run, assert_same_bits
@@ -312,6 +312,21 @@ def test_pairs_that_cannot_be_combined_are_marked_and_named(folder: Path, whole:
     ]
     with pytest.raises(ConfigError, match=f"lankarani-nikravesh-1994 with {DAMPED}"):
         impact.sweep(folder / "c.toml", overrides=alone)
+
+
+@pytest.mark.parametrize("gamma", [[0.1, 0.2, 0.0], [0.0, 0.0, 0.1]])
+def test_a_pair_that_adhesion_excludes_at_some_points_is_named_and_not_refused(gamma: list[float]) -> None:
+    source = {
+        "models": ["jkr-1971"],
+        "frictions": [SLIDING],
+        "materials": {"soft": {"E": 1e7, "nu": 0.3}},
+        "sweep": {"v1": 1.0, "m1": 1.0, "m2": 1.0, "R1": 0.1, "R2": 0.1, "material": "soft", "u1": 0.5, "mu": 0.3}
+        | {"cases": {"model.jkr-1971.gamma": gamma}},
+    }
+    with pytest.warns(ImpactWarning, match="pulls from the start"):
+        result = impact.sweep(source)
+    expected = np.where(np.array(gamma) > 0.0, FrictionStatus.NOT_COMBINABLE, FrictionStatus.OK)
+    np.testing.assert_array_equal(result.friction_status.values.ravel(), expected)
 
 
 @pytest.mark.slow

@@ -153,7 +153,10 @@ class Plan:
         problems, combinable = [], not self.frictions
         for law in self.laws[len(self.models) :]:
             assert isinstance(law, Pair)
-            parameters = (f"friction.{law.friction.key}.{parameter.name}" for parameter in law.friction.parameters)
+            parameters = [f"friction.{law.friction.key}.{parameter.name}" for parameter in law.friction.parameters]
+            # a force that pulls from the start for some values of its parameters
+            if law.model.family == "adhesive":
+                parameters += [f"{law.model.key}.{parameter.name}" for parameter in law.model.parameters]
             index = probe_index(self.inputs, {"n", *parameters})
             impacts = build_impacts(self.inputs, law.model, index)
             oblique = build_oblique(self.inputs, impacts, index, law.friction)
