@@ -107,6 +107,18 @@ def test_a_law_with_other_parameters_in_its_restitution_has_a_history_of_slip() 
     assert abs(change) == pytest.approx(abs(slip[-1] - slip[0]), rel=1e-3)
 
 
+def test_the_history_of_a_spring_that_stays_at_its_limit_is_that_of_the_outputs() -> None:
+    source = config(frictions=["yade-mindlin"], friction={"yade-mindlin": {"kt_over_kn": 0.8, "betas": 0.3}})
+    shot = impact.run(source, at={"angle": math.atan(0.5), "mu": 0.1})
+    assert shot.history is not None
+    t, slip, f, mode = (shot.history[name].values for name in ("t", "slip", "f", "mode"))
+    held = np.abs(mode) == 2
+    assert np.ptp(t[held]) > 0.1 * t[-1]
+    assert slip[-1] == pytest.approx(shot.values["slip_post"], rel=1e-6)
+    impulses = np.concatenate([[0.0], np.cumsum(0.5 * (f[1:] + f[:-1]) * np.diff(t))])
+    np.testing.assert_allclose(slip[0] - impulses / shot.derived["m_t"], slip, atol=1e-3 * abs(slip[0]))
+
+
 def test_the_history_has_the_mirrored_slip_of_a_mirrored_impact() -> None:
     source = config(frictions=["lammps-mindlin"])
     del source["sweep"]["angle"]

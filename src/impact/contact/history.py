@@ -19,7 +19,7 @@ from . import motion
 from .impacts import Impacts
 from .rigid import ObliqueImpacts
 from .simulate import RecordedMotion
-from .slip_motion import LEAST_S, SLIP_ROW, TIME_ROW
+from .slip_motion import LEAST_S, TIME_ROW
 from .status import Status
 from .tangential import RecordedSlip
 
@@ -143,9 +143,9 @@ def _with_slip(
         # at first contact smooth time stands still
         y[0] = np.where(np.abs(y[0]) < LEAST_S, LEAST_S, y[0])
         with np.errstate(all="ignore"):
-            k = part.phase.rates(y[:TIME_ROW], samples.params)
             mode = part.phase.columns(samples.params).mode
-            rows.append(np.array([y[SLIP_ROW], -k[SLIP_ROW] / k[TIME_ROW], np.where(mode, mode, 0.0)]))
+            slip_and_force = part.phase.slip_and_force(y[:TIME_ROW], samples.params)
+            rows.append(np.array([*slip_and_force, np.where(mode, mode, 0.0)]))
         first += len(part.steps)
     slip, force, mode = np.concatenate(rows, axis=1)
     if recorded[0].phase.form.kind == "regularized":

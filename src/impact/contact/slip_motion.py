@@ -654,6 +654,20 @@ class SlipPhase:
             y[SLIP_ROW, held] = self._held_slip(y[:N_COMPONENTS, held], part, direction)[0]
         return y
 
+    def slip_and_force(self, y: Array, params: Params) -> tuple[Array, Array]:
+        """Compute Gamma and the friction force over G0 at components y, also where a held mode determines them."""
+        k, columns = self.rates(y, params), self.columns(params)
+        slip, force = self._released(y, params)[SLIP_ROW], -k[SLIP_ROW] / k[TIME_ROW]
+        held = np.flatnonzero(np.abs(columns.mode) == 2.0)
+        if held.size:
+            # between that of a slip and that of sticking; as both vanish the rate of the slip loses its digits
+            limit = columns.memory_limit * k[-1]
+            drag = self._times(columns.damping * slip, y[0], self.drag_power)
+            bounds = np.sort([limit, limit + drag], axis=0)[:, held]
+            direction = np.sign(columns.mode[held])
+            force[held] = np.clip(self._held_force(y.take(held, 1), _taken(params, held), direction), *bounds)
+        return slip, force
+
     # ---- the start and the end of a part
 
     def begin(self, start: Array, params: Params) -> tuple[Array, Params]:
