@@ -143,6 +143,21 @@ def test_with_much_friction_a_linear_spring_never_slips() -> None:
     assert spring["beta"].item() == pytest.approx(-math.cos(w * spring["contact_time"].item()), abs=1e-6)
 
 
+def test_a_slip_sticks_where_the_normal_force_jumps_up_as_in_small_steps() -> None:
+    """The force of Kogut and Etsion jumps by 1.7 % at six times the indentation of first yield."""
+    source = {
+        "models": "kogut-etsion-2005",
+        "frictions": "cundall-strack-1979",
+        "materials": {"soft": {"E": 7e6, "nu": 0.2, "yield_strength": 2e5}},
+        "sweep": {"v1": 1.5, "m1": 0.4, "m2": 0.2, "R1": 0.016, "R2": 0.076, "mu": 0.4, "material": "soft"}
+        | {"u1": [1.2, 1.8]},
+        "friction": {"cundall-strack-1979": {"k_t": 4e4}},
+    }
+    steps = {"sweep.steps_per_contact": 10_000, "sweep.phase": 0.5, "solver.integrator": "kick-drift"}
+    small_steps = impact.sweep(source, overrides=steps)
+    np.testing.assert_allclose(impact.sweep(source)["beta"].values, small_steps["beta"].values, atol=2e-6)
+
+
 # angles [deg] and tangential restitution, 5 mm balls of alumina on glass at 3.9 m/s: Kharaz AH, Gorham DA, Salman
 # AD (2001) An experimental study of the elastic rebound of spheres. Powder Technol. 120, 281, as digitised in the
 # public tests of a granular code

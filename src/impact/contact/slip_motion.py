@@ -27,7 +27,7 @@ from ..array_types import Array, Mask
 from ..ode.problem import Margins, Params, Problem
 from . import motion
 from .formula_calls import Formula, argument_names, call_by_name
-from .piecewise import Breakpoint
+from .piecewise import STEP_BEYOND, Breakpoint
 from .velocity_coordinates import signed_power
 
 FrictionKind = Literal["coulomb", "spring", "dashpot", "regularized", "cone"]
@@ -766,6 +766,11 @@ class SlipPhase:
         near = y.copy()
         near[0] = np.where(np.abs(y[0]) < LEAST_S, LEAST_S, y[0])
         k = self.rates(near[:N_COMPONENTS], params)
+        if self.breakpoints:
+            # a force that jumps is that before the breakpoint, on whichever side of it rounding has ended
+            step = STEP_BEYOND * np.minimum(near[0], 1.0) * k[:N_COMPONENTS]
+            near[:N_COMPONENTS] -= np.where(self._crosses(near[:N_COMPONENTS] + step, params), step, 0.0)
+            k = self.rates(near[:N_COMPONENTS], params)
         force = self.local(near, k, params).spring_force
         self.track.force[index] = force
         # an energy that grows without bound towards x = 0 counts as slip work, or as memory work while sticking
