@@ -206,43 +206,18 @@ class Track:
         arrays: dict[str, Any] = {name: np.zeros(n, dtypes.get(name, float)) for name in cls.__annotations__}
         return cls(**{**arrays, "sign": np.ones(n), "v": np.ones(n), "slip": np.ones(n)})
 
-    def add_impulse(self, index: NDArray[np.intp], columns: Columns, v: Array, slip: Array) -> None:
+    def add_impulse(self, columns: Columns, v: Array, slip: Array) -> None:
         """Complete the impulses, and the work against the limit, up to velocities v and Gamma.
 
         While the contact slips Gamma changes by the impulse of N: times the mean Gamma it is the work.
         """
+        index = columns.row.astype(np.intp)
         change = self.v[index] - v
         impulse = np.sign(columns.share) * change
         self.impulse[index] += impulse
         self.signed[index] += np.sign(columns.mode) * impulse
         self.slip_work[index] += columns.limit * change * (0.5 * (self.slip[index] + slip))
         self.v[index], self.slip[index] = v, slip
-
-    def set_mode(
-        self,
-        form: TangentialForm,
-        index: NDArray[np.intp],
-        old: Array,
-        new: Array,
-        y: Array,
-        before: Array,
-        after: Array,
-    ) -> None:
-        """Change modes, with the energies of the spring before and after."""
-        was_slip, is_slip = np.abs(old) == 1.0, np.abs(new) == 1.0
-        # the work of a dashpot while slipping is a part of that against the limit
-        work = form.integral("work", y)
-        entered = np.where(was_slip, 0.0, before + work)
-        self.slip_work[index] += np.where(is_slip, entered, np.where(was_slip, -after - work, before - after))
-        self.stick_energy[index] += np.where(old == 0.0, before, 0.0) - np.where(new == 0.0, after, 0.0)
-        was_held, is_held = np.abs(old) == 2.0, np.abs(new) == 2.0
-        begins, ends, memory = is_held & ~was_held, was_held & ~is_held, form.integral("limit_memory", y)
-        self.held_memory[index] += np.where(ends, memory, 0.0) - np.where(begins, memory, 0.0)
-        rest = memory + 0.5 * y[SLIP_ROW] * y[SLIP_ROW]
-        self.damping_work[index] += np.where(begins, rest + after, 0.0) - np.where(ends, rest + before, 0.0)
-        self.mode[index] = new
-        self.changes[index] += old != new
-        self.regime[index] |= np.where(is_held, STICKS | SLIDES, np.where(is_slip, SLIDES, STICKS))
 
 
 class Local(NamedTuple):
@@ -535,11 +510,11 @@ class SlipPhase:
     def change(self, which: NDArray[np.intp], y: Array, k: Array, params: Params) -> tuple[Array, Params]:
         """Change the modes and signs of trajectories where margins vanish, see `Switch`."""
         y, columns = self._released(y, params), self.columns(params)
-        index, old = columns.row.astype(np.intp), columns.mode
-        self.track.add_impulse(index, columns, k[0], y[SLIP_ROW])
+        old = columns.mode
+        self.track.add_impulse(columns, k[0], y[SLIP_ROW])
         if not self.form.has_modes:
             # the only margin is that of the sign
-            return self._enter(index, old, old, -columns.sign, NO_FORCE, NO_FORCE, y, params)
+            return self._enter(old, -columns.sign, NO_FORCE, NO_FORCE, y, params)
         turned = which == SIGN_MARGIN
         sign = np.where(turned, -columns.sign, columns.sign)
         local, other = self.local(y, k, params), columns.changed(old, sign)
@@ -556,7 +531,7 @@ class SlipPhase:
         new = np.where(turned & (np.abs(old) == 2.0) & (other.share != 0.0), 0.0, new)
         new = self._held_mode(~turned & (old != 0.0), np.abs(old) == 2.0, np.sign(old), new, y, params)
         spring_force = np.where(~turned & (old == 0.0), direction * local.N - local.capped_drag, spring_force)
-        return self._enter(index, old, new, sign, local.spring_force, spring_force, y, params)
+        return self._enter(new, sign, local.spring_force, spring_force, y, params)
 
     def _without_force(self, columns: Columns) -> Mask:
         """Find trajectories without spring and dashpot."""
@@ -575,26 +550,36 @@ class SlipPhase:
         return np.where(self._without_force(columns), 0.0, new)
 
     def _enter(
-        self,
-        index: NDArray[np.intp],
-        old: Array,
-        new: Array,
-        sign: Array,
-        force_before: Array,
-        force: Array,
-        y: Array,
-        params: Params,
+        self, new: Array, sign: Array, force_before: Array, force: Array, y: Array, params: Params
     ) -> tuple[Array, Params]:
-        """Go on in other modes, with a force of the spring if the contact sticks."""
-        columns = self.columns(params)
-        before, after = self._energy(y[0], force_before, columns), self._energy(y[0], force, columns)
-        self.track.set_mode(self.form, index, old, new, y, before, after)
-        self.track.sign[index] = sign
+        """Go on in other modes, with a force of the spring if the contact sticks; account for its energies."""
+        form, track, columns = self.form, self.track, self.columns(params)
+        index = columns.row.astype(np.intp)
+        old, before, after = track.mode[index], *(self._energy(y[0], f, columns) for f in (force_before, force))
+        was_slip, is_slip = np.abs(old) == 1.0, np.abs(new) == 1.0
+        # the work of a dashpot while slipping is a part of that against the limit
+        work, memory = form.integral("work", y), form.integral("limit_memory", y)
+        entered = np.where(was_slip, 0.0, before + work)
+        track.slip_work[index] += np.where(is_slip, entered, np.where(was_slip, -after - work, before - after))
+        track.stick_energy[index] += np.where(old == 0.0, before, 0.0) - np.where(new == 0.0, after, 0.0)
+        was_held, is_held = np.abs(old) == 2.0, np.abs(new) == 2.0
+        begins, ends = is_held & ~was_held, was_held & ~is_held
+        track.held_memory[index] += np.where(ends, memory, 0.0) - np.where(begins, memory, 0.0)
+        rest = memory + 0.5 * y[SLIP_ROW] * y[SLIP_ROW]
+        track.damping_work[index] += np.where(begins, rest + after, 0.0) - np.where(ends, rest + before, 0.0)
+        track.mode[index], track.sign[index] = new, sign
+        # the first mode is no change
+        track.changes[index] += (old != new) & (track.regime[index] != 0)
+        track.regime[index] |= np.where(is_held, STICKS | SLIDES, np.where(is_slip, SLIDES, STICKS))
         scale = self._times(columns.root, _away_from_zero(y[0]), self.memory * self.stiffness_power)
-        z = np.where(columns.root > 0.0, force / scale, 0.0)
         y = y.copy()
-        y[SPRING_ROW] = np.where(new == 0.0, z, y[SPRING_ROW])
-        return y, self._replaced(params, columns.changed(new, sign))
+        y[SPRING_ROW] = np.where(new == 0.0, np.where(columns.root > 0.0, force / scale, 0.0), y[SPRING_ROW])
+        return y, self._changed(params, new, sign)[1]
+
+    def _changed(self, params: Params, mode: Array, sign: Array) -> tuple[Columns, Params]:
+        """Make the columns, and with them the params, of other modes and signs of the normal force."""
+        columns = self.columns(params).changed(mode, sign)
+        return columns, (*params[: self.first], *columns, *params[self.first + len(columns) :])
 
     # ---- the modes -2 and 2, in which a spring at its limit determines the slip
 
@@ -674,52 +659,46 @@ class SlipPhase:
         """Find the rows and params at the start of a part of the phase, where its formulas may change."""
         y = np.zeros((N_COMPONENTS + len(self.form.quadratures), start.shape[1]))
         y[: len(start)] = start
-        index = self.columns(params).row.astype(np.intp)
-        is_contact = self.track.regime[index[0]] == 0
-        return self._at_contact(y, params, index) if is_contact else self._at_change(y, params, index)
-
-    def _at_change(self, y: Array, params: Params, index: NDArray[np.intp]) -> tuple[Array, Params]:
-        """Find the modes where the formulas of the normal motion, or r, have changed."""
-        columns = self.columns(params)
-        old, force_before = self.track.mode[index], self.track.force[index]
-        k = self.rates(y[:N_COMPONENTS], params)
-        force = k[-1]
-        sign = np.where(np.abs(force) > MARGIN_TOLERANCE, np.sign(force), self.track.sign[index])
-        columns = columns.changed(old, sign)
-        params = self._replaced(params, columns)
-        local = self.local(y, k, params)
+        index, track = self.columns(params).row.astype(np.intp), self.track
+        is_contact = track.regime[index[0]] == 0
+        # not at s = 0 itself, where the share of the spring in the limit is 0/0
+        inside = self._rows_near_contact(y, params, START_S) if is_contact else y
+        k = self.rates(inside[:N_COMPONENTS], params)
+        is_certain = np.abs(k[-1]) > (0.0 if is_contact else MARGIN_TOLERANCE)
+        sign = np.where(is_certain, np.sign(k[-1]), track.sign[index])
+        columns, params = self._changed(params, track.mode[index], sign)
+        if is_contact:
+            twice_force = self._force(self._rows_near_contact(y, params, 2.0 * START_S)[:2], params)
+            track.order[index] = np.log2(twice_force / k[-1]) / self.law.model.coordinate_power
         if not self.form.has_modes:
-            return self._enter(index, old, old, sign, force_before, force_before, y, params)
+            mode = np.full(sign.size, 1.0 if self.form.kind == "regularized" else 0.0)
+            return self._enter(mode, sign, NO_FORCE, NO_FORCE, y, params)
+        local = self.local(inside, k, params)
+        if is_contact:
+            new, spring_force = self._at_contact(y, local, columns, params)
+            return self._enter(new, sign, NO_FORCE, spring_force, inside, params)
+        new, spring_force = self._at_change(y, k, local, columns, params)
+        return self._enter(new, sign, track.force[index], spring_force, y, params)
+
+    def _at_change(
+        self, y: Array, k: Array, local: Local, columns: Columns, params: Params
+    ) -> tuple[Array, Array]:
+        """Find the modes where the formulas of the normal motion, or r, have changed, and the spring's force."""
+        force_before = self.track.force[columns.row.astype(np.intp)]
         trial = local.drag if self.form.kind == "dashpot" else force_before + local.capped_drag
         at_limit = np.abs(trial) >= local.N * (1.0 - CAP_TOLERANCE) - MARGIN_TOLERANCE / columns.G0
         direction = np.where(trial < 0.0, -1.0, 1.0)
         spring_force = np.where(at_limit, direction * local.N - local.capped_drag, force_before)
-        new, was_held = direction, np.abs(old) == 2.0
+        new, was_held = direction, np.abs(columns.mode) == 2.0
         if self.form.kind == "spring":
             rate = self.trial_rate(y, k, columns, spring_force, direction * local.N)
             new = self._mode_at_limit(direction * rate - local.dN, direction, y, columns)
         new = np.where(at_limit, new, 0.0)
-        new = self._held_mode(at_limit & was_held, ~was_held, direction, new, y, params)
-        return self._enter(index, old, new, sign, force_before, spring_force, y, params)
+        return self._held_mode(at_limit & was_held, ~was_held, direction, new, y, params), spring_force
 
-    def _replaced(self, params: Params, columns: Columns) -> Params:
-        return (*params[: self.first], *columns, *params[self.first + len(columns) :])
-
-    def _at_contact(self, y: Array, params: Params, index: NDArray[np.intp]) -> tuple[Array, Params]:
-        """Find the modes at first contact, where leading powers of x decide whether the trial force is below N."""
-        form, columns, n = self.form, self.columns(params), y.shape[1]
-        near, twice = (self._rows_near_contact(y, params, s) for s in (START_S, 2.0 * START_S))
-        k = self.rates(near[:N_COMPONENTS], params)
-        force, twice_force = k[-1], self._force(twice[:2], params)
-        self.track.order[index] = np.log2(twice_force / force) / self.law.model.coordinate_power
-        sign = np.where(force < 0.0, -1.0, 1.0)
-        columns = columns.changed(np.zeros(n), sign)
-        params = self._replaced(params, columns)
-        if not self.form.has_modes:
-            mode = np.full(n, 1.0 if form.kind == "regularized" else 0.0)
-            return self._enter(index, mode, mode, sign, NO_FORCE, NO_FORCE, y, params)
-        local = self.local(near, k, params)
-        kp = form.stiffness_power
+    def _at_contact(self, y: Array, local: Local, columns: Columns, params: Params) -> tuple[Array, Array]:
+        """Find the same at first contact, where leading powers of x decide whether the trial force is below N."""
+        form, kp, index = self.form, self.form.stiffness_power, columns.row.astype(np.intp)
         spring_force = (
             columns.root**2
             * START_S ** (self.law.model.coordinate_power * (kp + 1.0))
@@ -727,8 +706,7 @@ class SlipPhase:
         )
         trial = local.drag if form.kind == "dashpot" else spring_force + local.capped_drag
         below = trial < local.N
-        spring_force = np.where(below, 0.0, local.N - local.capped_drag)
-        growth = np.ones(n) if form.kind == "dashpot" else self._growth_at_contact(y, params)
+        growth = np.ones(index.size) if form.kind == "dashpot" else self._growth_at_contact(y, params)
         if form.is_total and kp * self.memory == form.damping_power > 0.0:
             # the leading powers cancel
             growth = np.where(local.capped_drag >= local.N, columns.root**2 * columns.G0 - 1.0, growth)
@@ -737,8 +715,7 @@ class SlipPhase:
             self.track.is_slow[index] = is_slow = local.drag > local.N
             new = np.where(is_slow, -1.0, new)
         self.track.touches[index] = (new != 0.0) | ~below
-        # not at s = 0 itself, where the share of the spring in the limit is 0/0
-        return self._enter(index, new, new, sign, NO_FORCE, spring_force, near, params)
+        return new, np.where(below, 0.0, local.N - local.capped_drag)
 
     def _rows_near_contact(self, y: Array, params: Params, s: float) -> Array:
         """Make rows at an indentation so small that the velocities are those at first contact."""
@@ -758,13 +735,11 @@ class SlipPhase:
 
     def finish(self, y: Array, params: Params) -> None:
         """Note the state of friction at the end of a part, from its rows; complete the rows."""
-        columns = self.columns(params)
-        index = columns.row.astype(np.intp)
-        columns = columns.changed(self.track.mode[index], self.track.sign[index])
-        params = self._replaced(params, columns)
+        index = self.columns(params).row.astype(np.intp)
+        columns, params = self._changed(params, self.track.mode[index], self.track.sign[index])
         y[SLIP_ROW] = self._released(y, params)[SLIP_ROW]
         near = y.copy()
-        near[0] = np.where(np.abs(y[0]) < LEAST_S, LEAST_S, y[0])
+        near[0] = _away_from_zero(y[0])
         k = self.rates(near[:N_COMPONENTS], params)
         if self.breakpoints:
             # a force that jumps is that before the breakpoint, on whichever side of it rounding has ended
@@ -779,7 +754,7 @@ class SlipPhase:
         is_finite = 2.0 * order > self.form.stiffness_power - ORDER_TOLERANCE
         is_finite |= (np.abs(columns.mode) == 2.0) | (y[0] > END_S)
         self.track.energy[index] = np.where(is_finite, self._energy(near[0], force, columns), 0.0)
-        self.track.add_impulse(index, columns, k[0], y[SLIP_ROW])
+        self.track.add_impulse(columns, k[0], y[SLIP_ROW])
 
 
 def _taken(params: Params, rows: NDArray[np.intp]) -> Params:
