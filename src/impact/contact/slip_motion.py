@@ -294,20 +294,18 @@ class SlipPhase:
     def problem(self) -> Problem:
         """Pose the joint problem."""
         normal = self.normal
+        # a coordinate for strong damping uses the rate of time, others only those of s and v and the force
+        used = NORMAL_ROWS if self.law.coordinate.strength else slice(None)
         return Problem(
             rates=self.rates,
-            event=lambda y, k, params: normal.event(y[:2], self._normal_rates(k), params),
-            unreachable=lambda y, k, params: normal.unreachable(y[:2], self._normal_rates(k), params),
+            event=lambda y, k, params: normal.event(y[:2], k[used], params),
+            unreachable=lambda y, k, params: normal.unreachable(y[:2], k[used], params),
             floor=JOINT_FLOOR,
             step_at_unit_error=normal.step_at_unit_error,
             n_components=N_COMPONENTS,
             n_quadratures=len(self.form.quadratures),
             switch=self,
         )
-
-    def _normal_rates(self, k: Array) -> Array:
-        """Choose the rates that a normal problem uses; a coordinate for strong damping uses that of time."""
-        return k[NORMAL_ROWS] if self.law.coordinate.strength else k
 
     def rates(self, y: Array, params: Params, out: Array | None = None) -> Array:
         """Compute the rates of the joint problem, see `Problem`."""
@@ -454,7 +452,9 @@ class SlipPhase:
         if self.form.may_hold:
             held = np.flatnonzero((np.abs(columns.mode) == 2.0) & ~(leaves & (y[0] < END_S)))
             if held.size:
-                margin[held], rate[held] = self._held_margin(y.take(held, 1), _taken(params, held))[0], np.nan
+                direction = np.sign(columns.mode[held])
+                margin[held] = self._held_margin(y.take(held, 1), _taken(params, held), direction)[0]
+                rate[held] = np.nan
         # without a limit the mode does not matter, nor without a force
         free = np.flatnonzero((columns.share == 0.0) | self._without_force(columns))
         margin[free], rate[free] = 1.0, 0.0
@@ -593,20 +593,16 @@ class SlipPhase:
         fading = self.memory * self.stiffness_power * k[0] / _away_from_zero(y[0]) * N
         return direction * (dN - fading) / stiffness, N
 
-    def _held_force(self, y: Array, params: Params, direction: Array) -> Array:
-        """Compute the friction force that gives the slip its rate, over G0."""
+    def _held_margin(self, y: Array, params: Params, direction: Array) -> tuple[Array, Mask]:
+        """Compute a margin, positive while the force is between slip and stick, and where it is nearer to slip."""
+        columns, y = self.columns(params), y[:N_COMPONENTS]
+        slip, N = self._held_slip(y, params, direction)
+        # the friction force that gives the slip its rate
         small = RATE_OF_SLIP_STEP * np.clip(np.abs(y[0]), motion.MIN_RELEASE_S, 1.0)
         k = self.rates(y, params)
         step = small * k[:N_COMPONENTS]
         ahead, behind = (self._held_slip(y + sign * step, params, direction)[0] for sign in (1.0, -1.0))
-        return np.asarray((behind - ahead) / (2.0 * small * k[TIME_ROW]))
-
-    def _held_margin(self, y: Array, params: Params, direction: Array | None = None) -> tuple[Array, Mask]:
-        """Compute a margin, positive while the force is between slip and stick, and where it is nearer to slip."""
-        columns, y = self.columns(params), y[:N_COMPONENTS]
-        direction = np.sign(columns.mode) if direction is None else direction
-        slip, N = self._held_slip(y, params, direction)
-        force = self._held_force(y, params, direction)
+        force = (behind - ahead) / (2.0 * small * k[TIME_ROW])
         drag = self._times(columns.damping * slip, y[0], self.drag_power)
         above_slip = (force - direction * N) * np.sign(drag)
         return np.minimum(above_slip, np.abs(drag) - above_slip), above_slip < 0.5 * np.abs(drag)
