@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..array_types import Array, Mask
+from ..array_types import Array
 from .powers import power
 from .slip_motion import SLIDES, STICKS, TangentialForm
 
@@ -113,46 +113,36 @@ class FixedStepSlip:
         if form.kind == "coulomb":
             return
         drag = self.damping * power(x, form.damping_power) * self.slip
-        spring = self._spring(x, step) if form.kind == "spring" else np.zeros_like(drag)
+        spring, stiffness, keeps_force = np.zeros_like(drag), drag, form.memory[0] == 0.0
+        if form.kind == "spring":
+            now, rescaled = power(x, form.stiffness_power), form.memory[1] - form.memory[0]
+            if rescaled:
+                shrinks = now < self.last_power
+                self.memory = np.where(shrinks, self.memory * power(now / self.last_power, rescaled), self.memory)
+            self.last_power, stiffness = now, self.stiffness * now
+            if keeps_force:
+                spring = self.memory + step * stiffness * self.slip
+            else:
+                spring = stiffness * (self.memory + step * self.slip)
         trial = spring if form.cap == "spring" else spring + drag
         slips = np.abs(trial) > limit
         at_limit = np.copysign(limit, trial)
         phi = np.where(slips, at_limit, spring + drag)
         if form.kind == "spring":
-            self._remember(np.where(slips, self._spring_left(spring, drag, limit, at_limit), spring), slips)
+            match form.cap:
+                case "spring":
+                    left = at_limit
+                case "total":
+                    left = at_limit - drag
+                case "both":
+                    # a dashpot that turns the force leaves the spring as it is
+                    left = np.where(spring * at_limit > 0.0, np.clip(spring, -limit, limit), spring)
+            self.memory = np.where(slips, left, spring)
+            if not keeps_force:
+                memory = np.where(stiffness > 0.0, self.memory / stiffness, 0.0)
+                # where it slips, LAMMPS of 22 July 2025 divides the force by k, not by k a
+                is_classic = slips & (self.radius > 0.0)
+                self.memory = memory * np.where(is_classic, self.radius * self.last_power, 1.0)
         self.slip = self.slip - step * phi
         self.changes = self.changes + ((self.regime != 0) & (slips != self.slipped)).astype(np.int32)
         self.regime, self.slipped = self.regime | np.where(slips, SLIDES, STICKS), slips
-
-    def _spring(self, x: Array, step: Array) -> Array:
-        """Compute the force of the spring in a step, before its limit."""
-        form, now = self.form, power(x, self.form.stiffness_power)
-        rescaled = form.memory[1] - form.memory[0]
-        if rescaled:
-            shrinks = now < self.last_power
-            self.memory = np.where(shrinks, self.memory * power(now / self.last_power, rescaled), self.memory)
-        self.last_power = now
-        stiffness = self.stiffness * now
-        if form.memory[0] == 0.0:
-            return self.memory + step * stiffness * self.slip
-        return stiffness * (self.memory + step * self.slip)
-
-    def _spring_left(self, spring: Array, drag: Array, limit: Array, at_limit: Array) -> Array:
-        """Compute the force of the spring that a slip leaves, from forces before and at the limit."""
-        match self.form.cap:
-            case "spring":
-                return at_limit
-            case "total":
-                return at_limit - drag
-        # a dashpot that turns the force leaves the spring as it is
-        return np.where(spring * at_limit > 0.0, np.clip(spring, -limit, limit), spring)
-
-    def _remember(self, spring: Array, slips: Mask) -> None:
-        """Keep the force of the spring, or the displacement that belongs to it."""
-        if self.form.memory[0] == 0.0:
-            self.memory = spring
-            return
-        stiffness = self.stiffness * self.last_power
-        memory = np.where(stiffness > 0.0, spring / stiffness, 0.0)
-        # where it slips, LAMMPS of 22 July 2025 divides the force by k, not by k a
-        self.memory = memory * np.where(slips & (self.radius > 0.0), self.radius * self.last_power, 1.0)

@@ -79,17 +79,17 @@ class ObliqueImpacts:
         return self.mass_ratio * self.impacts.m
 
     @cached_property
-    def slip_ratio(self) -> Array:
-        """g0/v0; of the same bits at the same angle, whatever the speed is."""
-        if self.tangent is None:
-            return self.slip / self.impacts.v0
-        spinning = _rim(self.impacts.R1, self.omega1) + _rim(self.impacts.R2, self.omega2)
-        return self.tangent + spinning / self.impacts.v0
-
-    @cached_property
     def G0(self) -> Array:
-        """The slip before the impact in units in which friction of mu changes it at the rate of the force."""
-        return self.mass_ratio * self.slip_ratio / self.mu
+        """The slip before the impact in units in which friction of mu changes it at the rate of the force.
+
+        It has the same bits at the same angle, whatever the speed is.
+        """
+        if self.tangent is None:
+            slip_ratio = self.slip / self.impacts.v0
+        else:
+            spinning = _rim(self.impacts.R1, self.omega1) + _rim(self.impacts.R2, self.omega2)
+            slip_ratio = self.tangent + spinning / self.impacts.v0
+        return self.mass_ratio * slip_ratio / self.mu
 
     @cached_property
     def slip(self) -> Array:

@@ -319,7 +319,10 @@ class SlipPhase:
         v, s, slip = out[0], y[0], y[SLIP_ROW]
         phi = slip_spring = columns.limit * force
         if form.coefficient is not None:
-            phi = phi * self._coefficient(slip, params)
+            names, values = argument_names(form.coefficient), params[self.first + len(columns) :]
+            arguments = dict(zip(names, values, strict=False))
+            arguments["y"] = arguments["y"] * np.abs(slip)
+            phi = phi * (np.sign(slip) * call_by_name(form.coefficient, arguments))
         if self.form.kind == "spring":
             spring_force = self._times(columns.spring * y[SPRING_ROW], s, self.memory * self.stiffness_power)
             phi = phi + spring_force
@@ -352,14 +355,6 @@ class SlipPhase:
             memory_work *= (0.5 - self.memory) * self.stiffness_power * columns.compliance
             memory_work *= slip_spring * slip_spring
         return out
-
-    def _coefficient(self, slip: Array, params: Params) -> Array:
-        """Compute the coefficient of friction over mu, with the sign of the slip."""
-        assert self.form.coefficient is not None
-        first = self.first + len(Columns._fields)
-        arguments = dict(zip(argument_names(self.form.coefficient), params[first:], strict=False))
-        arguments["y"] = arguments["y"] * np.abs(slip)
-        return np.asarray(np.sign(slip) * call_by_name(self.form.coefficient, arguments))
 
     def _times(self, factor: Array, s: Array, exponent: float) -> Array:
         """Multiply by a power of s."""

@@ -31,7 +31,6 @@ from .fixed_step_slip import (
 )
 from .formula_calls import argument_names
 from .friction import Pair
-from .model import ForceModel
 from .piecewise import in_parts
 from .records import Record
 from .slip_motion import (
@@ -135,7 +134,10 @@ def _simulate_distinct(
 ) -> TangentialResult:
     """Integrate each distinct dimensionless problem once."""
     form = pair.form(n)
-    model = _smooth_model(pair.model, form)
+    # a coordinate in which the powers of x of the friction are smooth, too
+    powers = (form.stiffness_power, form.damping_power)
+    smooth = (p for p in (pair.model.coordinate_power, 4, 8) if all(float(p * q).is_integer() for q in powers))
+    model = replace(pair.model, coordinate_power=next(smooth, pair.model.coordinate_power))
     law_values = with_coefficients(model, with_units(values, n), count)
     status = simulate.check_coefficients(model, law_values, values, count)
     slip = np.ones(count) if form.kind == "coulomb" else np.abs(values[SLIP])
@@ -200,15 +202,6 @@ def _slip_at_fixed_steps(
     for name, column in answers.items():
         np.copyto(getattr(result, name), column, where=status == STATUS_OK)
     return replace(result, stiffness=slip.stiffness / n) if form.kind == "spring" else result
-
-
-def _smooth_model(model: ForceModel, form: TangentialForm) -> ForceModel:
-    """Choose a coordinate in which the powers of x of the friction are smooth, too."""
-    for coordinate_power in (model.coordinate_power, 4, 8):
-        powers = (coordinate_power * form.stiffness_power, coordinate_power * form.damping_power)
-        if all(float(power).is_integer() for power in powers):
-            return replace(model, coordinate_power=coordinate_power)
-    return model
 
 
 def _integrate(
