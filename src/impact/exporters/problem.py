@@ -8,11 +8,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..array_types import Array
 from ..config.draft import Overrides, Setting
 from ..config.load import Config
 from ..config.tables import SWEEP_QUANTITIES
-from ..contact.friction import FrictionLaw, Pair
+from ..contact.friction import Pair
 from ..contact.frictions import find_friction
 from ..contact.impacts import INPUTS, Impacts
 from ..contact.model import ForceModel
@@ -158,7 +157,11 @@ def prepare_export(
     fixed = fixed_step_law(point.config, PHASES, scheme, of_friction=chosen is not None)
     warn_of_point(point_source, point, fixed.impact, fixed.continuous)
     if isinstance(fixed.law, Pair) and fixed.oblique is not None:
-        _check_limit(code, fixed.law.friction, fixed.oblique.parameters.get("limit"))
+        # that of `coulomb-1785` is taken of any code
+        law = fixed.law.friction
+        for limit in (parameter for parameter in law.parameters if parameter.name == "limit"):
+            if law.kind != "coulomb" and fixed.oblique.parameters["limit"].item() != limit.default:
+                raise UsageError(f"friction.{law.key}.limit: {code.title} has only {law.default_limit}")
     better_fit = ""
     if calibration := point_source.calibration:
         better_fit, fit_notes = _fit_notes(code, version, key, calibration)
@@ -208,15 +211,6 @@ def _choose_friction(
     keys = [law.key for law in source.draft(model).frictions]
     chosen = friction or next((key for key in keys if key in known), None)
     return chosen, () if chosen else tuple(keys)
-
-
-def _check_limit(code: Code, law: FrictionLaw, limit: Array | None) -> None:
-    """Refuse the other normal force that limits friction; that of `coulomb-1785` is taken of any code."""
-    if law.kind == "coulomb" or limit is None:
-        return
-    words = next(parameter.choices for parameter in law.parameters if parameter.name == "limit")
-    if words[int(limit.item())] != law.default_limit:
-        raise UsageError(f"friction.{law.key}.limit: {code.title} has only {law.default_limit}")
 
 
 def _defaults(source: PointSource, at: Mapping[str, object], config: Config) -> tuple[str, ...]:

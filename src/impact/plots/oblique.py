@@ -99,15 +99,13 @@ def friction_loop_curves(histories: Sequence[xr.Dataset], choice: Choice) -> Cur
     """Draw friction over the slip displacement of one impact: the area under a curve is the work of friction."""
     if any("f" not in history for history in histories):
         raise UsageError("this impact has no friction; run or sweep a config with frictions = [...]")
-    moved = [_with_displacement(history) for history in histories]
+    moved = []
+    for history in histories:
+        # the displacement of the contact points against each other is the integral of the slip
+        t, slip = history["t"].values, history["slip"].values
+        displacement = np.concatenate(([0.0], np.cumsum(0.5 * (slip[1:] + slip[:-1]) * np.diff(t))))
+        moved.append(history.assign(xi=("t", displacement, {"units": "m", "long_name": "slip displacement"})))
     return curves_over("Friction over slip", moved, [("xi", "f", "")], choice, of_friction=True)
-
-
-def _with_displacement(history: xr.Dataset) -> xr.Dataset:
-    """Add the displacement of the contact points against each other, the integral of the slip."""
-    t, slip = history["t"].values, history["slip"].values
-    displacement = np.concatenate(([0.0], np.cumsum(0.5 * (slip[1:] + slip[:-1]) * np.diff(t))))
-    return history.assign(xi=("t", displacement, {"units": "m", "long_name": "slip displacement"}))
 
 
 def _pairs_along(dataset: xr.Dataset, choice: Choice, *names: str) -> tuple[Line, list[LawPart]]:
@@ -125,7 +123,9 @@ def _pairs_along(dataset: xr.Dataset, choice: Choice, *names: str) -> tuple[Line
         if any(np.isfinite(pair.data.variables[name].values).any() for name in names):
             pairs.append(pair)
         else:
-            not_drawn.append(f"{pair.law}: {_reason(pair.data)}")
+            statuses = np.unique(pair.data["friction_status"]) if "friction_status" in pair.data else ()
+            failures = [FrictionStatus(int(status)).meaning for status in statuses if status >= FIRST_FAILURE]
+            not_drawn.append(f"{pair.law}: {'; '.join(failures) or 'not defined'}")
     if not pairs:
         raise UsageError(f"no pair has a value of {' or '.join(names)} here: {not_drawn[0]}")
     if choice.frictions is None and len(pairs) > MAX_PAIRS:
@@ -139,13 +139,6 @@ def _first_axis(dataset: xr.Dataset, choice: Choice) -> str | None:
     """Find the angle, else the first input of several numbers that is not selected."""
     axes = numeric_axes(select(dataset, choice.sel or {}))
     return "angle" if "angle" in axes else next(iter(axes), None)
-
-
-def _reason(data: xr.Dataset) -> str:
-    """Say why a pair has no value."""
-    statuses = np.unique(data["friction_status"]) if "friction_status" in data else ()
-    failures = [FrictionStatus(int(status)).meaning for status in statuses if status >= FIRST_FAILURE]
-    return "; ".join(failures) or "not defined"
 
 
 def _panel(line: Line, pairs: Sequence[LawPart], name: str, y_label: str, guides: Sequence[Curve] = ()) -> Panel:

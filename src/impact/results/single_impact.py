@@ -38,7 +38,7 @@ from ..contact.simulate import RecordedMotion
 from ..contact.status import FIRST_FAILURE, FrictionStatus, Status
 from ..contact.tangential import RecordedSlip
 from ..contact.units import with_numbers
-from ..contact.variables import CENTRAL_OUTPUTS, HISTORY, LAW_DIMS, OUTPUTS, Variable
+from ..contact.variables import CENTRAL_OUTPUTS, HISTORY, LAW_DIMS, OUTPUTS
 from ..display import Block, Displayed, Styled, Table
 from ..engine.inputs import build_impacts, build_oblique, fixed_steps_at, input_at
 from ..engine.plan import Plan
@@ -187,6 +187,7 @@ class Impact(Displayed):
             ("e_kinetic", number(self.e_kinetic, CHECK_DIGITS), "(2), tau_r/tau_c"),
             ("e_energetic", number(self.e_energetic, CHECK_DIGITS), "(3), the root of -W_r/W_c"),
         ]
+        numbers = {**self.derived, **self.point, **self.values}
         for name, variable in OUTPUTS.items():
             value = self.values.get(name, math.nan)
             is_left_out = variable.dtype != "f8" or (variable.may_be_nan and value != value)
@@ -198,7 +199,9 @@ class Impact(Displayed):
             else:
                 # a number without a unit is often compared with an input
                 digits = INPUT_DIGITS if variable.unit == "1" else OUTPUT_DIGITS
-                value = 0.0 if self._is_rounding(variable) else value
+                scale = scale_of(variable, lambda name: np.asarray(numbers[name]), has_peak=True)
+                # what `compare` would by default take for 0
+                value = 0.0 if abs(value) <= DEFAULT_RTOL_FACTOR * self.rtol * scale else value
                 outputs.append((name, prefixed(value, self._with_numbers(variable.unit), digits), meaning))
         outputs += self._derived_rows(MOTION_QUANTITIES, OUTPUT_DIGITS)
         in_domain = "yes" if self.values["in_domain"] else "no"
@@ -208,12 +211,6 @@ class Impact(Displayed):
         if self.integrator != EXACT:
             checks.append(("integrator", self.integrator, "scheme with a fixed step"))
         return {"Inputs": inputs, "Outputs": outputs, "Checks": checks}
-
-    def _is_rounding(self, variable: Variable) -> bool:
-        """Whether `compare` would by default take the value of an output for 0."""
-        numbers = {**self.derived, **self.point, **self.values}
-        scale = scale_of(variable, lambda name: np.asarray(numbers[name]), has_peak=True)
-        return bool(abs(self.values[variable.name]) <= DEFAULT_RTOL_FACTOR * self.rtol * scale)
 
     def rows(self) -> dict[str, str]:
         """The lines of all groups, by name."""
