@@ -97,13 +97,10 @@ def _missing(quantity: Quantity) -> str:
     return f"missing, expected {quantity.expected}: {quantity.meaning}"
 
 
-def _velocity_problems(draft: Draft) -> Iterable[ConfigProblem]:
-    if {"v1", "speed"}.isdisjoint(draft.table("sweep")):
-        yield ("sweep", "v1"), _missing(SWEEP_QUANTITIES["v1"])
-
-
-def _restitution_problems(draft: Draft) -> Iterable[ConfigProblem]:
+def _speed_and_restitution_problems(draft: Draft) -> Iterable[ConfigProblem]:
     sweep = draft.table("sweep")
+    if {"v1", "speed"}.isdisjoint(sweep):
+        yield ("sweep", "v1"), _missing(SWEEP_QUANTITIES["v1"])
     if "e" in sweep and "alpha" in sweep:
         yield ("sweep", "alpha"), "set together with e, expected one of the two"
     users = _models_using(draft, "e")
@@ -339,8 +336,7 @@ def _depends_on(model: ForceModel, draft: Draft) -> set[str]:
 
 
 RULES = (
-    _velocity_problems,
-    _restitution_problems,
+    _speed_and_restitution_problems,
     _stiffness_problems,
     _material_problems,
     _yield_strength_problems,

@@ -194,7 +194,13 @@ def check_friction(pair: Pair, oblique: ObliqueImpacts) -> NDArray[np.int8]:
     status = replace_where(status, ~np.isfinite(oblique.slip), np.int8(FrictionStatus.OUT_OF_RANGE))
     for value in _spring_values(pair, oblique).values():
         status = replace_where(status, ~(value >= 0.0), np.int8(FrictionStatus.OUT_OF_RANGE))
-    for mask in _invalid(pair.friction, oblique):
+    law, impacts, mu = pair.friction, oblique.impacts, oblique.mu
+    invalid = [_value(law, oblique, "mu_d") > mu, (mu == 0.0) & (_value(law, oblique, "mu_v") > 0.0)]
+    given = [name for name, values in oblique.parameters.items() if not np.isnan(values).all()]
+    if "e" in required_inputs(law, given, distinct_values(impacts.n).tolist()):
+        is_off = law.damping == "liggghts" and _value(law, oblique, "tangential_damping") == 0.0
+        invalid.append(~((impacts.e >= 0.0) & (impacts.e <= 1.0)) & ~np.asarray(is_off))
+    for mask in invalid:
         status = replace_where(status, mask, np.int8(FrictionStatus.INVALID_PARAMETER))
     for mask, _ in _problems(pair, oblique):
         status = replace_where(status, mask, np.int8(FrictionStatus.NOT_COMBINABLE))
@@ -417,14 +423,3 @@ _FACTORS_OF_DAMPING = {
     "liggghts": ("tangential_damping", '; set tangential_damping = "off"'),
     "kratos": ("", ""),
 }
-
-
-def _invalid(law: FrictionLaw, oblique: ObliqueImpacts) -> Iterator[Mask]:
-    """Find where a value that friction needs is out of its range."""
-    impacts, mu = oblique.impacts, oblique.mu
-    given = [name for name, values in oblique.parameters.items() if not np.isnan(values).all()]
-    if "e" in required_inputs(law, given, distinct_values(impacts.n).tolist()):
-        is_off = law.damping == "liggghts" and _value(law, oblique, "tangential_damping") == 0.0
-        yield ~((impacts.e >= 0.0) & (impacts.e <= 1.0)) & ~np.asarray(is_off)
-    yield _value(law, oblique, "mu_d") > mu
-    yield (mu == 0.0) & (_value(law, oblique, "mu_v") > 0.0)
