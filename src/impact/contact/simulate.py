@@ -21,7 +21,6 @@ from ..errors import ModelError
 from ..ode.problem import Params, Problem, Solution, Termination
 from ..ode.rk45 import integrate
 from . import motion
-from .deduplicate import deduplicate
 from .dimensionless import LawValues, chi_of, exact_restitution, with_coefficients, with_units
 from .fixed_step import EXACT, MAX_CONTACTS, MUJOCO_CONE, collide_at_fixed_step
 from .fixed_step_slip import PREFIX, SLIP, FixedStepSlip
@@ -30,7 +29,7 @@ from .model import ForceModel
 from .numba import dispatch
 from .piecewise import in_parts
 from .powers import distinct_values, power
-from .records import CollisionResult, Positions, Record, positions
+from .records import CollisionResult, Positions, Record, deduplicate, positions
 from .slip_motion import TangentialForm
 from .status import LIMIT, STATUS_OK, Status
 from .velocity_coordinates import VelocityCoordinate, is_strong

@@ -14,13 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..contact.deduplicate import deduplicate
 from ..contact.dimensionless import dimensionless_values, exponent_names
 from ..contact.friction import Pair, check_friction, friction_values
 from ..contact.frictions.multibody_codes import MUJOCO_ELLIPTIC
 from ..contact.impacts import CHECKS, Impacts, check_inputs
 from ..contact.model import ForceModel
-from ..contact.records import CollisionResult, Record
+from ..contact.records import CollisionResult, Record, deduplicate
 from ..contact.status import STATUS_OK
 from ..contact.tangential import TangentialResult
 from .inputs import Index, Inputs, build_impacts, build_oblique, dimensions, fixed_steps_at, index_of
