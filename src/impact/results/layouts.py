@@ -232,7 +232,7 @@ def witness_values(
         index = index_of(cells[rows], table.inputs.shape)
         _, values = expand(table, numbers[model], index, list(values_by_name))
         for name, array in values_by_name.items():
-            array[rows] = np.broadcast_to(values[name], rows.shape)
+            array[rows] = values[name]
     return values_by_name
 
 

@@ -256,16 +256,13 @@ def summarize_table(dataset: xr.Dataset, table: TrajectoryTable) -> tuple[Summar
                 summary.not_counted += weight * variable.size
     for (position, shape), (weight, names) in sorted(groups.items(), key=lambda item: item[0]):
         for slab in slabs(dict(enumerate(shape))):
-            region = tuple(slab.values())
-            size = tuple(part.stop - part.start for part in region)
-            for_names = expand(table, position, table.inputs.index(region), names)[1]
-            values = {}
-            for name, array in for_names.items():
-                typed = np.asarray(array, dataset[name].dtype)
-                values[name] = np.broadcast_to(typed if region else typed.reshape(()), size)
+            index = table.inputs.index(tuple(slab.values()))
+            expanded = expand(table, position, index, names)[1]
+            values = {name: np.asarray(array, dataset[name].dtype) for name, array in expanded.items()}
+            for name, array in values.items():
                 so_far = extremes[name]
-                extremes[name] = so_far and so_far.add(values[name], weight)
-            start = [part.start for part in region]
+                extremes[name] = so_far and so_far.add(array, weight)
+            start = [part.start for part in slab.values()]
             summary.add(values, table.keys(position)[0], table.place(position), start, weight)
     keys = [law.key for law in table.laws]
     return summary, SummaryRecord(

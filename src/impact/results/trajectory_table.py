@@ -151,7 +151,7 @@ def expand(table: TrajectoryTable, number: int, index: Index, names: Sequence[st
     """Compute the inputs and some outputs of a model, or of a pair by the number of its map, at cells of the grid.
 
     `index` has an integer array for each axis, which broadcast against each other; a plan without axes has one
-    cell. The outputs broadcast to the shape of the index, with length one along axes on which they do not vary.
+    cell. The outputs have the shape of the index; along axes on which they do not vary they are views.
     """
     model, *friction = table.place(number)
     law = table.laws[model]
@@ -159,11 +159,16 @@ def expand(table: TrajectoryTable, number: int, index: Index, names: Sequence[st
     with np.errstate(all="ignore"):
         checked = check_inputs(law, impacts, table.checks[model])
     result = table.rows.take(model, table.maps[model].rows(index))
-    if not friction:
-        return impacts, outputs(law, impacts, result, names, checked)
-    tangential = table.rows.take(number, table.maps[number].rows(index))
-    of_friction = (build_oblique(table.inputs, impacts, index), tangential, table.frictions[table.keys(number)[1]])
-    return impacts, outputs(law, impacts, result, names, checked, of_friction)
+    of_friction = None
+    if friction:
+        tangential = table.rows.take(number, table.maps[number].rows(index))
+        kind = table.frictions[table.keys(number)[1]]
+        of_friction = (build_oblique(table.inputs, impacts, index), tangential, kind)
+    values = outputs(law, impacts, result, names, checked, of_friction)
+    shape = np.broadcast_shapes(*(positions.shape for positions in index))
+    # without axes, an array has one of length one
+    whole = {name: np.broadcast_to(a if index else a.reshape(()), shape) for name, a in values.items()}
+    return impacts, whole
 
 
 def varies_along(table: TrajectoryTable, number: int, names: Sequence[str]) -> dict[str, tuple[int, ...]]:
@@ -299,9 +304,7 @@ class ExpandedArray(BackendArray):
             for slab in slabs(dict(enumerate(out.shape))):
                 region = tuple(slab.values())
                 index = np.ix_(*(axis[part] for axis, part in zip(axes, region, strict=True)))
-                part = expand(self.table, number, index, [name])[1][name]
-                # without axes, a part has one of length one
-                out[region or ...] = part if region else part.reshape(())
+                out[region or ...] = expand(self.table, number, index, [name])[1][name]
         selected = tuple(0 if isinstance(part, int | np.integer) else slice(None) for part in key)
         return np.asarray(values[selected])
 
@@ -396,13 +399,8 @@ def expanded_slabs(
             region = tuple(slab.values())
             index = table.inputs.index(region)
             impacts, arrays = expand(table, number, index, [variable.name for variable in chosen])
-            shape = tuple(part.stop - part.start for part in region)
-            values = {}
-            for variable in chosen:
-                array = arrays.pop(variable.name)
-                array = np.broadcast_to(array if region else array.reshape(()), shape)
-                # copied only if it is a broadcast view or has another dtype
-                values[variable.name] = np.asarray(array, variable.dtype, order="C")
+            # copied only if it is a broadcast view or has another dtype
+            values = {v.name: np.asarray(arrays.pop(v.name), v.dtype, order="C") for v in chosen}
             yield ExpandedSlab(number, table.place(number), region, impacts, values)
 
 
