@@ -20,7 +20,7 @@ import pytest
 if TYPE_CHECKING:
     import xarray as xr
 
-    from .comparison.tolerances import Tolerances
+    from .comparison.compare import Tolerances
     from .comparison.verdict import Verdict
     from .contact.model import ForceModel
 

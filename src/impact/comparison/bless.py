@@ -16,8 +16,7 @@ from ..formatting import argument, safe_text
 from ..results.replay_command import command_start, describe_point, inputs_at
 from ..results.summary import summarize
 from ..results.xarray_backend import load, save_with_attributes
-from .compare import check_comparable, compare
-from .tolerances import Tolerances, effective_tolerances
+from .compare import Tolerances, check_comparable, compare, effective_tolerances
 from .verdict import Verdict
 
 

@@ -19,8 +19,7 @@ from ..results.replay_command import command_start
 from ..results.schema import kind_of, require_sweep
 from ..results.sweep import sweep_in_memory
 from ..results.xarray_backend import load
-from .compare import compare
-from .tolerances import Tolerances
+from .compare import Tolerances, compare
 from .verdict import Verdict
 
 
