@@ -17,7 +17,7 @@ import impact
 from impact.config.samples import unit_samples
 from impact.config.tables import Design
 from impact.errors import ConfigError, UsageError
-from impact.uncertainty.indices import indices_of, mixed_rows
+from impact.uncertainty.sensitivity import indices_of, mixed_rows
 
 from .conftest import ROOT, Run, problems_of
 
