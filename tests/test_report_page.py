@@ -28,8 +28,8 @@ from impact.contact.models import catalogue
 from impact.errors import ImpactError, UsageError
 from impact.formatting import percentage
 from impact.plots.kinds import KINDS, find_kind
+from impact.results.provenance import describe_point
 from impact.results.ranking import recommend
-from impact.results.replay_command import describe_point
 
 from .conftest import ROOT, Run, make_once
 

@@ -13,7 +13,7 @@ import xarray as xr
 from ..atomic import check_output
 from ..errors import ResultError, UsageError
 from ..formatting import argument, safe_text
-from ..results.replay_command import command_start, describe_point, inputs_at
+from ..results.provenance import command_start, describe_point, inputs_at
 from ..results.summary import summarize
 from ..results.xarray_backend import load, save_with_attributes
 from .compare import Tolerances, check_comparable, compare, effective_tolerances

@@ -22,7 +22,7 @@ from ..contact.variables import LAW_DIMS, OUTPUTS
 from ..errors import ResultError, UsageError, did_you_mean
 from ..formatting import argument, number, safe_text
 from ..results.attributes import read_attribute
-from ..results.replay_command import command_start
+from ..results.provenance import command_start
 from ..results.schema import (
     DEFAULT_RTOL_FACTOR,
     MODEL_METADATA,

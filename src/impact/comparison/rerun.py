@@ -14,8 +14,7 @@ from ..contact.model import ForceModel
 from ..engine.plan import Plan
 from ..engine.plugins import read_plugins
 from ..formatting import law_keys
-from ..results.provenance import config_of_part, stored_config
-from ..results.replay_command import command_start
+from ..results.provenance import command_start, config_of_part, stored_config
 from ..results.schema import kind_of, require_sweep
 from ..results.sweep import sweep_in_memory
 from ..results.xarray_backend import load

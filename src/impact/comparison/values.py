@@ -18,7 +18,7 @@ from ..contact.status import FIRST_FAILURE, Status
 from ..contact.variables import Variable
 from ..errors import UsageError
 from ..results import slabs
-from ..results.replay_command import inputs_of_model
+from ..results.provenance import inputs_of_model
 from ..results.schema import columns_along, inputs_of_scale, is_case, scale_of
 from .align import Alignment
 from .verdict import VariableComparison

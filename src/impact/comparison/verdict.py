@@ -15,7 +15,7 @@ from ..contact.units import names_in
 from ..contact.variables import OUTPUTS
 from ..display import Block, Displayed, Table, Wrapped
 from ..formatting import number, prefixed, safe_text
-from ..results.replay_command import describe_point, replay_command
+from ..results.provenance import describe_point, replay_command
 
 # in the order of a verdict: kinds that explain others first
 DifferenceKind = Literal["nothing in common", "physics config", "labels", "units", "missing variable", "values"]

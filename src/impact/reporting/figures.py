@@ -28,8 +28,8 @@ from ..plots.draw import draw, get_plot_data
 from ..plots.kinds import STUDIES, Choice, Kind, Look, kinds_of
 from ..plots.slices import numeric_axes, unit_of, varying_inputs
 from ..plots.style import encoded
+from ..results.provenance import command_start
 from ..results.ranking import MIN_ERROR_FLOOR
-from ..results.replay_command import command_start
 from ..results.schema import columns_along
 from ..results.selection import law_positions
 from ..results.slabs import distinct_points, is_computed, slabs

@@ -24,7 +24,7 @@ from ..contact.variables import OUTPUTS
 from ..display import Block, Displayed, Table, html_of
 from ..errors import UsageError, did_you_mean
 from ..formatting import argument, law_name, percentage, prefixed, safe_text
-from .replay_command import describe_point
+from .provenance import describe_point
 from .schema import columns_along, parts_of_laws, plain_unit, require_axes, require_sweep
 from .selection import as_keys, require_outputs, select, select_laws
 from .slabs import Slab, distinct_points, is_computed, over_varying_dims, read_slab, slabs, varying_dims

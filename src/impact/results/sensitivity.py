@@ -18,7 +18,7 @@ from ..display import Block, Displayed, Table
 from ..engine.plan import Plan
 from ..formatting import NO_BREAK, decimals, number, quantity, safe_text, scaled_unit
 from .attributes import read_attribute
-from .replay_command import describe_point
+from .provenance import describe_point
 from .schema import SENSITIVITY, parts_of_laws, plan_coordinates, provenance_attributes, template
 
 # probabilities of the quantiles

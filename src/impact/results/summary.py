@@ -24,7 +24,7 @@ from ..errors import ModelError, ResultError
 from ..formatting import label, number, prefixed, quantity, safe_text
 from .attributes import SummaryRecord
 from .layouts import read_inputs
-from .replay_command import command_start, inputs_at, replay_command
+from .provenance import command_start, inputs_at, replay_command
 from .schema import parts_of_laws
 from .slabs import MAX_SUMMARY_POINTS, distinct_points, is_computed, over_varying_dims, slabs
 from .trajectory_table import ExpandedSlab, TrajectoryTable, computed_array, expand, table_of_result
