@@ -46,13 +46,14 @@ def representative_regions(variables: Sequence[Variable], aligned: Alignment) ->
         dims = aligned.dims[variable.name]
         whole = {dim: slice(0, sizes[dim]) for dim in dims}
         parts: list[Region] = [whole]
-        if variable.name in known and "model" in dims:
-            dims_by_model = [_representative_dims(variable, aligned, datasets) for datasets in datasets_by_model]
+        if variable.name in known:
             parts = [
-                {d: whole[d] for d in dims} | {"model": slice(m, m + 1)} for m, dims in enumerate(dims_by_model)
+                {
+                    dim: slice(model, model + 1) if dim == "model" else whole[dim]
+                    for dim in _representative_dims(variable, aligned, datasets)
+                }
+                for model, datasets in enumerate(datasets_by_model if "model" in dims else [results])
             ]
-        elif variable.name in known:
-            parts = [{dim: whole[dim] for dim in _representative_dims(variable, aligned, results)}]
         points = sum(math.prod(part.stop - part.start for part in region.values()) for region in parts)
         if points > MAX_COMPARED_POINTS:
             expected = f"expected at most {MAX_COMPARED_POINTS:,}; select a part of the results"
@@ -78,17 +79,13 @@ def _representative_dims(
         candidates.insert(0, full | varying(variable.status))
     if variable.scale in DIMENSIONLESS_SCALES and all("e_out" in dataset for dataset in datasets):
         candidates.append(varying("e_out"))
-    chosen = []
-    for dims in candidates:
-        chosen.append(tuple(dim for dim in aligned.dims[variable.name] if dim in dims or dim == "model"))
-        if _points(chosen[-1], aligned.baseline.sizes) <= slabs.MAX_SUMMARY_POINTS:
-            return chosen[-1]
-    return min(chosen, key=lambda dims: _points(dims, aligned.baseline.sizes))
 
+    def points(dims: Iterable[str]) -> int:
+        """Count those of one model."""
+        return math.prod(aligned.baseline.sizes[dim] for dim in dims if dim != "model")
 
-def _points(dims: Iterable[str], sizes: Mapping[Hashable, int]) -> int:
-    """Count the points of one model."""
-    return math.prod(sizes[dim] for dim in dims if dim != "model")
+    chosen = [tuple(d for d in aligned.dims[variable.name] if d in dims or d == "model") for dims in candidates]
+    return next((dims for dims in chosen if points(dims) <= slabs.MAX_SUMMARY_POINTS), min(chosen, key=points))
 
 
 class Worst(NamedTuple):
@@ -190,15 +187,13 @@ def _ratio(
     missing = np.isnan(a.astype(float)), np.isnan(b.astype(float))
     with np.errstate(all="ignore"):
         difference = np.where(a == b, 0.0, np.abs(a.astype(float) - b.astype(float)))
+        largest = np.maximum(np.abs(a), np.abs(b))
         scale = _scale(variable, aligned, region, b.shape)
         # allow for the rounding of values that were stored in single precision
         lost = sum(float(np.finfo(values.dtype).eps) for values in (a, b) if values.dtype == np.float32)
-        allowed = tol * scale + (lost * np.maximum(np.abs(a), np.abs(b)) if lost else 0.0)
-        if variable.scale == "bounded by 10 rtol":
-            # a residual is noise: any value within its bound is accepted
-            counted = np.minimum(difference, np.maximum(np.abs(a), np.abs(b)))
-        else:
-            counted = difference
+        allowed = tol * scale + (lost * largest if lost else 0.0)
+        # a residual is noise: any value within its bound is accepted
+        counted = np.minimum(difference, largest) if variable.scale == "bounded by 10 rtol" else difference
         if not variable.has_tolerance:
             ratio = np.where(difference == 0.0, 0.0, np.inf)
         else:
