@@ -230,7 +230,7 @@ def witness_values(
     for model in np.unique(models).tolist():
         rows = np.flatnonzero(models == model)
         index = index_of(cells[rows], table.inputs.shape)
-        _, values = expand(table, numbers[model], index, list(values_by_name))
+        values = expand(table, numbers[model], index, list(values_by_name))
         for name, array in values_by_name.items():
             array[rows] = values[name]
     return values_by_name

@@ -157,7 +157,8 @@ def add_slab(summary: Summary, table: TrajectoryTable, slab: ExpandedSlab) -> No
     counted = {name: array[first or ...] for name, array in slab.values.items()}
     summary.add(counted, keys[0], slab.place, [part.start for part in slab.region])
     if "peak_indentation" in counted:
-        summary.add_depths(counted["peak_indentation"], np.fmin(slab.impacts.R1, slab.impacts.R2))
+        radius = smaller_radius_at(table.inputs, table.inputs.index(slab.region))
+        summary.add_depths(counted["peak_indentation"], radius)
 
 
 def summarize(dataset: xr.Dataset, max_failed_at: int = MAX_FAILED_AT) -> Summary:
@@ -257,8 +258,8 @@ def summarize_table(dataset: xr.Dataset, table: TrajectoryTable) -> tuple[Summar
     for (position, shape), (weight, names) in sorted(groups.items(), key=lambda item: item[0]):
         for slab in slabs(dict(enumerate(shape))):
             index = table.inputs.index(tuple(slab.values()))
-            expanded = expand(table, position, index, names)[1]
-            values = {name: np.asarray(array, dataset[name].dtype) for name, array in expanded.items()}
+            arrays = expand(table, position, index, names)
+            values = {name: np.asarray(array, dataset[name].dtype) for name, array in arrays.items()}
             for name, array in values.items():
                 so_far = extremes[name]
                 extremes[name] = so_far and so_far.add(array, weight)

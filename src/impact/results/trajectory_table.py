@@ -26,7 +26,7 @@ from ..array_types import Array
 from ..config.grid import Axis
 from ..config.input_names import InputName
 from ..config.tables import FIXED_STEP_INPUTS, OBLIQUE_INPUTS
-from ..contact.impacts import CHECKS, Impacts, check_inputs
+from ..contact.impacts import CHECKS, check_inputs
 from ..contact.model import Law
 from ..contact.output_formulas import Outputs, outputs
 from ..contact.records import CollisionResult, Record
@@ -147,8 +147,8 @@ def table_of_ranges(plan: Plan, load: Callable[[TrajectoryRange], Record]) -> Tr
     return TrajectoryTable(plan.inputs, plan.models, plan.maps, rows, frictions=frictions)
 
 
-def expand(table: TrajectoryTable, number: int, index: Index, names: Sequence[str]) -> tuple[Impacts, Outputs]:
-    """Compute the inputs and some outputs of a model, or of a pair by the number of its map, at cells of the grid.
+def expand(table: TrajectoryTable, number: int, index: Index, names: Sequence[str]) -> Outputs:
+    """Compute some outputs of a model, or of a pair by the number of its map, at cells of the grid.
 
     `index` has an integer array for each axis, which broadcast against each other; a plan without axes has one
     cell. The outputs have the shape of the index; along axes on which they do not vary they are views.
@@ -167,8 +167,7 @@ def expand(table: TrajectoryTable, number: int, index: Index, names: Sequence[st
     values = outputs(law, impacts, result, names, checked, of_friction)
     shape = np.broadcast_shapes(*(positions.shape for positions in index))
     # without axes, an array has one of length one
-    whole = {name: np.broadcast_to(a if index else a.reshape(()), shape) for name, a in values.items()}
-    return impacts, whole
+    return {name: np.broadcast_to(a if index else a.reshape(()), shape) for name, a in values.items()}
 
 
 def varies_along(table: TrajectoryTable, number: int, names: Sequence[str]) -> dict[str, tuple[int, ...]]:
@@ -304,7 +303,7 @@ class ExpandedArray(BackendArray):
             for slab in slabs(dict(enumerate(out.shape))):
                 region = tuple(slab.values())
                 index = np.ix_(*(axis[part] for axis, part in zip(axes, region, strict=True)))
-                out[region or ...] = expand(self.table, number, index, [name])[1][name]
+                out[region or ...] = expand(self.table, number, index, [name])[name]
         selected = tuple(0 if isinstance(part, int | np.integer) else slice(None) for part in key)
         return np.asarray(values[selected])
 
@@ -364,7 +363,7 @@ def lazy_dataset(template: xr.Dataset, table: TrajectoryTable, variables: Sequen
 
 
 class ExpandedSlab(NamedTuple):
-    """All values of a model, or of a pair, in a region of the grid, by name, and the impacts that they are of.
+    """All values of a model, or of a pair, in a region of the grid, by name.
 
     `number` is that of the map, and `place` the model, or the model and the friction law, see `TrajectoryTable`.
     """
@@ -372,7 +371,6 @@ class ExpandedSlab(NamedTuple):
     number: int
     place: tuple[int, ...]
     region: tuple[slice, ...]
-    impacts: Impacts
     values: dict[str, NDArray[Any]]
 
     def region_in(self, dims: Sequence[Hashable]) -> tuple[int | slice, ...]:
@@ -398,10 +396,10 @@ def expanded_slabs(
         for slab in slabs(sizes, chunks=chunks):
             region = tuple(slab.values())
             index = table.inputs.index(region)
-            impacts, arrays = expand(table, number, index, [variable.name for variable in chosen])
+            arrays = expand(table, number, index, [variable.name for variable in chosen])
             # copied only if it is a broadcast view or has another dtype
             values = {v.name: np.asarray(arrays.pop(v.name), v.dtype, order="C") for v in chosen}
-            yield ExpandedSlab(number, table.place(number), region, impacts, values)
+            yield ExpandedSlab(number, table.place(number), region, values)
 
 
 def in_memory(dataset: xr.Dataset) -> xr.Dataset:
