@@ -297,11 +297,11 @@ def _with_decimal_points(columns: Columns, decimal: str, looked_for: Sequence[st
             for name in names
             for line, cell in zip(columns.lines, columns.cells[name], strict=True)
         ]
-        numbers = {
-            sign: [(line, cell) for line, cell in cells if pattern.fullmatch(cell)]
+        signs = {
+            sign: numbers
             for sign, pattern in NUMBER_WITH.items()
+            if (numbers := [(line, cell) for line, cell in cells if pattern.fullmatch(cell)])
         }
-        signs = {sign: found for sign, found in numbers.items() if found}
         if len(signs) == 1:
             break
     places = {sign: f"{columns.source}:{found[0][0]}" for sign, found in signs.items()}
