@@ -39,7 +39,7 @@ CLI_IMPORTS = {
     # tables of names
     "completion": {"config", "conformance", "contact", "engine", "exporters", "plots"},
     # formats of a verdict, the picture of its differences, and functions whose keywords are deprecated for users
-    "compare": {"comparison.formats", "comparison.bless", "comparison.rerun", "plots"},
+    "compare": {"comparison.verdict", "comparison.bless", "comparison.rerun", "plots"},
     "sweep": {"uncertainty.sensitivity"},
     # the executors, which have no public function
     "execution": {"engine", "results.sweep"},

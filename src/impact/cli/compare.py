@@ -40,13 +40,13 @@ def compare(
     plot: PlotOption = None,
 ) -> None:
     """Compare a result with a baseline: exit 0 if equal, 1 if not (the first line says why), 2 on an error."""
-    from ..comparison import formats
+    from ..comparison.verdict import NoVerdict
 
     _check_plot(plot, new, baseline)
     try:
         verdict = options.call(impact.compare, locals())
     except ImpactError as error:
-        _print_outcome(formats.NoVerdict(str(new), str(baseline), error=str(error)), format)
+        _print_outcome(NoVerdict(str(new), str(baseline), error=str(error)), format)
         raise
     _report_verdict(verdict, format, plot)
 
@@ -90,14 +90,14 @@ def rerun(
 ) -> None:
     """Repeat a sweep or a calibration from its result alone, and compare the new values with the stored ones."""
     with execution(quiet) as keywords:
-        from ..comparison import formats
         from ..comparison.rerun import rerun as repeat
+        from ..comparison.verdict import NoVerdict
 
         _check_plot(plot, result)
         try:
             verdict = options.call(repeat, locals(), execute=partial(run_in_memory, **keywords))
         except ImpactError as error:
-            _print_outcome(formats.NoVerdict("the rerun", str(result), error=str(error)), format)
+            _print_outcome(NoVerdict("the rerun", str(result), error=str(error)), format)
             raise
     _report_verdict(verdict, format, plot)
 
@@ -132,14 +132,14 @@ def _report_verdict(verdict: Verdict, format: Format, plot: Path | None) -> None
 
 def _print_outcome(outcome: Verdict, format: Format) -> None:
     """Print a verdict or an error on stdout; an error has no table, its message is on stderr."""
-    from ..comparison import formats
+    from ..comparison import verdict
 
     match format:
         case "json":
             print(dump(outcome.as_dict()))
         case "junit":
-            print(formats.as_junit(outcome))
+            print(verdict.as_junit(outcome))
         case "markdown":
-            print(formats.as_markdown(outcome), end="")
+            print(verdict.as_markdown(outcome), end="")
         case "github":
-            print(formats.as_github(outcome))
+            print(verdict.as_github(outcome))
