@@ -257,10 +257,8 @@ def _publish(part: Path, path: Path, *, overwrite: bool) -> None:
         return
     try:
         os.link(part, path)
-    except FileExistsError:
-        raise
     except OSError:
-        # a file system without hard links: check for the file, then rename
-        if path.exists():
+        # the file exists; or the file system has no hard links: check for the file, then rename
+        if os.path.lexists(path):
             raise FileExistsError from None
         part.rename(path)
