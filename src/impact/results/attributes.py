@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import Annotated, Any, get_origin
@@ -87,6 +87,8 @@ ATTRIBUTE_TYPES: Mapping[str, Any] = {
     "summary": SummaryRecord,
     "tolerances": dict[str, Any],
 }
+# builds the validator of a type once
+_adapter: Callable[[Any], TypeAdapter[Any]] = cache(TypeAdapter)
 
 
 def read_attribute(attributes: Mapping[Any, Any], name: str, source: str = "", *, required: bool = False) -> Any:
@@ -106,14 +108,8 @@ def read_attribute(attributes: Mapping[Any, Any], name: str, source: str = "", *
     text = attributes.get(name)
     try:
         if isinstance(text, str):
-            return _adapter(name).validate_json(text, strict=True)
+            return _adapter(kind).validate_json(text, strict=True)
     except ValidationError:
         pass
     problem = "missing" if text is None else "not JSON of the expected type"
     raise ResultError(f"{source}{': ' if source else ''}attribute {name}: {problem}")
-
-
-@cache
-def _adapter(name: str) -> TypeAdapter[Any]:
-    """Build the validator of an attribute once."""
-    return TypeAdapter(ATTRIBUTE_TYPES[name])
