@@ -46,16 +46,12 @@ from .trajectory_table import (
     lazy_dataset,
     whole_stiffness,
 )
-from .validation import FACTORED_ATTRIBUTES, TABLE_VARIABLES, is_quantity
+from .validation import FACTORED_ATTRIBUTES, PREFIXES, TABLE_VARIABLES, WITNESSES, is_quantity
 
 N_WITNESSES = 1_000
 # tolerance of a witness, relative to the scale that `compare` uses for its variable
 WITNESS_TOLERANCE = 1e-12
 SLAB_ROWS = 2**16
-# what the variables of each type of trajectories begin with, which is also the name of their dimension
-PREFIXES: Mapping[type[Record], str] = {CollisionResult: "trajectory", TangentialResult: "tangential"}
-# by whether they are of pairs, the dimension of witnesses and the variable of their places
-WITNESSES = {False: ("witness", "witness_index"), True: ("pair_witness", "witness_pair_index")}
 
 # reads some values of a variable of the table, by its name; and the parts of some lengths that it consists of
 ReadVariable = Callable[[str, slice | NDArray[np.intp]], NDArray[Any]]

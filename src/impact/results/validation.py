@@ -13,7 +13,7 @@ import xarray as xr
 
 from ..config.input_names import InputName
 from ..config.tables import MATERIAL_KEYS, MATERIAL_QUANTITIES, SWEEP_QUANTITIES
-from ..contact.records import CollisionResult
+from ..contact.records import CollisionResult, Record
 from ..contact.tangential import TangentialResult
 from ..contact.variables import AXES, LAW_DIMS, OUTPUTS
 from ..errors import ResultError
@@ -35,15 +35,17 @@ from .slabs import is_computed, slabs
 TEXT_COORDINATES = frozenset(
     {"model", "friction", *MODEL_METADATA, *MATERIAL_KEYS, *CALIBRATION_TEXTS, "input"} - {"year"}
 ).union(STUDY_COORDINATES["board"])
+# what the variables of each type of trajectories begin with, which is also the name of their dimension
+PREFIXES: Mapping[type[Record], str] = {CollisionResult: "trajectory", TangentialResult: "tangential"}
+# by whether they are of pairs, the dimension of witnesses and the variable of their places
+WITNESSES = {False: ("witness", "witness_index"), True: ("pair_witness", "witness_pair_index")}
 # the trajectory table of a factored file, see `impact.results.layouts`
 TABLE_VARIABLES = frozenset(
     {
-        *(f"trajectory_{name}" for name in CollisionResult.columns()),
-        *(f"tangential_{name}" for name in TangentialResult.columns()),
+        *(f"{prefix}_{name}" for record, prefix in PREFIXES.items() for name in record.columns()),
         "trajectory_of_cell",
         "law_stiffness",
-        "witness_index",
-        "witness_pair_index",
+        *(places for _, places in WITNESSES.values()),
         *(f"witness_{name}" for name in OUTPUTS),
     }
 )
