@@ -67,13 +67,11 @@ def align_sweeps(new: xr.Dataset, baseline: xr.Dataset, *, subset: bool) -> Alig
             text = f"what varies along the axis {safe_text(axis)} is {got}, in BASELINE {expected}"
             faults.append(Difference("nothing in common", axis, text))
             continue
-        positions[axis] = match_labels(
-            [a[name].values for name in columns[0]], [b[name].values for name in columns[0]]
-        )
         # the column that gives the axis its name comes first
         names = sorted(columns[0], key=lambda name: name != axis)
-        labels = [[coords[name].values for name in names] for coords in (a, b)]
-        faults += _unmatched_labels(labels[0], labels[1], names, positions[axis], subset=subset)
+        new_labels, labels = ([coords[name].values for name in names] for coords in (a, b))
+        positions[axis] = match_labels(new_labels, labels)
+        faults += _unmatched_labels(new_labels, labels, names, positions[axis], subset=subset)
     faults += _changed_scalars(a, b, "nothing in common" if subset else "physics config")
     if any(fault.kind == "nothing in common" for fault in faults):
         return Alignment(xr.Dataset(), xr.Dataset(), {}, tuple(faults))

@@ -481,8 +481,7 @@ def with_depths(summary: Summary, dataset: xr.Dataset) -> Summary:
         for slab in slabs(depth.sizes):
             radius = smaller_radius_at(inputs, inputs.index([slab.get(a.name, slice(1)) for a in inputs.axes]))
             absent = tuple(number for number, axis in enumerate(inputs.axes) if axis.name not in dims)
-            radius = radius.squeeze(absent) if inputs.axes else radius
-            summary.add_depths(depth.isel(slab).values, radius, weight)
+            summary.add_depths(depth.isel(slab).values, radius.squeeze(absent), weight)
     return summary
 
 
