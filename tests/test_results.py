@@ -21,7 +21,7 @@ from impact.engine.run import DEFAULT_RUN
 from impact.engine.trajectories import trajectory_ranges
 from impact.plots.labels import symbol
 from impact.results.schema import dataset_template, stored_variables, udunits
-from impact.results.trajectory_table import TrajectoryRows, TrajectoryTable, in_memory, lazy_dataset
+from impact.results.trajectory_table import TrajectoryTable, in_memory, lazy_dataset
 
 from .conftest import WIDE
 
@@ -195,8 +195,9 @@ def test_the_size_and_order_of_ranges_change_no_bit(wide: xr.Dataset, size: int,
     plan = Plan(parse_config(WIDE, [f"solver.collapse={collapse}"]))
     ranges = sorted(trajectory_ranges(plan.maps, size), key=lambda part: hash((part.number, "shuffled")))
     finished = {(part.model, part.start): columns for part, columns in integrate_ranges(plan, ranges, DEFAULT_RUN)}
-    rows = TrajectoryRows(plan.maps, lambda model, start, stop: finished[model, start], size)
-    table = TrajectoryTable(plan.inputs, plan.models, plan.maps, rows, (None,) * len(plan.models))
+    table = TrajectoryTable(
+        plan.inputs, plan.models, plan.maps, lambda model, part: finished[model, part.start], segment=size
+    )
     # the overrides of the config are an attribute
     template = dataset_template(plan).assign_attrs(config_set=wide.attrs["config_set"])
     dataset = lazy_dataset(template, table, stored_variables(plan))

@@ -164,7 +164,7 @@ def _trajectories(table: TrajectoryTable, positions: Sequence[int]) -> Iterator[
         law, trajectory_map = table.laws[position], table.maps[position]
         # before they are read
         _check_size(trajectory_map.count * len(TRAJECTORY) * VALUE_BYTES)
-        rows = table.rows.take(position, np.arange(trajectory_map.count))
+        rows = table.take(position, np.arange(trajectory_map.count))
         impacts = build_impacts(table.inputs, law, index)
         _check_size(impacts.K.size * VALUE_BYTES)
         columns = {

@@ -346,7 +346,7 @@ class ExtendedPlan(Plan):
                     index[old_axis] = self.positions[axis].positions[coordinate]
             is_known[of_cell] = True
             old_rows[of_cell] = old_map.rows(tuple(index))
-        stored = table.rows.take(law, old_rows)
+        stored = table.take(law, old_rows)
         # a status that was assigned before integration may differ between the two sweeps
         status = self.columns_of(trajectory_range)["status"]
         is_known &= np.where(

@@ -40,7 +40,6 @@ from .netcdf import RegionValues, StoredArray
 from .schema import SLIP_INPUTS, attributes_of, count_points, derived_names, scale_of, stored_variables
 from .trajectory_table import (
     MAX_STIFFNESS_VALUES,
-    TrajectoryRows,
     TrajectoryTable,
     expand,
     lazy_dataset,
@@ -166,7 +165,7 @@ def table_values(table: TrajectoryTable, variables: Sequence[Variable]) -> Itera
         start, prefix = starts[trajectory_map.record], PREFIXES[trajectory_map.record]
         for first in range(0, trajectory_map.count, SLAB_ROWS):
             rows = np.arange(first, min(first + SLAB_ROWS, trajectory_map.count))
-            for name, array in vars(table.rows.take(law, rows)).items():
+            for name, array in vars(table.take(law, rows)).items():
                 yield f"{prefix}_{name}", (slice(start + first, start + first + rows.size),), array
         starts[trajectory_map.record] += trajectory_map.count
     cells = [trajectory_map.of_cell for trajectory_map in table.maps if trajectory_map.of_cell is not None]
@@ -273,12 +272,11 @@ def stored_table(dataset: xr.Dataset, sizes: Mapping[str, int], read: ReadVariab
         prefix = PREFIXES[record_type]
         return record_type(**{name: read(f"{prefix}_{name}", chosen) for name in record_type.columns()})
 
-    trajectory_rows = TrajectoryRows(maps, lambda law, *ends: read_rows(law, slice(*ends)), pick=read_rows)
     summary = read_attribute(dataset.attrs, "summary") or None
     if summary is not None:
         _check_summary(summary, dataset, inputs.shape)
     stored_laws = tuple(_stored_law(key, law) for key, law in laws.items())
-    return TrajectoryTable(inputs, stored_laws, tuple(maps), trajectory_rows, summary, frictions)
+    return TrajectoryTable(inputs, stored_laws, tuple(maps), read_rows, summary, frictions, pick=read_rows)
 
 
 def _axis_numbers(inputs: Inputs, names: Sequence[str]) -> tuple[int, ...]:

@@ -60,63 +60,27 @@ MAX_INDEXED_BYTES = 16 * 2**30
 
 
 @dataclass(frozen=True)
-class TrajectoryRows:
-    """The integrated trajectories of each law, read in segments when they are needed.
-
-    read : returns the trajectories of a law from a start to a stop: `read(law, start, stop)`
-    pick : returns a few trajectories of a law by their increasing row numbers; None if there are only segments
-    """
-
-    maps: Sequence[TrajectoryMap]
-    read: Callable[[int, int, int], Record]
-    segment: int = RANGE_TRAJECTORIES
-    pick: Callable[[int, NDArray[np.intp]], Record] | None = None
-    # of each type, the law whose trajectories were read last, and all of them, if its cells share them
-    _whole: dict[type[Record], tuple[int, Record]] = field(default_factory=dict)
-
-    def take(self, model: int, rows: NDArray[np.intp]) -> Any:
-        """Read trajectories of a law by their row numbers, a record of arrays of the shape of `rows`."""
-        trajectory_map = self.maps[model]
-        last, whole = self._whole.get(trajectory_map.record, (None, trajectory_map.record.blank(0)))
-        if self.pick is not None and last != model and rows.size < trajectory_map.count // FEW_ROWS:
-            distinct, position = np.unique(rows, return_inverse=True)
-            return self.pick(model, distinct).take(position.reshape(rows.shape))
-        if not trajectory_map.is_shared:
-            flat = self._segments(model, rows.reshape(-1))
-            return flat.take(np.arange(rows.size).reshape(rows.shape))
-        if last != model:
-            # cells share trajectories in any order: keep all of them
-            whole = self._segments(model, np.arange(trajectory_map.count))
-            self._whole[trajectory_map.record] = model, whole
-        return whole.take(rows)
-
-    def _segments(self, model: int, rows: NDArray[np.intp]) -> Record:
-        count = self.maps[model].count
-        size = even_size(count, self.segment)
-        trajectories, segment = self.maps[model].record.blank(rows.size), rows // size
-        for number in np.unique(segment).tolist():
-            positions, start = np.flatnonzero(segment == number), number * size
-            read = self.read(model, start, min(start + size, count))
-            trajectories.put(positions, read.take(rows[positions] - start))
-        return trajectories
-
-
-@dataclass(frozen=True)
 class TrajectoryTable:
     """The trajectories of a sweep, with everything else that the outputs depend on.
 
     laws : the models; those of a file have no formulas
     maps : of each model, then of the pairs of each model with each friction law
+    read : returns a segment of the integrated trajectories of a map, by its number, when they are needed
     summary : of all points, if the file contains one
     frictions : the kinds of the friction laws by key
+    pick : returns a few trajectories of a map by their increasing row numbers; None if there are only segments
     """
 
     inputs: Inputs
     laws: tuple[Law, ...]
     maps: tuple[TrajectoryMap, ...]
-    rows: TrajectoryRows
+    read: Callable[[int, slice], Record]
     summary: SummaryRecord | None = None
     frictions: Mapping[str, FrictionKind] = field(default_factory=dict)
+    pick: Callable[[int, NDArray[np.intp]], Record] | None = None
+    segment: int = RANGE_TRAJECTORIES
+    # of each type, the map whose trajectories were read last, and all of them, if its cells share them
+    _whole: dict[type[Record], tuple[int, Record]] = field(default_factory=dict, init=False)
 
     def numbers(self, of_friction: bool) -> range:
         """The numbers of the maps of the models, or of the pairs."""
@@ -138,13 +102,40 @@ class TrajectoryTable:
         """Find, by model, the checks of `impact.contact.impacts.check_inputs` that are necessary at each point."""
         return tuple(checks_that_may_fail(self.inputs, law) for law in self.laws)
 
+    def take(self, number: int, rows: NDArray[np.intp]) -> Any:
+        """Read trajectories of a map by their row numbers, a record of arrays of the shape of `rows`."""
+        trajectory_map = self.maps[number]
+        last, whole = self._whole.get(trajectory_map.record, (None, trajectory_map.record.blank(0)))
+        if self.pick is not None and last != number and rows.size < trajectory_map.count // FEW_ROWS:
+            distinct, position = np.unique(rows, return_inverse=True)
+            return self.pick(number, distinct).take(position.reshape(rows.shape))
+        if not trajectory_map.is_shared:
+            flat = self._segments(number, rows.reshape(-1))
+            return flat.take(np.arange(rows.size).reshape(rows.shape))
+        if last != number:
+            # cells share trajectories in any order: keep all of them
+            whole = self._segments(number, np.arange(trajectory_map.count))
+            self._whole[trajectory_map.record] = number, whole
+        return whole.take(rows)
+
+    def _segments(self, number: int, rows: NDArray[np.intp]) -> Record:
+        count = self.maps[number].count
+        size = even_size(count, self.segment)
+        trajectories, segments = self.maps[number].record.blank(rows.size), rows // size
+        for segment in np.unique(segments).tolist():
+            positions, start = np.flatnonzero(segments == segment), segment * size
+            read = self.read(number, slice(start, min(start + size, count)))
+            trajectories.put(positions, read.take(rows[positions] - start))
+        return trajectories
+
 
 def table_of_ranges(plan: Plan, load: Callable[[TrajectoryRange], Record]) -> TrajectoryTable:
     """Build the trajectory table of a plan from its finished ranges."""
     range_at = {(finished.model, finished.start): finished for finished in plan.ranges}
-    rows = TrajectoryRows(plan.maps, lambda model, start, stop: load(range_at[model, start]))
     frictions = {friction.key: friction.kind for friction in plan.frictions}
-    return TrajectoryTable(plan.inputs, plan.models, plan.maps, rows, frictions=frictions)
+    return TrajectoryTable(
+        plan.inputs, plan.models, plan.maps, lambda law, part: load(range_at[law, part.start]), None, frictions
+    )
 
 
 def expand(table: TrajectoryTable, number: int, index: Index, names: Sequence[str]) -> Outputs:
@@ -158,10 +149,10 @@ def expand(table: TrajectoryTable, number: int, index: Index, names: Sequence[st
     impacts = build_impacts(table.inputs, law, index)
     with np.errstate(all="ignore"):
         checked = check_inputs(law, impacts, table.checks[model])
-    result = table.rows.take(model, table.maps[model].rows(index))
+    result = table.take(model, table.maps[model].rows(index))
     of_friction = None
     if friction:
-        tangential = table.rows.take(number, table.maps[number].rows(index))
+        tangential = table.take(number, table.maps[number].rows(index))
         kind = table.frictions[table.keys(number)[1]]
         of_friction = (build_oblique(table.inputs, impacts, index), tangential, kind)
     values = outputs(law, impacts, result, names, checked, of_friction)
