@@ -11,7 +11,7 @@ import itertools
 import json
 import math
 import operator
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -52,9 +52,8 @@ N_WITNESSES = 1_000
 WITNESS_TOLERANCE = 1e-12
 SLAB_ROWS = 2**16
 
-# reads some values of a variable of the table, by its name; and the parts of some lengths that it consists of
-ReadVariable = Callable[[str, slice | NDArray[np.intp]], NDArray[Any]]
-ReadParts = Callable[[str, Sequence[int]], Iterator[NDArray[Any]]]
+# the variables of the table by name
+Arrays = Mapping[str, StoredArray]
 
 
 def read_layout(variables: Mapping[str, xr.Variable], attributes: Mapping[str, object]) -> tuple[str, xr.Dataset]:
@@ -75,9 +74,7 @@ def read_layout(variables: Mapping[str, xr.Variable], attributes: Mapping[str, o
     dataset = xr.Dataset(witnesses, coordinates, attributes)
     # without xarray's indexing, which takes longer than to read a few values
     lazy: dict[str, Any] = {name: variable._data for name, variable in stored.items() if name not in witnesses}
-    arrays: dict[str, StoredArray] = {name: indexed.array for name, indexed in lazy.items()}
-    sizes = {name: array.shape[0] for name, array in arrays.items()}
-    table = stored_table(dataset, sizes, lambda name, positions: arrays[name].read((positions,)))
+    table = stored_table(dataset, {name: indexed.array for name, indexed in lazy.items()})
     quantities = [
         replace(variable, dtype=stored[f"witness_{name}"].dtype.str[1:])
         for name, variable in OUTPUTS.items()
@@ -231,7 +228,7 @@ def witness_values(
     return values_by_name
 
 
-def stored_table(dataset: xr.Dataset, sizes: Mapping[str, int], read: ReadVariable) -> TrajectoryTable:
+def stored_table(dataset: xr.Dataset, arrays: Arrays) -> TrajectoryTable:
     """Read the trajectory table of a factored file; its rows are read when they are needed."""
     laws: dict[str, LawRecord] = read_attribute(dataset.attrs, "laws", required=True)
     if list(laws) != [str(key) for key in dataset["model"].values]:
@@ -241,28 +238,22 @@ def stored_table(dataset: xr.Dataset, sizes: Mapping[str, int], read: ReadVariab
     if along != names or len({*names}) < len(names):
         raise ResultError("is not a readable result (axes: not those of its grid)")
     inputs = read_inputs(dataset, names)
-
-    def parts(name: str, lengths: Sequence[int]) -> Iterator[NDArray[Any]]:
-        if sizes.get(name, 0) != sum(lengths):
-            raise ValueError
-        return (read(name, part) for part in _consecutive(lengths))
-
     pairs: list[PairRecord] = read_attribute(dataset.attrs, "pairs")
     frictions: dict[str, FrictionKind] = read_attribute(dataset.attrs, "frictions")
     keys = [str(key) for key in dataset["friction"].values] if "friction" in dataset else []
     if len(pairs) != len(laws) * len(frictions) or list(frictions) != keys:
         raise ResultError("is not a readable result (pairs: not those of its models and friction laws)")
     try:
-        maps = _stored_maps(inputs, [*laws.values(), *pairs], len(laws), parts)
-        inputs = replace(inputs, stiffness=_read_stiffness(inputs, laws, parts))
+        maps = _stored_maps(inputs, [*laws.values(), *pairs], len(laws), arrays)
+        inputs = replace(inputs, stiffness=_read_stiffness(inputs, laws, arrays))
         rows: list[slice] = []
         for record_type, prefix in PREFIXES.items():
             of_type = [trajectory_map.count for trajectory_map in maps if trajectory_map.record is record_type]
             if of_type:
                 rows += _consecutive(of_type)
-                if {sizes[f"{prefix}_{name}"] for name in record_type.columns()} != {sum(of_type)}:
+                if {arrays[f"{prefix}_{name}"].shape for name in record_type.columns()} != {(sum(of_type),)}:
                     raise ValueError
-                _check_trajectory_statuses(record_type, sum(of_type), read)
+                _check_trajectory_statuses(record_type, arrays[f"{prefix}_status"])
     except (KeyError, TypeError, ValueError, IndexError, OverflowError):
         raise ResultError("is not a readable result (its laws do not fit its table)") from None
 
@@ -270,7 +261,7 @@ def stored_table(dataset: xr.Dataset, sizes: Mapping[str, int], read: ReadVariab
         start, record_type = rows[law].start, maps[law].record
         chosen = slice(start + part.start, start + part.stop) if isinstance(part, slice) else start + part
         prefix = PREFIXES[record_type]
-        return record_type(**{name: read(f"{prefix}_{name}", chosen) for name in record_type.columns()})
+        return record_type(**{name: arrays[f"{prefix}_{name}"].read((chosen,)) for name in record_type.columns()})
 
     summary = read_attribute(dataset.attrs, "summary") or None
     if summary is not None:
@@ -287,8 +278,15 @@ def _axis_numbers(inputs: Inputs, names: Sequence[str]) -> tuple[int, ...]:
     return tuple(numbers[name] for name in names)
 
 
+def _parts(arrays: Arrays, name: str, lengths: Sequence[int]) -> Iterator[NDArray[Any]]:
+    """Read the parts of some lengths that a variable consists of; a ValueError if it has another length."""
+    if (arrays[name].shape[0] if name in arrays else 0) != sum(lengths):
+        raise ValueError
+    return (arrays[name].read((part,)) for part in _consecutive(lengths))
+
+
 def _stored_maps(
-    inputs: Inputs, laws: Sequence[LawRecord | PairRecord], models: int, parts: ReadParts
+    inputs: Inputs, laws: Sequence[LawRecord | PairRecord], models: int, arrays: Arrays
 ) -> list[TrajectoryMap]:
     """Read the trajectory of each cell, of each model and pair; raise a ValueError for one that does not exist."""
     maps = []
@@ -297,7 +295,7 @@ def _stored_maps(
         record = CollisionResult if position < models else TangentialResult
         maps.append(TrajectoryMap(position, axes, tuple(inputs.shape[axis] for axis in axes), record=record))
     shared = [model for model, law in enumerate(laws) if law.is_shared]
-    cells = parts("trajectory_of_cell", [maps[model].cells for model in shared])
+    cells = _parts(arrays, "trajectory_of_cell", [maps[model].cells for model in shared])
     for model, of_cell in zip(shared, cells, strict=True):
         count = laws[model].trajectories
         if of_cell.dtype.kind != "i" or of_cell.min() < 0 or of_cell.max() >= count:
@@ -307,7 +305,7 @@ def _stored_maps(
     return maps
 
 
-def _read_stiffness(inputs: Inputs, laws: Mapping[str, LawRecord], parts: ReadParts) -> dict[str, Column]:
+def _read_stiffness(inputs: Inputs, laws: Mapping[str, LawRecord], arrays: Arrays) -> dict[str, Column]:
     """Read K of each law with a rule for it, over the axes that it depends on; see `Inputs`."""
     axes = {
         f"{key}.K": _axis_numbers(inputs, law.stiffness_axes)
@@ -315,7 +313,7 @@ def _read_stiffness(inputs: Inputs, laws: Mapping[str, LawRecord], parts: ReadPa
         if law.stiffness_axes is not None
     }
     shapes = [tuple(inputs.shape[axis] for axis in numbers) for numbers in axes.values()]
-    values = parts("law_stiffness", [math.prod(shape) for shape in shapes])
+    values = _parts(arrays, "law_stiffness", [math.prod(shape) for shape in shapes])
     return {
         name: Column(numbers, np.reshape(K, shape))
         for (name, numbers), shape, K in zip(axes.items(), shapes, values, strict=True)
@@ -340,12 +338,12 @@ def _check_summary(summary: SummaryRecord, dataset: xr.Dataset, shape: tuple[int
         raise ResultError("is not a readable result (summary: not that of its points)")
 
 
-def _check_trajectory_statuses(record: type[Record], rows: int, read: ReadVariable) -> None:
+def _check_trajectory_statuses(record: type[Record], array: StoredArray) -> None:
     """Refuse unknown statuses, since the computed ones would be unknown as well."""
     # by the bits of a status
     is_known = np.isin(np.arange(2**8), [*record.statuses])
-    for first in range(0, rows, SLAB_ROWS):
-        values = read(f"{PREFIXES[record]}_status", slice(first, min(first + SLAB_ROWS, rows)))
+    for first in range(0, array.shape[0], SLAB_ROWS):
+        values = array.read((slice(first, first + SLAB_ROWS),))
         if values.dtype != np.int8 or not is_known[values.view(np.uint8)].all():
             raise ValueError
 
