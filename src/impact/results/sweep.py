@@ -424,7 +424,12 @@ def store_result(
         run.on_progress(replace(progress, points=points, failed=max(summary.failed, progress.failed)))
         run.check_stop()
 
-    def values_of_points() -> Iterator[RegionValues]:
+    def values() -> Iterator[RegionValues]:
+        if plan.layout == "factored":
+            for stored in table_values(table, variables):
+                yield stored
+                report(0)
+            return
         chunks = plan.config.output.chunks
         lengths = [chunks.get(axis.name, axis.size) for axis in plan.config.axes] if chunks else []
         for slab in expanded_slabs(table, variables, lengths):
@@ -434,13 +439,7 @@ def store_result(
             add_slab(summary, table, slab)
             report(summary.points)
 
-    def values_of_table() -> Iterator[RegionValues]:
-        for stored in table_values(table, variables):
-            yield stored
-            report(0)
-
-    values = values_of_table() if plan.layout == "factored" else values_of_points()
     with atomic_write(output, overwrite=run.overwrite or plan.replaces, part=part) as sink:
-        seal = write_sealed(sink, output, template, values, plan.config.output)
+        seal = write_sealed(sink, output, template, values(), plan.config.output)
     result.encoding = {"source": str(output), "seal": seal, "layout": plan.layout}
     return SweepOutcome(result, summary, progress.of_trajectories, output=output)
