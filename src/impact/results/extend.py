@@ -29,7 +29,7 @@ from ..engine.inputs import Inputs
 from ..engine.plan import Plan
 from ..engine.plugins import Plugins, read_plugins
 from ..engine.run import ProgressCallback, Run, ignore, never
-from ..engine.trajectories import ReusedPart, TrajectoryMap, TrajectoryRange, keys_of, model_of
+from ..engine.trajectories import ReusedPart, TrajectoryRange, keys_of, model_of
 from ..errors import ResultError, UsageError
 from ..formatting import argument, safe_text
 from .attributes import read_attribute
@@ -336,14 +336,13 @@ class ExtendedPlan(Plan):
         is_known = np.zeros(trajectory_range.size, bool)
         old_rows = np.zeros(trajectory_range.size, np.intp)
         if {*old_map.axes} <= {self.positions[axis].axis for axis in trajectory_map.axes}:
-            cells, of_cell = self._cells_of(trajectory_range)
-            is_old = self._is_old(trajectory_map, cells)
-            cells, of_cell = cells[is_old], of_cell[is_old]
-            index = [np.zeros(cells.shape, np.intp) for _ in self.old.config.axes]
-            for axis, coordinate in trajectory_map.index_along(cells).items():
+            of_cell, is_old, along = self._old_cells(trajectory_range)
+            of_cell = of_cell[is_old]
+            index = [np.zeros(of_cell.shape, np.intp) for _ in self.old.config.axes]
+            for axis, positions in along.items():
                 old_axis = self.positions[axis].axis
                 if old_axis is not None:
-                    index[old_axis] = self.positions[axis].positions[coordinate]
+                    index[old_axis] = positions[is_old]
             is_known[of_cell] = True
             old_rows[of_cell] = old_map.rows(tuple(index))
         stored = table.take(law, old_rows)
@@ -364,24 +363,23 @@ class ExtendedPlan(Plan):
         related = [number for number, other in enumerate(self.laws) if law in (other, model_of(other))]
         if None in map(self.old_law, related) or any(is_new_along):
             return super().reused(trajectory_range)
-        cells, of_cell = self._cells_of(trajectory_range)
+        of_cell, is_old_cell, _ = self._old_cells(trajectory_range)
         is_old = np.ones(trajectory_range.size, bool)
-        is_old[of_cell[~self._is_old(trajectory_map, cells)]] = False
+        is_old[of_cell[~is_old_cell]] = False
         return is_old, trajectory_range.record.blank(int(np.count_nonzero(is_old)))
 
-    def _cells_of(self, trajectory_range: TrajectoryRange) -> tuple[IndexArray, IndexArray]:
-        """List the cells of the trajectories of a range, and the positions of their trajectories in it."""
-        of_cell = self.maps[trajectory_range.model].of_cell
-        if of_cell is None:
-            return trajectory_range.rows, np.arange(trajectory_range.size)
-        cells = np.flatnonzero((of_cell >= trajectory_range.start) & (of_cell < trajectory_range.stop))
-        return cells, of_cell[cells].astype(np.intp) - trajectory_range.start
-
-    def _is_old(self, trajectory_map: TrajectoryMap, cells: IndexArray) -> NDArray[np.bool_]:
-        is_old = np.ones(cells.shape, bool)
-        for axis, coordinate in trajectory_map.index_along(cells).items():
-            is_old &= self.positions[axis].positions[coordinate] >= 0
-        return is_old
+    def _old_cells(
+        self, trajectory_range: TrajectoryRange
+    ) -> tuple[IndexArray, NDArray[np.bool_], dict[int, IndexArray]]:
+        """List for the cells of a range the trajectory in it, if the old result has it, and where along axes."""
+        trajectory_map = self.maps[trajectory_range.model]
+        cells, of_cell = trajectory_range.rows, trajectory_map.of_cell
+        if of_cell is not None:
+            cells = np.flatnonzero((of_cell >= trajectory_range.start) & (of_cell < trajectory_range.stop))
+        numbers = cells if of_cell is None else of_cell[cells].astype(np.intp)
+        along = {a: self.positions[a].positions[cell] for a, cell in trajectory_map.index_along(cells).items()}
+        is_old = np.logical_and.reduce([np.ones(cells.shape, bool), *(where >= 0 for where in along.values())])
+        return numbers - trajectory_range.start, is_old, along
 
     def fill(self, slab: ExpandedSlab) -> None:
         """Copy the values of an old result without trajectories into the values of a slab.
