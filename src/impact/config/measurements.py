@@ -347,7 +347,7 @@ def _column_of(header: str, outputs: Sequence[str], models: Mapping[str, ForceMo
         output = measured if header != SIGMA else next(iter(outputs), "e_out")
         if outputs and output not in outputs:
             raise value_error(f"got no column {output}, expected one next to its standard deviation")
-        return _Column("sigma", output, _deviation(output))
+        return _Column("sigma", output, replace(DEVIATION, unit=OUTPUTS[output].unit))
     name = InputName.parse(header)
     try:
         quantity = name.quantity(models)
@@ -363,10 +363,6 @@ def _column_of(header: str, outputs: Sequence[str], models: Mapping[str, ForceMo
     if quantity.words:
         raise value_error(f"got words, expected numbers; all points have one {name.key}")
     return _Column("input", str(name), replace(quantity, infinite=False))
-
-
-def _deviation(output: str) -> Quantity:
-    return replace(DEVIATION, unit=OUTPUTS[output].unit)
 
 
 def read_data_file(draft: Draft) -> tuple[dict[KeyPath, object], list[ConfigError], list[str]]:
@@ -521,7 +517,7 @@ def _read_sigma(value: object, output: str, n_points: int) -> tuple[tuple[Any, .
     cells = value if isinstance(value, list) else [value]
     if cells is value and len(cells) != n_points:
         return (), [(path, f"got {len(cells)} values, expected {n_points}, one for each point")]
-    values, problems = read_cells(cells, _deviation(output), None)
+    values, problems = read_cells(cells, replace(DEVIATION, unit=OUTPUTS[output].unit), None)
     texts = [(index, message) for index, message in problems if isinstance(cells[index], str)]
     if cells is not value:
         return tuple(values) * n_points, [(path, message) for _, message in texts]
