@@ -68,7 +68,7 @@ def complete_selection(context: typer.Context) -> list[str]:
 
 def complete_setting() -> list[str]:
     """`TABLE.KEY=` of the keys of a config."""
-    from ..config.lines import KEYS_BY_TABLE
+    from ..config.tables import KEYS_BY_TABLE
 
     keys = ["title", "models", "frictions"]
     keys += [f"{table}.{key}" for table, names in KEYS_BY_TABLE.items() for key in names]

@@ -20,8 +20,10 @@ from ..errors import ConfigError, MissingFileError, UsageError
 from ..formatting import argument, safe_text, type_of
 from .files import (
     as_table,
+    key_lines,
     override_text,
     parse_document,
+    path_text,
     read_override,
     read_text,
     read_value,
@@ -30,10 +32,10 @@ from .files import (
 )
 from .input_names import InputName, input_values
 from .library import STARTER_CONFIG, library
-from .lines import MAX_PROBLEM_LINES, key_lines, path_text
 from .quantities import VALUE_FORMS, ConfigProblem, KeyPath
 from .tables import MATERIAL_KEYS, SWEEP_DEFAULTS, SWEEP_QUANTITIES, Loss, Noise, expand_laws
 
+MAX_PROBLEM_LINES = 100
 # keys of [sweep] that arrange inputs
 NO_INPUTS = (("sweep", "zip"), ("sweep", "cases"))
 # inputs that a setting of another one replaces

@@ -1,4 +1,7 @@
-"""Plain data from the sources of a config: files, texts, mappings and overrides, none of which is trusted."""
+"""Plain data from the sources of a config: files, texts, mappings and overrides, none of which is trusted.
+
+Texts are TOML, in which the lines of keys are found for messages, and into which values are written.
+"""
 
 from __future__ import annotations
 
@@ -6,18 +9,17 @@ import contextlib
 import json
 import re
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from pydantic_core import PydanticCustomError
 
 from ..errors import ConfigError, ImpactError, MissingFileError, UsageError
 from ..formatting import safe_text
-from .lines import BARE_KEY
 from .quantities import ConfigProblem, KeyPath, Quantity, as_text
 
 MAX_CONFIG_BYTES = 1_000_000  # size of a TOML file
@@ -29,8 +31,16 @@ MAX_KEY_PARTS = 64  # dots of a key: TOML parsers take quadratic time for longer
 RESULT_MAGIC = b"impact result\n"
 # workbooks of Excel and LibreOffice, old workbooks, and files of Parquet
 NO_TEXT = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0", b"PAR1")
+BARE_KEY = r"[A-Za-z0-9_-]++"
 _PART = rf"""(?:{BARE_KEY}|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')"""
 LONG_KEY = re.compile(rf"(?<![\w.-])(?:{_PART}[ \t]*+\.[ \t]*+){{{MAX_KEY_PARTS + 1}}}")
+TOML_TOKEN = re.compile(
+    r"""(?P<skip>[ \t\r]+ | \#[^\n]*)
+      | \"{3} (?: \\. | [^\\] )*? \"{3,5} | '{3} .*? '{3,5}
+      | " (?: \\. | [^"\\] )* " | '[^']*' | [^\s\[\]{}=,.\#"']+
+      | .""",
+    re.DOTALL | re.VERBOSE,
+)
 
 
 def file_hint(path: Path, content: bytes) -> str:
@@ -348,3 +358,86 @@ def read_value(text: str) -> object:
     except ConfigError:
         return text
     return table["value"] if isinstance(table, dict) and table.keys() == {"value"} else text
+
+
+def path_text(path: KeyPath) -> str:
+    """Write a path for a message.
+
+    >>> path_text(("materials", "my steel", "E")), path_text(("sweep", "e", 3))
+    ('materials."my steel".E', 'sweep.e[3]')
+    """
+    shown = ""
+    for part in path:
+        if isinstance(part, int):
+            shown += f"[{part}]"
+        else:
+            bare = re.fullmatch(BARE_KEY, part)
+            shown += ("." if shown else "") + (safe_text(part, 60) if bare else f'"{safe_text(part, 60)}"')
+    return shown
+
+
+def key_lines(text: str) -> dict[KeyPath, int]:
+    """Find the line of every key of a valid TOML text, and of list elements on another line than their list.
+
+    >>> key_lines("a = 1\\n[b]\\nc.d = [\\n  1,\\n  2]")[("b", "c", "d", 1)]
+    5
+    """
+    lines: dict[KeyPath, int] = {}
+    tokens = _tokens(text)
+
+    def read_key(token: _Token, base: KeyPath, end: str) -> KeyPath:
+        """Read a key or header, and record its line, also that of the tables that a dotted one implies."""
+        started, path = 0, base
+        while token.text != end:
+            if token.text not in ("[", "."):
+                # without quotes and escapes
+                is_quoted = token.text.startswith(("'", '"'))
+                part = next(iter(tomllib.loads(f"{token.text} = 0"))) if is_quoted else token.text
+                started, path = started or token.line, (*path, part)
+                lines.setdefault(path, started)
+            token = next(tokens)
+        return path
+
+    def read_value(token: _Token, path: KeyPath) -> _Token:
+        """Read a value, and return the token after it."""
+        if token.text not in ("[", "{"):
+            while token.text not in (",", "]", "}", "\n"):
+                token = next(tokens)
+            return token
+        first_line, index, element = token.line, 0, next(tokens)
+        while element.text not in ("]", "}"):
+            if token.text == "{":
+                inner, element = read_key(element, path, "="), next(tokens)
+            else:
+                inner, index = (*path, index), index + 1
+                if element.line != first_line:
+                    lines[inner] = element.line
+            element = read_value(element, inner)
+            element = next(tokens) if element.text == "," else element
+        return next(tokens)
+
+    table: KeyPath = ()
+    for token in tokens:
+        if token.text == "[":
+            table = read_key(token, (), "]")
+        elif token.text not in ("]", "\n"):
+            path = read_key(token, table, "=")
+            read_value(next(tokens), path)
+    return lines
+
+
+class _Token(NamedTuple):
+    """A part of a TOML text, and the line where it begins."""
+
+    text: str
+    line: int
+
+
+def _tokens(text: str) -> Iterator[_Token]:
+    """Split a TOML text, without spaces and comments, and without the line breaks in lists."""
+    line, depth = 1, 0
+    for match in TOML_TOKEN.finditer(f"{text}\n"):
+        depth += (match[0] in ("[", "{")) - (match[0] in ("]", "}"))
+        if match["skip"] is None and (match[0] != "\n" or depth == 0):
+            yield _Token(match[0], line)
+        line += match[0].count("\n")

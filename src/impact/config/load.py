@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -16,10 +17,11 @@ from ..contact.materials import Material
 from ..contact.model import ForceModel
 from ..contact.numba.dispatch import is_installed
 from ..contact.variables import OUTPUTS, default_variables
-from ..errors import MissingFileError
+from ..errors import MissingFileError, did_you_mean
 from . import measurements, quantities, tables
 from .columns import expand_cases, named_files, read_files, without_replaced_inputs
 from .draft import (
+    MAX_PROBLEM_LINES,
     Draft,
     Measurements,
     Overrides,
@@ -33,13 +35,49 @@ from .files import as_table, override_text, set_value
 from .grid import MAX_POINTS, Axis, build_grid, chunk_problems
 from .input_names import InputName, paths_with
 from .library import library
-from .lines import validation_problems
-from .quantities import Column, ConfigProblem, Distribution, FitRange, KeyPath
+from .quantities import VALUE_FORMS, Column, ConfigProblem, Distribution, FitRange, KeyPath, as_text
 from .rules import check_rules, materials_of
 from .samples import design_problems, draw_columns, unit_samples
 
 # what a config is read for: only a calibration has measurements and parameters to fit, only a sweep has axes
 Purpose = Literal["sweep", "calibrate"]
+EXPECTED_BY_KEY = {
+    "sweep": "a table [sweep] of what to sweep: e or alpha, v1, m1, m2, material, ...",
+    "models": tables.LAWS_EXPECTED["model"],
+    **{name: f"{quantity.expected}: {quantity.meaning}" for name, quantity in tables.MATERIAL_QUANTITIES.items()},
+    **{name: str(info.description) for name, info in Column.model_fields.items()},
+    "n": f"the number of {tables.Design.model_fields['n'].description}, such as 1024",
+}
+# where keys that are in another table belong
+HOMES: Mapping[str, Iterable[str]] = {
+    **{f"under [{table}]": tables.KEYS_BY_TABLE[table] for table in ("sweep", "solver", "output")},
+    "under [materials.NAME]": tables.MaterialTable.model_fields,
+    "before all tables": ("models", "frictions", "title"),
+}
+# other words that users may write for a key
+KEY_SYNONYMS = {
+    "restitution": "e",
+    "cor": "e",
+    "stiffness": "K",
+    "exponent": "n",
+    "youngs_modulus": "E",
+    "poisson": "nu",
+    "poissons_ratio": "nu",
+    "density": "rho",
+    "friction": "mu",
+    "friction_coefficient": "mu",
+    "impact_angle": "angle",
+    "logspace": "geomspace",
+}
+WORDS_OF_BALLS = {
+    "mass": "m",
+    "speed": "v",
+    "velocity": "v",
+    "radius": "R",
+    "spin": "omega",
+    "tangential_velocity": "u",
+}
+KEY_SYNONYMS |= {f"{word}{ball}": f"{key}{ball}" for word, key in WORDS_OF_BALLS.items() for ball in "12"}
 
 
 @dataclass(frozen=True)
@@ -349,3 +387,59 @@ def _settings_problems(document: tables.Document, axes: Sequence[Axis], draft: D
             yield ("output", "variables", position), f'got "{name}", which needs frictions = [...]'
     if output.chunks and output.layout == "factored":
         yield ("output", "chunks"), 'set together with layout = "factored", expected layout = "full"'
+
+
+def validation_problems(error: ValidationError, models: Mapping[str, ForceModel]) -> Iterable[ConfigProblem]:
+    """List the problems that pydantic reports, with the path of each value."""
+    for n_problems, detail in enumerate(error.errors(include_url=False)):
+        # the tags of unions are not keys
+        path: KeyPath = tuple(part for part in detail["loc"] if not (isinstance(part, str) and "\0" in part))
+        match detail["type"]:
+            case quantities.PROBLEM_TYPE:
+                yield path, detail["msg"]
+            case "missing":
+                yield path, f"missing, expected {EXPECTED_BY_KEY[str(path[-1])]}"
+            case "extra_forbidden" | "unexpected_keyword_argument":
+                # hints take time, and later lines are not printed
+                hint = _unknown_key_hint(detail["loc"], models) if n_problems < MAX_PROBLEM_LINES else ""
+                yield path, f"unknown key; {hint}"
+            case "literal_error":
+                choices = ", ".join(re.findall("'([^']*)'", detail["ctx"]["expected"]))
+                yield path, f"got {as_text(detail['input'])}, expected one of {choices}"
+            case _:
+                yield path, f"got {as_text(detail['input'])}, expected a table"
+
+
+def _unknown_key_hint(location: KeyPath, models: Mapping[str, ForceModel]) -> str:
+    """Suggest a known key for an unknown one; `location` is its path, with tags."""
+    name = str(location[-1])
+    home = next((home for home, keys in HOMES.items() if name in keys), None)
+    if home is not None and (len(location) < 3 or location[0] in ("materials", "model", "friction")):
+        return f"it belongs {home}"
+    keys: Iterable[str]
+    match location[:-1]:
+        case (*_, quantities.RANGE):
+            keys = VALUE_FORMS
+        case (*_, quantities.FIT):
+            keys = ("fit",)
+        case (*_, quantities.DISTRIBUTION):
+            keys = quantities.DISTRIBUTION_FORMS
+        case (*_, quantities.COLUMN):
+            keys = Column.model_fields
+        case ():
+            keys = tables.Document.model_fields
+        case ("materials", _):
+            keys = tables.MaterialTable.model_fields
+        case ("model" | "friction" as table,):
+            keys = tables.laws_of(table, models)
+        case ("model" | "friction" as table, key):
+            keys = tables.law_quantities(tables.laws_of(table, models)[str(key)])
+        case ("sweep",) if owners := [
+            table
+            for table in tables.LAW_TABLES
+            if any(name in tables.law_quantities(law) for law in tables.laws_of(table, models).values())
+        ]:
+            return f"it belongs under [{owners[0]}.KEY], where KEY is that of its law"
+        case (table, *_):
+            keys = tables.KEYS_BY_TABLE[str(table)]
+    return did_you_mean(name, list(keys), KEY_SYNONYMS)

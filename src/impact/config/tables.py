@@ -480,6 +480,13 @@ class Document(Table):
     friction: Any = None
 
 
+KEYS_BY_TABLE: Mapping[str, Iterable[str]] = {
+    "sweep": Sweep.model_fields,
+    "design": Design.model_fields,
+    "data": Data.model_fields,
+    "solver": vars(Solver()),
+    "output": vars(Output()),
+}
 # tables of the parameters of laws, and what the keys that choose the laws, `models` and `frictions`, contain
 LAW_TABLES = {
     "model": 'models by name, "all", "family:NAME" or a pattern; after "!" those left out',

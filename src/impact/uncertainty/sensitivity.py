@@ -16,9 +16,9 @@ import xarray as xr
 
 from ..array_types import Array
 from ..atomic import check_outputs
+from ..config.files import path_text
 from ..config.grid import MAX_POINTS, SAMPLE
 from ..config.input_names import InputName
-from ..config.lines import path_text
 from ..config.load import Config
 from ..config.samples import draw_columns, unit_samples
 from ..config.tables import power_of_two_problem
