@@ -6,7 +6,7 @@ by check.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -41,6 +41,7 @@ class Alignment:
     dims : by common variable, its axes in the order of the baseline, without variables that vary along different
         axes; empty if the results have no common point
     scales : by variable of a calibration, the scale of each value; NaN if the data do not determine the value
+    notes : on what differs and does not affect equality
     """
 
     new: xr.Dataset
@@ -48,6 +49,7 @@ class Alignment:
     dims: Mapping[str, tuple[str, ...]]
     faults: tuple[Difference, ...]
     scales: Mapping[str, Array] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
 
 def align_sweeps(new: xr.Dataset, baseline: xr.Dataset, *, subset: bool) -> Alignment:
@@ -267,7 +269,7 @@ def align_calibrations(new: xr.Dataset, baseline: xr.Dataset, *, subset: bool) -
     both = [name for name in CALIBRATION if name in new and name in baseline] if is_same_data else []
     names = [name for name in both if new[name].size]
     scales = {name: _scale(name, baseline) for name in names}
-    return _align(new, baseline, scales, faults)
+    return _align(new, baseline, scales, faults, _fit_notes(new, baseline))
 
 
 def _of_laws(study: xr.Dataset, keys: Sequence[str], *, subset: bool) -> xr.Dataset:
@@ -300,10 +302,10 @@ def align_boards(new: xr.Dataset, baseline: xr.Dataset, *, subset: bool) -> Alig
     new, baseline = (dataset.sel(common) for dataset in (new, baseline))
     # all numbers are dimensionless; what is not supported in one of them differs by its status
     scales = {name: np.maximum(1.0, np.abs(np.nan_to_num(baseline[name].values.astype(float)))) for name in names}
-    return _align(new, baseline, scales, faults)
+    return _align(new, baseline, scales, faults, _version_notes(new, baseline))
 
 
-def version_notes(new: xr.Dataset, baseline: xr.Dataset) -> Iterator[str]:
+def _version_notes(new: xr.Dataset, baseline: xr.Dataset) -> Iterator[str]:
     """Name the engines whose version or kind differs."""
     for engine in common_labels(new, baseline, "engine"):
         for name in ("engine_version", "engine_kind"):
@@ -314,14 +316,18 @@ def version_notes(new: xr.Dataset, baseline: xr.Dataset) -> Iterator[str]:
 
 
 def _align(
-    new: xr.Dataset, baseline: xr.Dataset, scales: Mapping[str, Array], faults: Sequence[Difference]
+    new: xr.Dataset,
+    baseline: xr.Dataset,
+    scales: Mapping[str, Array],
+    faults: Iterable[Difference],
+    notes: Iterable[str],
 ) -> Alignment:
     """Align two studies whose points are in the same order; the variables that have a scale are compared."""
     labels = {dim: baseline.variables[dim] for dim in baseline.dims if dim in baseline.coords}
     coords = xr.Coordinates(labels, indexes={})
     a, b = (xr.Dataset({name: study.variables[name] for name in scales}, coords) for study in (new, baseline))
     dims = {name: tuple(map(str, baseline[name].dims)) for name in scales}
-    return Alignment(a, b, dims, tuple(faults), scales)
+    return Alignment(a, b, dims, tuple(faults), scales, tuple(notes))
 
 
 def common_labels(new: xr.Dataset, baseline: xr.Dataset, dim: str) -> list[str]:
@@ -388,7 +394,7 @@ def _scale(name: str, baseline: xr.Dataset) -> Array:
     return np.asarray(scale.where(np.isfinite(scale)).broadcast_like(values).transpose(*values.dims), float)
 
 
-def fit_notes(new: xr.Dataset, baseline: xr.Dataset) -> Iterator[str]:
+def _fit_notes(new: xr.Dataset, baseline: xr.Dataset) -> Iterator[str]:
     """Name the laws whose fits ended with another status."""
     for key in common_labels(new, baseline, "model"):
         a, b = (fit_status(dataset.sel(model=key)) for dataset in (new, baseline))

@@ -33,16 +33,7 @@ from ..results.schema import (
     require_sweep,
 )
 from ..results.xarray_backend import load
-from .align import (
-    MODEL_COORDINATES,
-    Alignment,
-    align_boards,
-    align_calibrations,
-    align_sweeps,
-    changed_config,
-    fit_notes,
-    version_notes,
-)
+from .align import MODEL_COORDINATES, Alignment, align_boards, align_calibrations, align_sweeps, changed_config
 from .values import compare_values, group_size, representative_regions
 from .verdict import Difference, Verdict
 
@@ -114,8 +105,7 @@ def compare(
         align = align_calibrations if kind == "calibration" else align_boards
         aligned = align(a, b, subset=subset)
         faults = [*aligned.faults]
-        notes = [*_attribute_notes(a.attrs, b.attrs, {"rtol": None, "impact_version": None})]
-        notes += fit_notes(a, b) if kind == "calibration" else version_notes(a, b)
+        notes = [*_attribute_notes(a.attrs, b.attrs, {"rtol": None, "impact_version": None}), *aligned.notes]
     else:
         for dataset, name in zip((a, b), names, strict=True):
             check_comparable(dataset, name)
