@@ -38,13 +38,7 @@ from ..formatting import number, safe_text
 from .attributes import LawRecord, PairRecord, SummaryRecord, read_attribute
 from .netcdf import RegionValues, StoredArray
 from .schema import SLIP_INPUTS, attributes_of, count_points, derived_names, scale_of, stored_variables
-from .trajectory_table import (
-    MAX_STIFFNESS_VALUES,
-    TrajectoryTable,
-    expand,
-    lazy_dataset,
-    whole_stiffness,
-)
+from .trajectory_table import MAX_STIFFNESS_VALUES, TrajectoryTable, expand, lazy_dataset, whole_stiffness
 from .validation import FACTORED_ATTRIBUTES, PREFIXES, TABLE_VARIABLES, WITNESSES, is_quantity
 
 N_WITNESSES = 1_000
