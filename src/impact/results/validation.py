@@ -19,17 +19,7 @@ from ..contact.variables import AXES, LAW_DIMS, OUTPUTS
 from ..errors import ResultError
 from ..formatting import safe_text
 from .attributes import ATTRIBUTE_TYPES, read_attribute
-from .schema import (
-    BOARD,
-    CALIBRATION,
-    CALIBRATION_TEXTS,
-    MODEL_METADATA,
-    SCHEMA,
-    STUDY_COORDINATES,
-    Kind,
-    is_case,
-    kind_of,
-)
+from .schema import CALIBRATION_TEXTS, MODEL_METADATA, SCHEMA, STUDY_COORDINATES, Kind, is_case, kind_of
 from .slabs import is_computed, slabs
 
 TEXT_COORDINATES = frozenset(
@@ -160,7 +150,7 @@ def _status_violations(dataset: xr.Dataset) -> Iterator[str]:
     """Numbers that are no status; computed statuses always are one."""
     for name, noun in STATUS_NOUNS.items():
         if name in dataset and not is_computed(dataset[name].variable):
-            known = [*{**OUTPUTS, **CALIBRATION, **BOARD}[name].flags.values()]
+            known = [*next(table[name] for table in SCHEMA.values() if name in table).flags.values()]
             parts = (dataset[name].isel(where).values for where in slabs(dataset[name].sizes, STATUS_SLAB_POINTS))
             if any(not np.isin(np.unique(part), known).all() for part in parts):
                 yield f"{name}: got a number that is no {noun}"
