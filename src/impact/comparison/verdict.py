@@ -264,9 +264,7 @@ class Verdict(Displayed):
 
     def replay(self, variable: VariableComparison) -> str:
         """Write the command that runs the worst point of a variable again; empty if there is none."""
-        if not self.repeats or not variable.at:
-            return ""
-        return replay_command(self.repeats, variable.at)
+        return replay_command(self.repeats, variable.at) if self.repeats and variable.at else ""
 
     def __str__(self) -> str:
         return "\n".join([self.headline, *self.lines, *(f"note: {note}" for note in self.notes)])

@@ -276,8 +276,7 @@ class ImpactBackend(BackendEntrypoint):
         self, filename_or_obj: Any, *, drop_variables: str | Iterable[str] | None = None
     ) -> xr.Dataset:
         dataset = open_result(filename_or_obj)
-        dropped = [drop_variables] if isinstance(drop_variables, str) else list(drop_variables or ())
-        rest = dataset.drop_vars(dropped, errors="ignore")
+        rest = dataset.drop_vars(drop_variables or (), errors="ignore")
         rest.set_close(dataset.close)
         return rest
 
