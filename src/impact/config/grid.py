@@ -13,15 +13,7 @@ from ..errors import did_you_mean
 from ..formatting import argument
 from .draft import Draft
 from .input_names import InputName, input_values
-from .quantities import (
-    MAX_PROBLEMS,
-    ConfigProblem,
-    KeyPath,
-    Names,
-    Numbers,
-    Range,
-    as_text,
-)
+from .quantities import MAX_PROBLEMS, ConfigProblem, Names, Numbers, Range, as_text
 
 # default limit of the points of all models together
 MAX_POINTS = 10**9
@@ -213,8 +205,7 @@ def _repetition_problems(name: str, values: AxisValues, words: Sequence[str]) ->
     seen: set[object] = set()
     for index, value in enumerate(values):
         if value in seen:
-            path: KeyPath = (*InputName.parse(name).path, index)
             word = words[int(value)] if words and isinstance(value, float) else value
-            return [(path, f"got {as_text(word)} twice, expected each value once")]
+            return [((*InputName.parse(name).path, index), f"got {as_text(word)} twice, expected each value once")]
         seen.add(value)
     return []

@@ -19,15 +19,7 @@ from ..formatting import label, number
 from .attributes import read_attribute
 from .board import Board
 from .calibration import Fits
-from .schema import (
-    MODEL_METADATA,
-    STUDIES,
-    count_points,
-    exponents_of,
-    kind_of,
-    plain_unit,
-    require_result,
-)
+from .schema import MODEL_METADATA, count_points, exponents_of, kind_of, plain_unit, require_result
 from .sensitivity import Studies
 from .slabs import is_large
 from .summary import Extremes, Summary, error_table, extremes_of, summarize
@@ -46,6 +38,9 @@ SHOWN_ATTRIBUTES = (
     "reason",
     "design",
 )
+# the variables with a value for each point of a study: the measured values of a calibration, the studies of a
+# sensitivity study, and the checks of a board
+POINTS_OF_STUDIES = {"calibration": "measured", "sensitivity study": "mean", "board": "check_status"}
 # longer lists of numbers are abbreviated
 MAX_LISTED_NUMBERS = 4
 
@@ -99,9 +94,7 @@ def info(result: xr.Dataset | str | Path) -> Info:
 def _describe(result: xr.Dataset, name: str = "") -> Info:
     """Describe a dataset, of the file of a name."""
     summary = summarize(result) if "model" in result.dims else Summary()
-    # the measured values of a calibration, the studies of a study, and the checks of a board are its points
-    by_kind = {"calibration": "measured", "sensitivity study": "mean", "board": "check_status"}
-    counted, variables = by_kind.get(kind_of(result)), dict[str, Any]()
+    counted, variables = POINTS_OF_STUDIES.get(kind_of(result)), dict[str, Any]()
     for variable_name, variable in result.items():
         extremes = extremes_of(result, str(variable_name))
         variables[str(variable_name)] = {
@@ -155,7 +148,7 @@ def _tables(result: xr.Dataset, name: str, description: Mapping[str, Any]) -> li
     tables: list[Block] = [Table(list(rows.items())), "", Table(variables, headings)]
     if description["worst"]:
         tables += ["", error_table(description["worst"])]
-    if kind_of(result) in STUDIES:
+    if kind_of(result) in POINTS_OF_STUDIES:
         tables += ["", *describe(result).sections(PIPE_WIDTH)]
     return tables
 

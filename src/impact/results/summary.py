@@ -146,19 +146,18 @@ class Summary:
             self.deep += weight * int(np.count_nonzero(share > MAX_SMALL_INDENTATION))
             self.deepest = float(np.fmax.reduce(share, axis=None, initial=self.deepest))
 
-
-def add_slab(summary: Summary, table: TrajectoryTable, slab: ExpandedSlab) -> None:
-    """Add the points of a slab; points that differ only by parameters of other models count once."""
-    keys = table.keys(slab.number)
-    axes = table.inputs.axes_of_law(*keys)
-    if any(part.start > 0 for axis, part in enumerate(slab.region) if axis not in axes):
-        return
-    first = tuple(slice(None) if axis in axes else slice(1) for axis in range(len(slab.region)))
-    counted = {name: array[first or ...] for name, array in slab.values.items()}
-    summary.add(counted, keys[0], slab.place, [part.start for part in slab.region])
-    if "peak_indentation" in counted:
-        radius = smaller_radius_at(table.inputs, table.inputs.index(slab.region))
-        summary.add_depths(counted["peak_indentation"], radius)
+    def add_slab(self, table: TrajectoryTable, slab: ExpandedSlab) -> None:
+        """Add the points of a slab; points that differ only by parameters of other models count once."""
+        keys = table.keys(slab.number)
+        axes = table.inputs.axes_of_law(*keys)
+        if any(part.start > 0 for axis, part in enumerate(slab.region) if axis not in axes):
+            return
+        first = tuple(slice(None) if axis in axes else slice(1) for axis in range(len(slab.region)))
+        counted = {name: array[first or ...] for name, array in slab.values.items()}
+        self.add(counted, keys[0], slab.place, [part.start for part in slab.region])
+        if "peak_indentation" in counted:
+            radius = smaller_radius_at(table.inputs, table.inputs.index(slab.region))
+            self.add_depths(counted["peak_indentation"], radius)
 
 
 def summarize(dataset: xr.Dataset, max_failed_at: int = MAX_FAILED_AT) -> Summary:

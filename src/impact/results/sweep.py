@@ -35,16 +35,7 @@ from ..formatting import argument
 from .layouts import file_template, stiffness_to_store, table_values
 from .netcdf import MAX_LABEL_BYTES, RegionValues, encode_text, is_text
 from .schema import dataset_template, plan_coordinates, stored_variables
-from .summary import (
-    Summary,
-    SweepOutcome,
-    add_slab,
-    input_notes,
-    result_notes,
-    summarize,
-    summarize_table,
-    with_depths,
-)
+from .summary import Summary, SweepOutcome, input_notes, result_notes, summarize, summarize_table, with_depths
 from .trajectory_table import TrajectoryTable, expanded_slabs, in_memory, lazy_dataset, table_of_ranges
 from .validation import is_name
 from .xarray_backend import MAX_LOADED_BYTES, load, open_result, write_sealed
@@ -418,7 +409,7 @@ def store_result(
             template = template.assign_attrs(summary=record.model_dump_json(exclude_defaults=True))
         else:
             for slab in expanded_slabs(table, variables):
-                add_slab(summary, table, slab)
+                summary.add_slab(table, slab)
 
     def report(points: int) -> None:
         run.on_progress(replace(progress, points=points, failed=max(summary.failed, progress.failed)))
@@ -436,7 +427,7 @@ def store_result(
             plan.fill(slab)
             for name, array in slab.values.items():
                 yield name, slab.region_in(result[name].dims), array
-            add_slab(summary, table, slab)
+            summary.add_slab(table, slab)
             report(summary.points)
 
     with atomic_write(output, overwrite=run.overwrite or plan.replaces, part=part) as sink:
