@@ -22,6 +22,7 @@ from ..config.grid import SAMPLE
 from ..config.input_names import InputName, is_foreign, is_input
 from ..config.tables import MATERIAL_KEYS
 from ..contact.fixed_step import EXACT
+from ..contact.history import History
 from ..contact.materials import effective_mass
 from ..contact.variables import AXES, HISTORY, LAW_DIMS, OUTPUTS, Variable, by_name, default_variables
 from ..engine.inputs import input_at
@@ -312,6 +313,26 @@ def dataset_template(plan: Plan) -> xr.Dataset:
     axes = [axis.name for axis in plan.config.axes]
     # in one call: xarray merges the whole dataset in each call
     return dataset.assign(template(stored_variables(plan), dataset.sizes, axes))
+
+
+def history_dataset(history: History, plan: Plan, point: Mapping[str, float | str]) -> xr.Dataset:
+    """Build the dataset of a time history over t, with the inputs and masses of the impact as an attribute."""
+    masses = {name: input_at(plan.inputs, name, plan.inputs.index()).item() for name in ("m1", "m2")}
+    laws = {"model": plan.models[0].key, **({"friction": plan.frictions[0].key} if plan.frictions else {})}
+    arrays = {name: getattr(history, name) for name in HISTORY}
+    dataset = xr.Dataset(
+        {name: ("t", a, attributes_of(HISTORY[name])) for name, a in arrays.items() if a is not None},
+        coords={"t": ("t", history.t, {"units": "s", "long_name": "time since first contact"}), **laws},
+    )
+    dataset.attrs = {
+        "title": f"Time history of one impact, {' with '.join(laws.values())}",
+        "schema_version": SCHEMA_VERSION,
+        "impact_version": __version__,
+        "inputs": json.dumps({**point, **masses}),
+        "e_kinetic": history.e_kinetic,
+        "e_energetic": history.e_energetic,
+    }
+    return dataset
 
 
 def attributes_of(variable: Variable) -> dict[str, object]:

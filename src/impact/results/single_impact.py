@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
@@ -13,7 +12,6 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from .._version import __version__
 from ..arguments import require_counts
 from ..config.columns import without_replaced_inputs
 from ..config.draft import Draft, Overrides, Setting, open_config, open_text, reject_law_key, settings_of
@@ -38,26 +36,16 @@ from ..contact.simulate import RecordedMotion
 from ..contact.status import FIRST_FAILURE, FrictionStatus, Status
 from ..contact.tangential import RecordedSlip
 from ..contact.units import with_numbers
-from ..contact.variables import CENTRAL_OUTPUTS, HISTORY, LAW_DIMS, OUTPUTS
+from ..contact.variables import CENTRAL_OUTPUTS, LAW_DIMS, OUTPUTS
 from ..display import Block, Displayed, Styled, Table
-from ..engine.inputs import build_impacts, build_oblique, fixed_steps_at, input_at
+from ..engine.inputs import build_impacts, build_oblique, fixed_steps_at
 from ..engine.plan import Plan
 from ..engine.plugins import Plugins, read_plugins
 from ..errors import ConfigError, UsageError, did_you_mean, warn
 from ..formatting import argument, law_keys, law_name, number, prefixed, safe_text
 from .calibration import fitted_config, position_of_law
 from .provenance import changed_plugins, stored_config, stored_draft, unknown_plugins
-from .schema import (
-    DEFAULT_RTOL_FACTOR,
-    SCHEMA_VERSION,
-    attributes_of,
-    is_case,
-    kind_of,
-    plain_unit,
-    require_result,
-    require_sweep,
-    scale_of,
-)
+from .schema import DEFAULT_RTOL_FACTOR, history_dataset, is_case, kind_of, require_result, require_sweep, scale_of
 from .seal import is_result
 from .selection import chosen_laws
 from .summary import depth_notes, input_notes
@@ -73,12 +61,12 @@ INPUT_QUANTITIES = (
     ("m", "kg", "effective mass (17)"),
 )
 MOTION_QUANTITIES = (
-    ("K_r", "N m-n", "unloading stiffness (42)"),
+    ("K_r", "N/m^n", "unloading stiffness (42)"),
     ("tau_c", "N s", "impulse of the approach"),
     ("tau_r", "N s", "impulse of the restitution"),
     ("W_c", "J", "work of the approach (38)"),
     ("W_r", "J", "work of the restitution (39)"),
-    ("rebound_speed_bound", "m s-1", "K/lambda, bound of the rebound speed (26)"),
+    ("rebound_speed_bound", "m/s", "K/lambda, bound of the rebound speed (26)"),
 )
 DERIVED_QUANTITIES = (*INPUT_QUANTITIES, *MOTION_QUANTITIES)
 # derived from the inputs of an oblique impact
@@ -220,7 +208,7 @@ class Impact(Displayed):
     def _derived_rows(self, quantities: Iterable[tuple[str, str, str]], digits: int) -> list[tuple[str, str, str]]:
         """Write the derived quantities that apply and are not inputs."""
         return [
-            (name, prefixed(self.derived[name], self._with_numbers(plain_unit(unit)), digits), meaning)
+            (name, prefixed(self.derived[name], self._with_numbers(unit), digits), meaning)
             for name, unit, meaning in quantities
             if not math.isnan(self.derived.get(name, math.nan)) and name not in self.point
         ]
@@ -425,26 +413,6 @@ def _derived_quantities(
         chi = math.inf if values["status"] == Status.LIMIT else chi
         quantities["rebound_speed_bound"] = v0 / chi if chi else math.inf
     return {name: quantities.get(name, math.nan) for name, _, _ in DERIVED_QUANTITIES}
-
-
-def history_dataset(history: History, plan: Plan, point: Mapping[str, float | str]) -> xr.Dataset:
-    """Build the dataset of a time history over t, with the inputs and masses of the impact as an attribute."""
-    masses = {name: input_at(plan.inputs, name, plan.inputs.index()).item() for name in ("m1", "m2")}
-    laws = {"model": plan.models[0].key, **({"friction": plan.frictions[0].key} if plan.frictions else {})}
-    arrays = {name: getattr(history, name) for name in HISTORY}
-    dataset = xr.Dataset(
-        {name: ("t", a, attributes_of(HISTORY[name])) for name, a in arrays.items() if a is not None},
-        coords={"t": ("t", history.t, {"units": "s", "long_name": "time since first contact"}), **laws},
-    )
-    dataset.attrs = {
-        "title": f"Time history of one impact, {' with '.join(laws.values())}",
-        "schema_version": SCHEMA_VERSION,
-        "impact_version": __version__,
-        "inputs": json.dumps({**point, **masses}),
-        "e_kinetic": history.e_kinetic,
-        "e_energetic": history.e_energetic,
-    }
-    return dataset
 
 
 def histories(
