@@ -32,10 +32,9 @@ from .files import (
 )
 from .input_names import InputName, input_values
 from .library import STARTER_CONFIG, library
-from .quantities import VALUE_FORMS, ConfigProblem, KeyPath
+from .quantities import MAX_PROBLEMS, VALUE_FORMS, ConfigProblem, KeyPath
 from .tables import MATERIAL_KEYS, SWEEP_DEFAULTS, SWEEP_QUANTITIES, Loss, Noise, expand_laws
 
-MAX_PROBLEM_LINES = 100
 # keys of [sweep] that arrange inputs
 NO_INPUTS = (("sweep", "zip"), ("sweep", "cases"))
 # inputs that a setting of another one replaces
@@ -181,9 +180,9 @@ class Draft:
     def with_problems(self, problems: Iterable[ConfigProblem]) -> Draft:
         return replace(self, problems=tuple(dict.fromkeys((*self.problems, *problems))))
 
-    def with_settings(self, settings: Iterable[Setting]) -> Draft:
+    def with_settings(self, overrides: Overrides) -> Draft:
         """Apply settings in order, after library materials of which one of them changes a property."""
-        settings = list(settings)
+        settings = settings_of(overrides)
         if not settings:
             return self
         paths = [setting.path for setting in settings if setting.path[:1] == ("materials",)]
@@ -233,8 +232,8 @@ class Draft:
             rank, location = self._locate(path, key_line)
             ranked.append((rank, ": ".join(part for part in (location, path_text(path), message) if part)))
         lines = [line for _, line in sorted(ranked, key=lambda ranked_line: ranked_line[0])]
-        if len(lines) > MAX_PROBLEM_LINES:
-            lines[MAX_PROBLEM_LINES:] = [f"and {len(lines) - MAX_PROBLEM_LINES} more"]
+        if len(lines) > MAX_PROBLEMS:
+            lines[MAX_PROBLEMS:] = [f"and {len(lines) - MAX_PROBLEMS} more"]
         kind_of_error = MissingFileError if self.misses_file else ConfigError
         return kind_of_error(*lines, *self.lines)
 

@@ -20,17 +20,7 @@ from ..contact.variables import OUTPUTS, default_variables
 from ..errors import MissingFileError, did_you_mean
 from . import measurements, quantities, tables
 from .columns import expand_cases, named_files, read_files, without_replaced_inputs
-from .draft import (
-    MAX_PROBLEM_LINES,
-    Draft,
-    Measurements,
-    Overrides,
-    Setting,
-    add_library_materials,
-    open_config,
-    open_text,
-    settings_of,
-)
+from .draft import Draft, Measurements, Overrides, Setting, add_library_materials, open_config, open_text
 from .files import as_table, override_text, set_value
 from .grid import MAX_POINTS, Axis, build_grid, chunk_problems
 from .input_names import InputName, paths_with
@@ -130,7 +120,7 @@ def read_config(
     >>> read_config({"models": "hertz", "sweep": sweep, "materials": {"steel": steel}}).axes
     (Axis(columns={'e': (0.5, 1.0)}, numbered='', numbers=()),)
     """
-    draft = open_config(source, plugins).with_settings(settings_of(overrides))
+    draft = open_config(source, plugins).with_settings(overrides)
     if source is None:
         draft = without_replaced_inputs(inline_files(draft), {})
     return build(draft, max_points, purpose)
@@ -147,7 +137,7 @@ def parse_config(
 
     No file is read, because the text may come from a result of unknown origin.
     """
-    return build(open_text(text, name, plugins).with_settings(settings_of(overrides)), purpose=purpose)
+    return build(open_text(text, name, plugins).with_settings(overrides), purpose=purpose)
 
 
 def build(draft: Draft, max_points: int = MAX_POINTS, purpose: Purpose = "sweep") -> Config:
@@ -401,7 +391,7 @@ def validation_problems(error: ValidationError, models: Mapping[str, ForceModel]
                 yield path, f"missing, expected {EXPECTED_BY_KEY[str(path[-1])]}"
             case "extra_forbidden" | "unexpected_keyword_argument":
                 # hints take time, and later lines are not printed
-                hint = _unknown_key_hint(detail["loc"], models) if n_problems < MAX_PROBLEM_LINES else ""
+                hint = _unknown_key_hint(detail["loc"], models) if n_problems < quantities.MAX_PROBLEMS else ""
                 yield path, f"unknown key; {hint}"
             case "literal_error":
                 choices = ", ".join(re.findall("'([^']*)'", detail["ctx"]["expected"]))

@@ -47,7 +47,7 @@ PROBLEM_TYPE = "config_problem"
 MAX_UNIT_LENGTH = 64  # characters of a string with a unit
 MAX_AXIS_VALUES = 10**7  # values on one axis, which are held in memory
 MAX_PRINTED_COUNT = 10**18  # larger counts are not written out in messages
-MAX_PROBLEMS = 100  # reported for one list or table
+MAX_PROBLEMS = 100  # reported for one list or table, and for a whole config
 MAX_REPORTED_VALUES = 1000  # invalid values reported for a config; bounds the time that a hostile list takes
 
 _DIGITS = r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"

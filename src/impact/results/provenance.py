@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 import xarray as xr
 
-from ..config.draft import Draft, Overrides, open_text, settings_of
+from ..config.draft import Draft, Overrides, open_text
 from ..config.grid import MAX_POINTS
 from ..config.input_names import InputName
 from ..config.load import Config, Purpose, build
@@ -39,7 +39,7 @@ def stored_config(
     if not allow_changed_plugins:
         for reason in (*changed_plugins(attributes, plugins, name), *unknown_plugins(attributes, plugins, name)):
             raise UsageError(reason)
-    return build(draft.with_settings(settings_of(overrides)), max_points, purpose)
+    return build(draft.with_settings(overrides), max_points, purpose)
 
 
 def stored_draft(attributes: Mapping[str, object], plugins: Plugins, name: str) -> Draft:
@@ -51,7 +51,7 @@ def stored_draft(attributes: Mapping[str, object], plugins: Plugins, name: str) 
         raise ResultError(f"{name}: its attribute config is not text")
     check_plugins(attributes, plugins, name)
     stored = read_attribute(attributes, "config_set", name, required=True)
-    return open_text(text, name, plugins.models).with_settings(settings_of(stored))
+    return open_text(text, name, plugins.models).with_settings(stored)
 
 
 def config_of_part(config: Config, dataset: xr.Dataset) -> Config:

@@ -557,11 +557,11 @@ def open_source(source: ConfigSource, overrides: Overrides, plugins: Plugins) ->
     if source is None:
         starter = open_config(None, plugins.models).with_settings([Setting.parse("sweep.e=0.5")])
         # that setting is no input of the user
-        draft = replace(starter, origins={}).with_settings(settings_of(overrides))
+        draft = replace(starter, origins={}).with_settings(overrides)
         return PointSource(draft, plugins, is_starter=True)
     reject_law_key(source, "model", plugins.models)
     draft = open_config(source, plugins.models)
-    return PointSource(draft.with_settings(settings_of(overrides)), plugins)
+    return PointSource(draft.with_settings(overrides), plugins)
 
 
 def _open_stored(dataset: xr.Dataset, overrides: Overrides, plugins: Plugins, name: str) -> PointSource:
