@@ -102,6 +102,13 @@ def _select_points(result: xr.Dataset, coords: xr.Dataset, positions: Mapping[st
     return coords.isel(index).assign({n: v.isel({d: index[d] for d in v.dims}) for n, v in variables.items()})
 
 
+def unknown_variables(dataset: xr.Dataset) -> list[str]:
+    """List the variables that are not part of a result."""
+    standard_names = {*MODEL_COORDINATES, *LAW_DIMS, *OUTPUTS}
+    names = [str(name) for name in dataset.variables if name not in standard_names]
+    return [name for name in names if not (is_input(name) or is_case(name))]
+
+
 def _drop_foreign_axes(result: xr.Dataset, other: xr.Dataset) -> xr.Dataset:
     """Drop the parameters of laws that either result lacks; other laws do not depend on them."""
     laws = [

@@ -18,22 +18,14 @@ from ..config.files import read_number
 from ..config.input_names import is_input
 from ..config.quantities import Quantity
 from ..contact.fixed_step import EXACT
-from ..contact.variables import LAW_DIMS, OUTPUTS
+from ..contact.variables import OUTPUTS
 from ..errors import ResultError, UsageError, did_you_mean
 from ..formatting import argument, number, safe_text
 from ..results.attributes import read_attribute
 from ..results.provenance import command_start
-from ..results.schema import (
-    DEFAULT_RTOL_FACTOR,
-    MODEL_METADATA,
-    SCHEMA,
-    SCHEMA_VERSION,
-    is_case,
-    kind_of,
-    require_sweep,
-)
+from ..results.schema import DEFAULT_RTOL_FACTOR, MODEL_METADATA, SCHEMA, SCHEMA_VERSION, kind_of, require_sweep
 from ..results.xarray_backend import load
-from .align import MODEL_COORDINATES, Alignment, align_boards, align_calibrations, align_sweeps, changed_config
+from .align import Alignment, align_boards, align_calibrations, align_sweeps, changed_config, unknown_variables
 from .values import compare_values, group_size, representative_regions
 from .verdict import Difference, Verdict
 
@@ -109,7 +101,7 @@ def compare(
     else:
         for dataset, name in zip((a, b), names, strict=True):
             check_comparable(dataset, name)
-        unknown = sorted({*_unknown_variables(a), *_unknown_variables(b)})
+        unknown = sorted({*unknown_variables(a), *unknown_variables(b)})
         a, b = (dataset.drop_vars(unknown, errors="ignore") for dataset in (a, b))
         tolerances = effective_tolerances(tol, b.attrs)
         aligned = align_sweeps(a, b, subset=subset)
@@ -181,13 +173,6 @@ def check_comparable(dataset: xr.Dataset, name: str) -> None:
             raise UsageError(f"{name}: {variable}: got {dataset[variable].dtype}, expected numbers")
         if variable in dataset and not axes <= set(dataset[variable].dims):
             raise UsageError(f"{name}: {variable} does not vary along all axes, expected a whole result")
-
-
-def _unknown_variables(dataset: xr.Dataset) -> list[str]:
-    """List the variables that are not part of a result."""
-    standard_names = {*MODEL_COORDINATES, *LAW_DIMS, *OUTPUTS}
-    names = [str(name) for name in dataset.variables if name not in standard_names]
-    return [name for name in names if not (is_input(name) or is_case(name))]
 
 
 def _material_faults(new: xr.Dataset, baseline: xr.Dataset) -> list[Difference]:
