@@ -78,7 +78,7 @@ def _laws(code: Code) -> Iterator[ExportProblem]:
 
 
 def _sets_e(problem: ExportProblem) -> bool:
-    return problem.law.has_e or problem.point.solved is not None
+    return problem.law.has_e or problem.law.solved is not None
 
 
 def _overview(code: Code, problem: ExportProblem) -> list[str]:
@@ -97,7 +97,7 @@ def _section(code: Code, problems: Sequence[ExportProblem]) -> Iterator[str]:
     for problem in problems:
         numbers = ["–", "–"]
         if _sets_e(problem):
-            key, solved = problem.model.key, problem.point.solved
+            key, solved = problem.model.key, problem.law.solved
             at = {**INPUTS.get(key, {}), **({"e": E} if solved is None else solved), "v1": SLOW}
             slow = impact.run(model=key, at=at).values["e_out"]
             numbers = [f"{e:.3f}" for e in (problem.e_continuous, slow)]

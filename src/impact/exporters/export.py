@@ -203,7 +203,7 @@ def export(
     code = find_code(to)
     program_path, version = choose_version(code, program, code_version, verify=verify)
     problem = prepare_export(code, model, version, source, at or {}, overrides, friction)
-    check_outputs([output], [source, *problem.point.config.files], overwrite=overwrite)
+    check_outputs([output], [source, *problem.law.config.files], overwrite=overwrite)
     if script and not code.template:
         raise UsageError(f"{argument('script')}: there is none for {code.title}: {code.tested}")
     contact_time = problem.law.contact_time
@@ -223,11 +223,11 @@ def export(
         raise UsageError(f"{argument('parameter')}: what {code.title} delivers at a time step is not predicted")
     needed, name = None, parameter
     if parameter is None and given and advised is not None and advised.dt < dt:
-        name = timestep.time_parameter(problem.point.config, problem.model)
+        name = timestep.time_parameter(problem.law.config, problem.model)
     # where nobody asked for it, a law whose time scale has no such parameter is exported without
     with nullcontext() if parameter is not None else suppress(UsageError):
         if name is not None:
-            needed = timestep.needed_parameter(problem.point, name, dt, ADVISED_TOL, problem.law, advised)
+            needed = timestep.needed_parameter(problem.law, name, dt, ADVISED_TOL, advised)
     needed_text = str(needed or (timestep.missing_parameter(parameter, ADVISED_TOL) if parameter else ""))
     header = tuple(_header(problem, collision, at_dt, advised, needed_text))
     result = Export(
@@ -235,8 +235,8 @@ def export(
         version=problem.version,
         model=problem.model.key,
         scheme=code.scheme and problem.law.scheme,
-        e=problem.law.e if problem.point.solved is None else float(problem.point.config.scalars["e"]),
-        solved=problem.point.solved,
+        e=problem.law.wanted_e,
+        solved=problem.law.solved,
         e_continuous=problem.e_continuous,
         contact_time=contact_time,
         friction=collision.friction,
@@ -317,7 +317,7 @@ def _header(
         known = "" if math.isnan(radius) else f", R* = {quantity(radius, 'm')}"
         moving = "; in a script it is at rest, and ball 1 has v1 - v2" if collision["v2"] else ""
         yield f"ball 2 is a plane wall: m = m1{known}{moving}"
-    for name, value in (problem.point.solved or {}).items():
+    for name, value in (problem.law.solved or {}).items():
         yield f"{name} = {value!r} gives the e that is wanted"
     asked = f"e = {number(law.e)} is asked for; " if law.has_e else ""
     delivered, contact_time = number(problem.e_continuous), quantity(law.contact_time, "s")

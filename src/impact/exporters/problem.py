@@ -21,8 +21,7 @@ from ..engine.plan import Plan
 from ..engine.plugins import Plugins
 from ..errors import UsageError, did_you_mean
 from ..formatting import argument, law_keys, number, quantity
-from ..inverse.solve import PointWithE, point_with_e, warn_of_point
-from ..inverse.timestep import FixedStepLaw, fixed_step_law
+from ..inverse.timestep import FixedStepLaw, law_at_point
 from ..results.calibration import position_of_law, unidentified_notes
 from ..results.single_impact import Calibration, ConfigSource, PointSource, open_source
 from .code import Code, Collision
@@ -45,7 +44,6 @@ class ExportProblem:
     Parameters
     ----------
     law : the law, the impact and the contact time of the continuous law
-    point : the config, the axes of the source that are at their first value, and the damping that was solved for
     notes : where the law and its values come from: a release, a calibration, Table 1 of the paper, first values
     better_fit : a remark on the law of a calibration that fits best, where it is none of the code; else ""
     left_out : friction laws of the source, where the code has none of them
@@ -54,7 +52,6 @@ class ExportProblem:
     code: Code
     version: str
     law: FixedStepLaw
-    point: PointWithE
     notes: tuple[str, ...]
     better_fit: str
     left_out: tuple[str, ...]
@@ -66,7 +63,7 @@ class ExportProblem:
     @property
     def has_wall(self) -> bool:
         """Whether ball 2 is a plane wall."""
-        return self.point.replaced is not None
+        return self.law.replaced is not None
 
     @property
     def e_continuous(self) -> float:
@@ -88,7 +85,7 @@ class ExportProblem:
         if oblique is not None:
             values |= {name: float(getattr(oblique, name).item()) for name in OBLIQUE_VALUES}
             values |= {name: float(value.item()) for name, value in oblique.parameters.items()}
-        names = self.point.config.scalars
+        names = self.law.config.scalars
         duration = CONTACTS_RUN * self.law.contact_time
         if self.code.scheme is not None:
             # contacts with hardly any rebound may take longer at a step
@@ -135,8 +132,7 @@ def prepare_export(
     friction: str | None = None,
 ) -> ExportProblem:
     """Choose the law, and reduce the source to one impact; the damping of a law without e is solved for."""
-    opened = open_source(source, overrides, Plugins(()))
-    point_source = replace(opened, config_draft=replace(opened.config_draft, has_own_scheme=True))
+    point_source = open_source(source, overrides, Plugins(()))
     notes = []
     if model is not None:
         key = law_of_code(code, model, version)
@@ -148,14 +144,17 @@ def prepare_export(
             notes.append(f"release {version} lacks the default law of {code.newest}, {newest}")
     point_source = _with_parameters(point_source, key)
     chosen, left_out = _choose_friction(code, point_source, key, friction)
-    point = point_with_e(
-        point_source, find(key), at, lambda config: wall_inputs(config, code, version), friction=chosen
-    )
-    if chosen:
-        Plan(point.config).pair_notes("frictions")
     scheme = (find_friction(chosen).scheme if chosen else "") or code.scheme
-    fixed = fixed_step_law(point.config, PHASES, scheme, of_friction=chosen is not None)
-    warn_of_point(point_source, point, fixed.impact, fixed.continuous)
+    fixed = law_at_point(
+        point_source,
+        find(key),
+        at,
+        PHASES,
+        scheme,
+        chosen,
+        of_friction=chosen is not None,
+        replacing=lambda config: wall_inputs(config, code, version),
+    )
     if isinstance(fixed.law, Pair) and fixed.oblique is not None:
         # that of `coulomb-1785` is taken of any code
         law = fixed.law.friction
@@ -166,15 +165,14 @@ def prepare_export(
     if calibration := point_source.calibration:
         better_fit, fit_notes = _fit_notes(code, version, key, calibration)
         notes += [better_fit, *fit_notes] if better_fit else fit_notes
-    if point_source.is_starter and (defaults := _defaults(point_source, at, point.config)):
+    if point_source.is_starter and (defaults := _defaults(point_source, at, fixed.config)):
         notes.append(f"defaults of Table 1 of the paper: {', '.join(defaults)}")
-    if point.defaulted_axes:
-        notes.append(f"first value of each axis of the source: {', '.join(point.defaulted_axes)}")
+    if fixed.defaulted_axes:
+        notes.append(f"first value of each axis of the source: {', '.join(fixed.defaulted_axes)}")
     return ExportProblem(
         code=code,
         version=version,
         law=fixed,
-        point=point,
         notes=tuple(notes),
         better_fit=better_fit,
         left_out=left_out,

@@ -13,7 +13,7 @@ minimized instead, by Brent's bounded search.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from itertools import pairwise
@@ -32,7 +32,6 @@ from ..config.load import Config
 from ..contact.fixed_step import EXACT
 from ..contact.friction import FrictionLaw, Pair
 from ..contact.frictions import find_friction
-from ..contact.impacts import Impacts
 from ..contact.interpolant import NODE_MAX_STEPS, Interpolant
 from ..contact.model import ForceModel, Parameter
 from ..contact.models import find
@@ -46,15 +45,7 @@ from ..engine.plugins import read_plugins
 from ..errors import UsageError, did_you_mean, require_known, warn
 from ..formatting import argument, law_name, number, prefixed, quantity, safe_text
 from ..results.ranking import only_target, target_value
-from ..results.single_impact import (
-    PointSource,
-    ignores_e,
-    input_name,
-    open_source,
-    single_point,
-    warn_of_ignored_e,
-)
-from ..results.summary import depth_notes
+from ..results.single_impact import ignores_e, input_name, open_source, single_point
 from .prepared import outputs_at, trial_inputs
 
 # values that are tried before roots are refined: powers of ten times the contact's own unit of the parameter
@@ -281,48 +272,6 @@ def placeholder(model: ForceModel, unknown: Parameter) -> dict[str, float]:
         return {}
     value = next((v for v in (unknown.default, unknown.typical) if v is not None), 1.0)
     return {config_name(model, unknown): min(max(value, unknown.least), unknown.most)}
-
-
-@dataclass(frozen=True)
-class PointWithE:
-    """A config without axes, the damping that gives an e to a law without one, and inputs that were replaced."""
-
-    config: Config
-    defaulted_axes: tuple[str, ...]
-    solved: Mapping[str, float] | None
-    replaced: Mapping[str, float] | None
-
-
-def point_with_e(
-    source: PointSource,
-    law: ForceModel,
-    at: Mapping[str, object],
-    replacing: Callable[[Config], Mapping[str, float] | None] = lambda config: None,
-    friction: str | None = None,
-) -> PointWithE:
-    """Reduce a source to one impact, and replace inputs; an e for a law without one is reached by its damping."""
-    is_solved = "e" in at and "e" not in law.quantities
-    if is_solved:
-        if not law.damping:
-            raise UsageError(f"{argument('at', key='e')}: {law.key} has no e, and no parameter that sets it")
-        if not {law.damping, f"{law.key}.{law.damping}"}.isdisjoint(at):
-            raise UsageError(f"{argument('at')}: got e and {law.damping}, expected one of the two")
-        at = {**at, **placeholder(law, unknown_of(law, law.damping))}
-    config, defaulted_axes = single_point(source, law.key, at, friction=friction)
-    replaced = replacing(config)
-    config = replace(config, scalars={**config.scalars, **(replaced or {})})
-    if not is_solved:
-        return PointWithE(config, defaulted_axes, None, replaced)
-    config = solve_damping(config, float(config.scalars["e"]))
-    solved = {law.damping: float(config.scalars[f"{law.key}.{law.damping}"])}
-    return PointWithE(config, defaulted_axes, solved, replaced)
-
-
-def warn_of_point(source: PointSource, point: PointWithE, impact: Impacts, outputs: Mapping[str, float]) -> None:
-    """Warn of a large indentation, and of an e of the source that the law ignores, unless it is solved for."""
-    if point.solved is None and source.has_own_e and "e" not in point.defaulted_axes:
-        warn_of_ignored_e(point.config, outputs["e_out"])
-    warn(*depth_notes(outputs["peak_indentation"], impact.R1.item(), impact.R2.item()))
 
 
 def solve_damping(config: Config, e: float) -> Config:

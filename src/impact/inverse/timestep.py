@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cache, partial
 from pathlib import Path
@@ -56,10 +56,11 @@ from ..engine.inputs import build_impacts, build_oblique, rayleigh_time_at
 from ..engine.plan import Plan
 from ..engine.plugins import read_plugins
 from ..engine.trajectories import PlanLaw, model_of
-from ..errors import ModelError, UsageError
+from ..errors import ModelError, UsageError, warn
 from ..formatting import argument, decimals, law_name, number, quantity, rounded
-from ..results.single_impact import open_source
-from .solve import PointWithE, config_name, point_with_e, solve_damping, unknown_of, warn_of_point
+from ..results.single_impact import PointSource, open_source, single_point, warn_of_ignored_e
+from ..results.summary import depth_notes
+from .solve import config_name, placeholder, solve_damping, unknown_of
 
 # steps per contact if none are given
 STEPS_PER_CONTACT = (10.0, 20.0, 50.0, 100.0)
@@ -355,28 +356,24 @@ def timestep(
         origin, of = argument("model"), argument("scheme", model)
         raise UsageError(f'{origin}: got the scheme "{model}", expected {expected}, beside {of}')
     opened = open_source(source, overrides, plugin_set)
-    point_source = replace(opened, config_draft=replace(opened.config_draft, has_own_scheme=True))
-    point = point_with_e(point_source, find(model, plugin_set.models), at or {}, friction=friction)
-    Plan(point.config).pair_notes("frictions")
-    law = fixed_step_law(point.config, phases, scheme, of_friction=True)
-    warn_of_point(point_source, point, law.impact, law.continuous)
+    law = law_at_point(opened, find(model, plugin_set.models), at or {}, phases, scheme, friction)
     steps = time_steps(law.contact_time, counts or (() if given else STEPS_PER_CONTACT), given)
     needed, found = None, None
     if tol is not None:
         needed = needed_steps(law, tol)
         if parameter is not None:
-            found = needed_parameter(point, parameter, given[0], tol, law, needed)
+            found = needed_parameter(law, parameter, given[0], tol, needed)
     return TimestepResult(
         model=law.model.key,
         scheme=law.scheme,
-        e=law.e if point.solved is None else float(point.config.scalars["e"]),
+        e=law.wanted_e,
         e_continuous=law.continuous["e_out"],
         contact_time=law.contact_time,
         rows=timestep_rows(law, steps),
         needed=needed,
         phases=phases,
         tol=tol,
-        solved=point.solved,
+        solved=law.solved,
         parameter=parameter or "",
         needed_parameter=found,
         rayleigh_time=law.rayleigh_time,
@@ -394,6 +391,9 @@ class FixedStepLaw:
     law : the model, or its pair with a friction law, which has the tangential inputs `oblique`
     continuous : outputs of the continuous law by name, in SI
     rayleigh_time : the smaller one of both balls [s]
+    defaulted_axes : axes of the source that are at their first value
+    solved : the damping that gives the e of a law without one; None if none was asked for
+    replaced : inputs that replace those of the source; None without any
     """
 
     config: Config
@@ -404,6 +404,9 @@ class FixedStepLaw:
     phases: int
     scheme: str
     rayleigh_time: float
+    defaulted_axes: tuple[str, ...] = ()
+    solved: Mapping[str, float] | None = None
+    replaced: Mapping[str, float] | None = None
 
     @property
     def model(self) -> ForceModel:
@@ -432,6 +435,11 @@ class FixedStepLaw:
     def e(self) -> float:
         """The requested e; NaN for a law without one."""
         return float(self.impact.e[0]) if self.has_e else math.nan
+
+    @property
+    def wanted_e(self) -> float:
+        """The requested e, also of a law without one whose damping was solved for."""
+        return self.e if self.solved is None else float(self.config.scalars["e"])
 
     def outputs(self, dt: Array, *names: str, e: Array | None = None) -> list[NDArray[Any]]:
         """Compute outputs by name at steps dt [s] with the e to ask for at each, of shape (k, phases)."""
@@ -564,23 +572,18 @@ def missing_parameter(name: str, tol: float) -> str:
 
 
 def needed_parameter(
-    point: PointWithE,
-    name: str,
-    dt: float,
-    tol: float,
-    law: FixedStepLaw,
-    needed: NeededSteps | None = None,
+    law: FixedStepLaw, name: str, dt: float, tol: float, needed: NeededSteps | None = None
 ) -> NeededParameter | None:
     """Find the value of a parameter from which on every phase is within a tolerance at a step dt [s].
 
-    The law and, where they are known, the needed steps are those of the point. Where its damping was solved for, e
-    is kept by the damping in the contact's own units, which is enough where the law has a single time scale, else
-    by solving again.
+    The needed steps are those of the law, where they are known. Where its damping was solved for, e is kept by the
+    damping in the contact's own units, which is enough where the law has a single time scale, else by solving
+    again.
     """
     if name == RELAXATION_TIME:
-        return _needed_relaxation_time(point, dt, tol, law, needed)
-    config, model = point.config, law.model
-    e = None if point.solved is None else float(config.scalars["e"])
+        return _needed_relaxation_time(law, dt, tol, needed)
+    config, model = law.config, law.model
+    e = None if law.solved is None else law.wanted_e
     unknown, path, value = _seek(law, name)
     base, damping_path = law, f"{model.key}.{model.damping}"
     law_of = partial(fixed_step_law, phases=base.phases, scheme=base.scheme, of_friction=base.is_coupled)
@@ -641,7 +644,7 @@ def needed_parameter(
 
 
 def _needed_relaxation_time(
-    point: PointWithE, dt: float, tol: float, law: FixedStepLaw, known: NeededSteps | None
+    law: FixedStepLaw, dt: float, tol: float, known: NeededSteps | None
 ) -> NeededParameter | None:
     """Find the relaxation time of SAP, and the K with which it keeps e, from which it follows."""
     role = argument("parameter")
@@ -649,12 +652,12 @@ def _needed_relaxation_time(
     if math.isnan(relaxation_time):
         command = f"impact timestep --model kelvin-voigt-no-tension --scheme {DRAKE_SAP}"
         raise UsageError(f"{role}: {RELAXATION_TIME} is C/K of Drake's SAP: {command} finds it")
-    if point.solved is None or relaxation_time == 0.0:
+    if law.solved is None or relaxation_time == 0.0:
         raise UsageError(
             f"{role}: {RELAXATION_TIME} = C/K sets e at a given K, and not the contact time: expected "
             f"{argument('at', 0.8, key='e')} or another e < 1, which K and {RELAXATION_TIME} together keep"
         )
-    needed = needed_parameter(point, "K", dt, tol, law, known)
+    needed = needed_parameter(law, "K", dt, tol, known)
     if needed is None:
         return None
     return replace(
@@ -713,6 +716,45 @@ def _takes_moduli(config: Config, model: ForceModel) -> bool:
     """Whether the stiffness of a law follows from Young's moduli."""
     is_given = not {"K", f"{model.key}.K"}.isdisjoint(config.scalars)
     return not is_given and (model.stiffness is None or "E_eff" in argument_names(model.stiffness))
+
+
+def law_at_point(
+    source: PointSource,
+    model: ForceModel,
+    at: Mapping[str, object],
+    phases: int,
+    scheme: str | None,
+    friction: str | None,
+    *,
+    of_friction: bool = True,
+    replacing: Callable[[Config], Mapping[str, float] | None] = lambda config: None,
+) -> FixedStepLaw:
+    """Reduce a source to one impact of a law, and replace inputs.
+
+    An e for a law without one is reached by its damping. Warns of a large indentation, and of an e of the source
+    that the law ignores.
+    """
+    source = replace(source, config_draft=replace(source.config_draft, has_own_scheme=True))
+    is_solved = "e" in at and "e" not in model.quantities
+    if is_solved:
+        if not model.damping:
+            raise UsageError(f"{argument('at', key='e')}: {model.key} has no e, and no parameter that sets it")
+        if not {model.damping, f"{model.key}.{model.damping}"}.isdisjoint(at):
+            raise UsageError(f"{argument('at')}: got e and {model.damping}, expected one of the two")
+        at = {**at, **placeholder(model, unknown_of(model, model.damping))}
+    config, defaulted_axes = single_point(source, model.key, at, friction=friction)
+    replaced, solved = replacing(config), None
+    config = replace(config, scalars={**config.scalars, **(replaced or {})})
+    if is_solved:
+        config = solve_damping(config, float(config.scalars["e"]))
+        solved = {model.damping: float(config.scalars[f"{model.key}.{model.damping}"])}
+    if of_friction:
+        Plan(config).pair_notes("frictions")
+    law = fixed_step_law(config, phases, scheme, of_friction=of_friction)
+    if not is_solved and source.has_own_e and "e" not in defaulted_axes:
+        warn_of_ignored_e(config, law.continuous["e_out"])
+    warn(*depth_notes(law.continuous["peak_indentation"], law.impact.R1.item(), law.impact.R2.item()))
+    return replace(law, defaulted_axes=defaulted_axes, solved=solved, replaced=replaced)
 
 
 def fixed_step_law(
