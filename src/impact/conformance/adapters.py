@@ -19,12 +19,12 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, SupportsFloat
+from typing import IO, Any, SupportsFloat
 
 from ..contact.frictions import frictions
 from ..contact.models import catalogue
 from ..errors import UsageError, did_you_mean
-from ..exporters.programs import KEPT_OUTPUT_BYTES, MAX_OUTPUT_BYTES, POLL_INTERVAL_S, find_program, kill
+from ..exporters.programs import MAX_OUTPUT_BYTES, POLL_INTERVAL_S, end_of, find_program, kill
 from ..formatting import argument, number, safe_text
 from .checks import KIND_TOLERANCES, Answer, Kind, balls_of
 from .suite import Question
@@ -102,7 +102,7 @@ def open_adapter(adapter: object, timeout_s: float, folder: str | None = None) -
             raise AdapterError(f"{words[0]}: {error.strerror}") from None
         with process:
             try:
-                yield _Conversation(process, errors.fileno(), timeout_s).ask
+                yield _Conversation(process, errors, timeout_s).ask
             finally:
                 kill(process)
 
@@ -111,11 +111,11 @@ def _command(adapter: object) -> list[str]:
     """Make the words of the command of an adapter."""
     if isinstance(adapter, str) and PYTHON_FUNCTION.fullmatch(adapter):
         path = Path(adapter.rpartition(":")[0])
-        # it may also be the last word of a command
-        if " " not in str(path) or path.is_file():
-            if not path.is_file():
-                raise AdapterError(f"{path}: {'is no file' if path.exists() else 'does not exist'}")
+        if path.is_file():
             return [sys.executable, str(SERVE), str(Path(adapter).absolute())]
+        # it may also be the last word of a command
+        if " " not in str(path):
+            raise AdapterError(f"{path}: {'is no file' if path.exists() else 'does not exist'}")
     if not isinstance(adapter, str | Sequence) or not "".join(map(str, adapter)).strip():
         raise AdapterError(f'got {adapter!r}, expected FILE.py:FUNCTION or "PROGRAM ARGUMENTS"')
     try:
@@ -133,7 +133,7 @@ class _Conversation:
     """A program that gets a line on stdin for each line on its stdout."""
 
     process: subprocess.Popen[bytes]
-    errors: int
+    errors: IO[bytes]
     timeout_s: float
     received: bytes = b""
 
@@ -163,7 +163,7 @@ class _Conversation:
                 raise AdapterError(f"{name}: no answer after {number(self.timeout_s)} s ({argument('timeout')})")
             if len(self.received) > MAX_LINE_BYTES:
                 raise AdapterError(f"{name}: a line of more than {MAX_LINE_BYTES >> 10} KiB")
-            if os.fstat(self.errors).st_size > MAX_OUTPUT_BYTES:
+            if os.fstat(self.errors.fileno()).st_size > MAX_OUTPUT_BYTES:
                 raise AdapterError(f"{name}: more than {MAX_OUTPUT_BYTES >> 20} MiB on stderr")
             # Windows cannot wait for a pipe, so that a silent adapter is not stopped there
             if sys.platform == "win32" or select.select([descriptor], [], [], POLL_INTERVAL_S)[0]:
@@ -180,10 +180,7 @@ class _Conversation:
             code = f"exit code {self.process.wait(self.timeout_s)}"
         except subprocess.TimeoutExpired:
             code = "its stdout closed"
-        size = os.fstat(self.errors).st_size
-        os.lseek(self.errors, max(0, size - KEPT_OUTPUT_BYTES), os.SEEK_SET)
-        kept = os.read(self.errors, KEPT_OUTPUT_BYTES)
-        lines = kept.decode(errors="replace").strip().splitlines()
+        lines = end_of(self.errors).strip().splitlines()
         last = f": {safe_text(lines[-1])}" if lines else ""
         return AdapterError(f"{name}: the adapter ended with {code}{last}")
 

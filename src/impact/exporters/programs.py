@@ -120,7 +120,7 @@ def run_program(command: Sequence[str], folder: str, timeout_s: float) -> subpro
         except BaseException:
             kill(process)
             raise
-        return subprocess.CompletedProcess(command, process.returncode, _end_of(out), _end_of(err))
+        return subprocess.CompletedProcess(command, process.returncode, end_of(out), end_of(err))
 
 
 def kill(process: subprocess.Popen[bytes]) -> None:
@@ -133,7 +133,7 @@ def kill(process: subprocess.Popen[bytes]) -> None:
     process.wait()
 
 
-def _end_of(file: IO[bytes]) -> str:
+def end_of(file: IO[bytes]) -> str:
     """Read the last KEPT_OUTPUT_BYTES of a file."""
     file.seek(max(0, os.fstat(file.fileno()).st_size - KEPT_OUTPUT_BYTES))
     return file.read(KEPT_OUTPUT_BYTES).decode("utf-8", errors="replace")
