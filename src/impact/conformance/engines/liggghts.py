@@ -39,6 +39,11 @@ dump 1 all custom {steps} velocities id vx vy omegaz
 dump_modify 1 format "%d %.17g %.17g %.17g"
 run {steps}
 """
+ATOM = """\
+create_atoms 1 single {0!r} {1!r} 0
+set atom {ball.number} diameter {2!r} mass {ball.m!r} omegaz {ball.omega!r}
+set atom {ball.number} vx {ball.v!r} vy {ball.u!r} vz 0
+"""
 # ktToKnUser on: the tangential spring is 2/7 of the normal one, both have the same period for solid balls
 CONTACT = "gran model hooke tangential history"
 OPTIONS = "tangential_damping off ktToKnUser on"
@@ -48,8 +53,6 @@ FACTS: dict[str, Any] = {
     "parameters": {"tangential_damping": "off", "tangential_reduce": "on"},
 }
 NU = 0.3
-# the balls touch after half of a step, and three contact times are run
-PHASE, CONTACTS = 0.5, 3.0
 # one process needs neither the network for which MPI would look each time, nor the daemon that it would start
 ALONE = {"OMPI_MCA_pml": "ob1", "OMPI_MCA_btl": "self", "OMPI_MCA_ess_singleton_isolated": "1"}
 ENVIRONMENT = os.environ | ALONE
@@ -57,37 +60,28 @@ ENVIRONMENT = os.environ | ALONE
 
 def collide(c: dict[str, Any]) -> dict[str, Any]:
     """Run a collision in the program that ends the command."""
-    from two_balls import answer_of, balls_of, harmonic
+    from two_balls import answer_of, balls_of, granular_script, harmonic
 
     balls = balls_of(c)
     if not all(ball.is_solid for ball in balls):
         return answer_of(c, (), "compliant", error="atoms are solid spheres", **FACTS)
-    atoms = ""
-    for ball in balls:
-        x, y = ball.start(PHASE * c["dt"])
-        atoms += f"create_atoms 1 single {x!r} {y!r} 0\n"
-        atoms += f"set atom {ball.number} diameter {2.0 * ball.R!r} mass {ball.m!r} omegaz {ball.omega!r}\n"
-        atoms += f"set atom {ball.number} vx {ball.v!r} vy {ball.u!r} vz 0\n"
     mass, radius = harmonic(ball.m for ball in balls), harmonic(ball.R for ball in balls)
     # any speed gives the stiffness that the contact time needs, with a modulus of its own
     speed = radius / c["contact_time"]
     k = mass * (math.pi**2 + math.log(c["e"]) ** 2) / c["contact_time"] ** 2
     # k = A^(4/5) (m speed^2)^(1/5) with A = 16/15 sqrt(R) E*, and E* = E/(2 (1 - nu^2)) of one material
     effective_modulus = (k**5 / (mass * speed**2)) ** 0.25 * 15.0 / (16.0 * math.sqrt(radius))
-    largest = max(ball.R for ball in balls)
-    script = SCRIPT.format(
-        reach=10.0 * largest,
-        skin=0.1 * largest,
+    script = granular_script(
+        SCRIPT,
+        ATOM,
+        c,
         modulus=repr(2.0 * (1.0 - NU**2) * effective_modulus),
         nu=NU,
         e=c["e"],
         mu=c["mu"],
         speed=repr(speed),
         contact=f"{CONTACT} {OPTIONS}",
-        balls=atoms,
         wall="" if len(balls) == 2 else f"fix wall all wall/{CONTACT} primitive type 1 xplane 0.0 {OPTIONS}",
-        dt=repr(c["dt"]),
-        steps=math.ceil(CONTACTS * c["contact_time"] / c["dt"]),
     )
     Path("velocities").unlink(missing_ok=True)
     process = subprocess.run(

@@ -11,6 +11,8 @@ from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 SOLID = 0.4
+# the balls touch after half of a step, and three contact times are run
+PHASE, CONTACTS = 0.5, 3.0
 
 
 class Ball(NamedTuple):
@@ -55,6 +57,16 @@ def answer_of(c: dict[str, Any], motions: Iterable[Iterable[float]], kind: str, 
     for number, motion in zip("12", motions, strict=False):
         answer |= zip((f"v{number}", f"u{number}", f"omega{number}"), motion, strict=True)
     return answer
+
+
+def granular_script(script: str, atom: str, c: dict[str, Any], **values: Any) -> str:
+    """Fill a script of LAMMPS or LIGGGHTS, and the lines of each atom: x, y, its diameter, and the ball."""
+    balls = balls_of(c)
+    largest = max(ball.R for ball in balls)
+    atoms = [atom.format(*ball.start(PHASE * c["dt"]), 2.0 * ball.R, ball=ball) for ball in balls]
+    steps = math.ceil(CONTACTS * c["contact_time"] / c["dt"])
+    values |= {"balls": "".join(atoms), "dt": repr(c["dt"]), "steps": steps}
+    return script.format(reach=10.0 * largest, skin=0.1 * largest, **values)
 
 
 def half_time(z: float) -> float:

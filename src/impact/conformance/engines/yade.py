@@ -8,14 +8,12 @@ from typing import Any
 SETTINGS = "ViscElMat, kn and cn for e and the contact time, ks = 2/7 kn, cs = 0, NewtonIntegrator(damping=0)"
 # over that of the normal spring: both have the same period for solid balls
 TANGENTIAL_STIFFNESS = 2.0 / 7.0
-# the balls touch after half of a step, and three contact times are run
-PHASE, CONTACTS = 0.5, 3.0
 
 
 def collide(c: dict[str, Any]) -> dict[str, Any]:
     """Run a collision, in a scene of its own."""
     import yade
-    from two_balls import answer_of, balls_of, damping_ratio, half_time, harmonic
+    from two_balls import CONTACTS, PHASE, answer_of, balls_of, damping_ratio, half_time, harmonic
     from yade import O, utils
 
     balls = balls_of(c)
