@@ -9,7 +9,7 @@ import shutil
 import tempfile
 import threading
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence, Set
+from collections.abc import Iterator, Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -34,14 +34,8 @@ MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "*", "p")
 DASHES = ("-", (0, (6, 1.5)), (0, (3, 1.2)), (0, (6, 1.5, 1, 1.5)), (0, (1.2, 1.2)))
 HATCHES = ("", "////", "....", "\\\\\\\\", "xxxx", "----", "oo", "||||")
 # without dates in the metadata a picture has the same bytes each time
-METADATA: dict[str, dict[str, None]] = {
-    "png": {},
-    "svg": dict.fromkeys(("Date", "Creator", "Format", "Type")),
-    "pdf": {"CreationDate": None},
-    "eps": {},
-    "pgf": {},
-    "gif": {},
-}
+METADATA = {"svg": dict.fromkeys(("Date", "Creator", "Format", "Type")), "pdf": {"CreationDate": None}}
+FORMATS = ("png", "svg", "pdf", "eps", "pgf", "gif")
 FRAMES_PER_SECOND = 20
 # values are equal that differ by less, relative to the largest
 FLAT = 1e-6
@@ -113,28 +107,26 @@ def model_styles(models: Sequence[str]) -> dict[str, dict[str, Any]]:
     """
     keys = list(dict.fromkeys([*catalogue(), *(law_keys(name)[0] for name in models)]))
     friction_index = {key: index for index, key in enumerate(frictions())}
-    styles_by_model: dict[str, dict[str, Any]] = {}
-    used: dict[str, Counter[Any]] = {"color": Counter(), "marker": Counter(), "hatch": Counter()}
+    styles: dict[str, dict[str, Any]] = {}
+
+    def next_free(name: str, choices: Sequence[Any], start: int, alike: Sequence[Mapping[str, Any]] = ()) -> Any:
+        """Choose the least used, the first from index `start` on; one of `alike` only if there is no other."""
+        ordered = [*choices[start % len(choices) :], *choices[: start % len(choices)]]
+        used, refused = Counter(style[name] for style in styles.values()), {style[name] for style in alike}
+        return min(ordered, key=lambda choice: (choice in refused, used[choice]))
+
     for model in dict.fromkeys(models):
         key, *friction = law_keys(model)
         index = keys.index(key) + sum(friction_index.get(name, 0) for name in friction)
-        color = _next_free(COLOURS, index, used["color"])
-        alike = [style for style in styles_by_model.values() if style["color"] == color]
-        styles_by_model[model] = {
+        color = next_free("color", COLOURS, index)
+        alike = [style for style in styles.values() if style["color"] == color]
+        styles[model] = {
             "color": color,
-            "marker": _next_free(MARKERS, index, used["marker"], {style["marker"] for style in alike}),
-            "hatch": _next_free(HATCHES, len(styles_by_model), used["hatch"], {style["hatch"] for style in alike}),
+            "marker": next_free("marker", MARKERS, index, alike),
+            "hatch": next_free("hatch", HATCHES, len(styles), alike),
             "linestyle": DASHES[(index + len(alike)) % len(DASHES)],
         }
-        for name, counter in used.items():
-            counter[styles_by_model[model][name]] += 1
-    return styles_by_model
-
-
-def _next_free(choices: Sequence[Any], start: int, used: Counter[Any], refused: Set[Any] = frozenset()) -> Any:
-    """Choose the least used, the first from index `start` on; a refused one only if there is no other."""
-    ordered = [choices[(start + step) % len(choices)] for step in range(len(choices))]
-    return min(ordered, key=lambda choice: (choice in refused, used[choice]))
+    return styles
 
 
 def limits_of(low: float, high: float) -> tuple[float, float]:
@@ -159,8 +151,8 @@ def is_geometric(values: np.ndarray) -> bool:
 def check_picture(path: Path) -> str:
     """Find the format of a picture from the ending of its name, and check that it can be written."""
     kind = path.suffix.lower().removeprefix(".")
-    if kind not in METADATA:
-        *most, last = (f".{name}" for name in METADATA)
+    if kind not in FORMATS:
+        *most, last = (f".{name}" for name in FORMATS)
         raise UsageError(f"{path}: expected a name that ends in {', '.join(most)} or {last}")
     latex = str(rcParams["pgf.texsystem"])
     if kind == "pgf" and shutil.which(latex) is None:
@@ -171,12 +163,12 @@ def check_picture(path: Path) -> str:
 
 
 def encoded(figure: Figure, kind: str, style: str | Path | None = None) -> bytes:
-    """Encode a figure in a format of METADATA; the bytes are the same each time."""
+    """Encode a figure in one of FORMATS; the bytes are the same each time."""
     if kind == "gif":
         return _encoded_frames(figure, style)
     buffer = io.BytesIO()
     # some formats have no metadata, and do not accept the argument
-    options: dict[str, Any] = {"metadata": METADATA[kind]} if METADATA[kind] else {}
+    options: dict[str, Any] = {"metadata": METADATA[kind]} if kind in METADATA else {}
     with styled(style):
         try:
             figure.savefig(buffer, format=kind, **options)
