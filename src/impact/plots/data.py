@@ -17,7 +17,7 @@ from ..config.tables import LABORATORY, STANDARD_GRAVITY, SWEEP_QUANTITIES
 from ..contact.variables import HISTORY, OUTPUTS
 from ..display import encode_frame
 from ..errors import ConfigError, warn
-from ..formatting import heading, safe_text
+from ..formatting import heading
 from ..results.schema import plain_unit
 
 if TYPE_CHECKING:
@@ -112,9 +112,7 @@ def read_points(points: str | Path | Mapping[str, Sequence[object]] | pd.DataFra
     problems += [columns.problem(message, name, row) for name, row, message in gaps]
     if problems:
         raise ConfigError(*problems)
-    for note in (count, f"columns without use: {', '.join(unused)}" if unused else ""):
-        if note:
-            warn(safe_text(f"{columns.source}: {note}", 1000))
+    warn(*columns.notes(count, unused))
     columns, values, variable = columns.take(rows), {}, ""
     for name in used:
         quantity, unit = quantities[name], ""

@@ -17,8 +17,8 @@ from ..results.sensitivity import distribution_texts
 from .curves import Curve, CurveData, Panel, curve_of, x_axis_fields
 from .kinds import Choice, Kind
 from .labels import split_by_law, with_model, words_of
-from .restitution import requested_curve
-from .slices import choose_line, conditions_of, numeric_axes, read, take_line
+from .restitution import read_line, requested_curve
+from .slices import choose_line, conditions_of, numeric_axes
 
 # ends of the band, and points of a distribution function that are drawn
 BAND, MAX_DRAWN_PROBABILITIES = (0.05, 0.95), 401
@@ -35,8 +35,7 @@ def uncertainty_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     if x in dataset.coords and dataset[x].dims == (SAMPLE,):
         raise UsageError(f"{argument('x', x)}: is an uncertain input, expected another axis")
     keep = (SAMPLE, "friction") if "friction" in dataset[name].dims else (SAMPLE,)
-    line, x_name, not_drawn, is_ordered = take_line(dataset, replace(choice, x=x or SAMPLE), keep)
-    line = read(line, [name])
+    line, x_name, not_drawn, is_ordered = read_line(dataset, replace(choice, x=x or SAMPLE), name, keep=keep)
     meaning = "Delivered restitution" if name == "e_out" else words_of(line[name].attrs, name).capitalize()
     curves: list[Curve] = []
     for law in split_by_law(line, numbered=choice.equations):
