@@ -132,7 +132,8 @@ def prepare_export(
     friction: str | None = None,
 ) -> ExportProblem:
     """Choose the law, and reduce the source to one impact; the damping of a law without e is solved for."""
-    point_source = open_source(source, overrides, Plugins(()))
+    opened = open_source(source, overrides, Plugins(()))
+    point_source = replace(opened, config_draft=replace(opened.config_draft, has_own_scheme=True))
     notes = []
     if model is not None:
         key = law_of_code(code, model, version)

@@ -356,7 +356,8 @@ def timestep(
         origin, of = argument("model"), argument("scheme", model)
         raise UsageError(f'{origin}: got the scheme "{model}", expected {expected}, beside {of}')
     opened = open_source(source, overrides, plugin_set)
-    law = law_at_point(opened, find(model, plugin_set.models), at or {}, phases, scheme, friction)
+    point_source = replace(opened, config_draft=replace(opened.config_draft, has_own_scheme=True))
+    law = law_at_point(point_source, find(model, plugin_set.models), at or {}, phases, scheme, friction)
     steps = time_steps(law.contact_time, counts or (() if given else STEPS_PER_CONTACT), given)
     needed, found = None, None
     if tol is not None:
@@ -734,7 +735,6 @@ def law_at_point(
     An e for a law without one is reached by its damping. Warns of a large indentation, and of an e of the source
     that the law ignores.
     """
-    source = replace(source, config_draft=replace(source.config_draft, has_own_scheme=True))
     is_solved = "e" in at and "e" not in model.quantities
     if is_solved:
         if not model.damping:
