@@ -156,8 +156,7 @@ def verify_scripts(problem: ExportProblem, program: str, dt: float, n_phases: in
     """
     problem = replace(problem, law=replace(problem.law, phases=n_phases))
     code, phases = problem.code, (np.arange(n_phases) + 0.5) / n_phases
-    collision, peak = problem.collision(dt, 0.5), problem.law.continuous["peak_indentation"]
-    share = collision.largest_radius / peak
+    share = problem.collision(dt, 0.5).largest_radius / problem.law.continuous["peak_indentation"]
     tolerance = max(code.uncertainty.get(problem.model.key, ROUNDING), SPACINGS * code.resolution * share)
     steps = np.array([dt] if code.scheme is not None else [dt, dt / 2, dt / 4])
     runs = []
@@ -178,36 +177,45 @@ def verify_scripts(problem: ExportProblem, program: str, dt: float, n_phases: in
     predicted = np.full(measured.shape, problem.e_continuous)
     if code.scheme is not None:
         (predicted,) = problem.law.outputs(steps, "e_out")
-    beta: dict[str, Any] = {}
-    oblique, has_wall = problem.law.oblique, problem.has_wall
-    if oblique is not None:
-        # the normal of two balls turns, and some codes shorten the arm of friction: both change velocities by a
-        # part of the speed before the impact, of the order of the indentation over R* and of the angle of the turn
-        v0, slip = float(problem.law.impact.v0[0]), float(oblique.slip.item())
-        tangential = float((oblique.u1 - oblique.u2).item())
-        speed, exact = math.hypot(v0, tangential), tolerance
-        # at a grazing impact the centres move far along the tangent while the balls touch; 0 of a wall. A law that
-        # needs no radius may have none in its impact, but has one in the collision
-        turn = abs(tangential) * problem.law.contact_time / (collision["R1"] + collision["R2"])
-        turning = max(TURNING * peak / collision.effective_radius, turn)
-        if not has_wall or problem.law.is_coupled:
-            tolerance = max(exact, turning * speed / v0)
-        (predicted_beta,) = problem.law.outputs(steps, "beta")
-        beta = {
-            "beta_measured": tuple(run.get("beta", math.nan) for row in runs for run in row),
-            "beta_predicted": tuple(predicted_beta.ravel().tolist()),
-            "beta_uncertainty": exact,
-        }
-        if code.shortens_arms or not has_wall:
-            beta["beta_uncertainty"] = max(exact, turning * max(1.0, speed / abs(slip)))
-    return Verification(
+    verification = Verification(
         program=program,
         dt=tuple(np.repeat(steps, n_phases).tolist()),
         phases=tuple(np.tile(phases, steps.size).tolist()),
         measured=tuple(measured.ravel().tolist()),
         predicted=tuple(predicted.ravel().tolist()),
         uncertainty=tolerance,
-        **beta,
+    )
+    return verification if problem.law.oblique is None else _with_friction(verification, problem, steps, runs)
+
+
+def _with_friction(
+    verification: Verification, problem: ExportProblem, steps: Array, runs: list[list[dict[str, float]]]
+) -> Verification:
+    """Add the tangential restitution.
+
+    The normal of two balls turns, and some codes shorten the arm of friction: both change velocities by a part of
+    the speed before the impact, of the order of the indentation over R* and of the angle of the turn.
+    """
+    oblique = problem.law.oblique
+    assert oblique is not None
+    (predicted,) = problem.law.outputs(steps, "beta")
+    exact, impact = verification.uncertainty, problem.law.impact
+    v0, slip = float(impact.v0[0]), float(oblique.slip.item())
+    tangential = float((oblique.u1 - oblique.u2).item())
+    speed = math.hypot(v0, tangential)
+    # a law that needs no radius may have none in its impact
+    collision = problem.collision(float(steps[0]), 0.5)
+    turning = TURNING * problem.law.continuous["peak_indentation"] / collision.effective_radius
+    # at a grazing impact the centres move far along the tangent while the balls touch; 0 of a wall
+    turn = abs(tangential) * problem.law.contact_time / (collision["R1"] + collision["R2"])
+    turning = max(turning, turn)
+    is_turning = problem.code.shortens_arms or not problem.has_wall
+    return replace(
+        verification,
+        uncertainty=exact if problem.has_wall and not problem.law.is_coupled else max(exact, turning * speed / v0),
+        beta_measured=tuple(run.get("beta", math.nan) for row in runs for run in row),
+        beta_predicted=tuple(predicted.ravel().tolist()),
+        beta_uncertainty=max(exact, turning * max(1.0, speed / abs(slip))) if is_turning else exact,
     )
 
 
