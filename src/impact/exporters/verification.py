@@ -164,23 +164,18 @@ def verify_scripts(problem: ExportProblem, program: str, dt: float, n_phases: in
         collisions = [problem.collision(dt, phase) for phase in phases.tolist()]
         runs.append([run_script(code, program, code.script(c, code.parameters(c))) for c in collisions])
     measured = np.array([[run["e_out"] for run in row] for row in runs])
-    if code.scheme is None and np.isfinite(measured).all():
-        value, uncertainty = extrapolate(measured)
-        return Verification(
-            program=program,
-            dt=(0.0,),
-            phases=(float("nan"),),
-            measured=(value,),
-            predicted=(problem.e_continuous,),
-            uncertainty=max(uncertainty, FLOOR, tolerance),
-        )
     predicted = np.full(measured.shape, problem.e_continuous)
+    dt_of_row, phase_of_row = np.repeat(steps, n_phases), np.tile(phases, steps.size)
     if code.scheme is not None:
         (predicted,) = problem.law.outputs(steps, "e_out")
+    elif np.isfinite(measured).all():
+        value, uncertainty = extrapolate(measured)
+        dt_of_row, phase_of_row, measured, predicted = np.array([[0.0], [np.nan], [value], predicted[0, :1]])
+        tolerance = max(uncertainty, FLOOR, tolerance)
     verification = Verification(
         program=program,
-        dt=tuple(np.repeat(steps, n_phases).tolist()),
-        phases=tuple(np.tile(phases, steps.size).tolist()),
+        dt=tuple(dt_of_row.tolist()),
+        phases=tuple(phase_of_row.tolist()),
         measured=tuple(measured.ravel().tolist()),
         predicted=tuple(predicted.ravel().tolist()),
         uncertainty=tolerance,
