@@ -588,16 +588,19 @@ class SlipPhase:
         fading = self.memory * self.stiffness_power * k[0] / _away_from_zero(y[0]) * N
         return direction * (dN - fading) / stiffness, N
 
-    def _held_margin(self, y: Array, params: Params, direction: Array) -> tuple[Array, Mask]:
-        """Compute a margin, positive while the force is between slip and stick, and where it is nearer to slip."""
-        columns, y = self.columns(params), y[:N_COMPONENTS]
-        slip, N = self._held_slip(y, params, direction)
-        # the friction force that gives the slip its rate
+    def _held_force(self, y: Array, params: Params, direction: Array) -> Array:
+        """Compute the friction force that gives the slip its rate, over G0."""
         small = RATE_OF_SLIP_STEP * np.clip(np.abs(y[0]), motion.MIN_RELEASE_S, 1.0)
         k = self.rates(y, params)
         step = small * k[:N_COMPONENTS]
         ahead, behind = (self._held_slip(y + sign * step, params, direction)[0] for sign in (1.0, -1.0))
-        force = (behind - ahead) / (2.0 * small * k[TIME_ROW])
+        return np.asarray((behind - ahead) / (2.0 * small * k[TIME_ROW]))
+
+    def _held_margin(self, y: Array, params: Params, direction: Array) -> tuple[Array, Mask]:
+        """Compute a margin, positive while the force is between slip and stick, and where it is nearer to slip."""
+        columns, y = self.columns(params), y[:N_COMPONENTS]
+        slip, N = self._held_slip(y, params, direction)
+        force = self._held_force(y, params, direction)
         drag = self._times(columns.damping * slip, y[0], self.drag_power)
         above_slip = (force - direction * N) * np.sign(drag)
         return np.minimum(above_slip, np.abs(drag) - above_slip), above_slip < 0.5 * np.abs(drag)
