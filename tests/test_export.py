@@ -1196,6 +1196,10 @@ def test_pybullet_takes_the_root_of_a_coefficient_and_newton_a_friction_that_sto
     assert export.parameters["kf"] == pytest.approx(2.0 / 7.0 * 0.75 / 1e-4, rel=1e-14)
     assert export.lines[0].endswith(f"kf={export.parameters['kf']!r}, mu=0.3)")
     assert "kf" not in impact.export("newton", at={"K": 1e6, "kd": 60.0}, code_version="1.8.0").parameters
+    # a plane of finite mass does not turn: 1/m_t = 7/2 + 1/3
+    plane = at | {"kd": 60.0, "R2": math.inf}
+    export = impact.export("newton", at=plane, friction=friction, dt=1e-4, code_version="1.8.0")
+    assert export.parameters["kf"] == pytest.approx(6.0 / 23.0 / 1e-4, rel=1e-14)
     for name in ("pybullet", "newton"):
         with pytest.raises(UsageError, match='has no "drake-regularized"; known: coulomb-1785'):
             impact.export(name, at=at, friction="drake-regularized", code_version=CODES[name].newest)

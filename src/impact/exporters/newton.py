@@ -63,7 +63,9 @@ def parameters(c: Collision) -> dict[str, float | str]:
     normal = {"ke": c["K"], "kd": c["kd"]}
     if not c.friction:
         return {**normal}
-    slip_per_impulse = sum((1.0 + 1.0 / c[f"inertia_factor{ball}"]) / c[f"m{ball}"] for ball in "12")
+    # a plane does not turn
+    turns = {ball: 1.0 / c[f"inertia_factor{ball}"] if math.isfinite(c[f"R{ball}"]) else 0.0 for ball in "12"}
+    slip_per_impulse = sum((1.0 + turns[ball]) / c[f"m{ball}"] for ball in "12")
     # the friction kf g, if it is within mu N, stops the slip in one step
     return {**normal, "kf": 1.0 / (slip_per_impulse * c.dt), "mu": c["mu"]}
 
