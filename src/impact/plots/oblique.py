@@ -20,7 +20,7 @@ from .kinds import Choice, Kind
 from .labels import LawPart, NamedLaw, split_by_law
 from .motions import choose_point, curves_over, motion
 from .restitution import complete, read_line
-from .slices import Line, numeric_axes
+from .slices import Line, choose_line
 
 # pairs that are drawn where no friction law is chosen: more curves cannot be told apart
 MAX_PAIRS = 8
@@ -115,9 +115,8 @@ def _pairs_along(dataset: xr.Dataset, choice: Choice, *names: str) -> tuple[Line
     """
     if "friction" not in dataset.dims:
         raise UsageError("this result has no friction; sweep a config with frictions = [...]")
-    line = read_line(
-        dataset, replace(choice, x=choice.x or _first_axis(dataset, choice)), *names, keep=("friction",)
-    )
+    x = choice.x or choose_line(select(dataset, choice.sel or {}), None, "angle").x
+    line = read_line(dataset, replace(choice, x=x), *names, keep=("friction",))
     pairs, not_drawn = [], []
     for pair in split_by_law(line.data, numbered=choice.equations):
         if any(np.isfinite(pair.data.variables[name].values).any() for name in names):
@@ -133,12 +132,6 @@ def _pairs_along(dataset: xr.Dataset, choice: Choice, *names: str) -> tuple[Line
         not_drawn.append(f"{len(pairs) - MAX_PAIRS} more pairs; choose some with {choice_of_pairs}")
         pairs = pairs[:MAX_PAIRS]
     return line._replace(not_drawn=(*line.not_drawn, *not_drawn)), pairs
-
-
-def _first_axis(dataset: xr.Dataset, choice: Choice) -> str | None:
-    """Find the angle, else the first input of several numbers that is not selected."""
-    axes = numeric_axes(select(dataset, choice.sel or {}))
-    return "angle" if "angle" in axes else next(iter(axes), None)
 
 
 def _panel(line: Line, pairs: Sequence[LawPart], name: str, y_label: str, guides: Sequence[Curve] = ()) -> Panel:
@@ -167,15 +160,15 @@ def _sticking_e_t(data: xr.Dataset) -> list[float]:
 
 def choose_pairs(dataset: xr.Dataset, keys: Sequence[str], needed: str) -> Choice | None:
     """Choose to draw the pairs of a result over the angle; None without friction, an axis or a needed variable."""
-    x = _first_axis(dataset, Choice()) if "friction" in dataset.dims and needed in dataset else None
-    return None if x is None else Choice(x, models=keys)
+    choice = choose_line(dataset, keys, "angle") if "friction" in dataset.dims and needed in dataset else None
+    return choice if choice and choice.x else None
 
 
 def choose_loop(dataset: xr.Dataset, keys: Sequence[str]) -> Choice | None:
     """Choose the point of a motion with friction, of at most MAX_PAIRS; None for a result without friction."""
     choice = choose_point(dataset, keys) if "friction" in dataset.dims else None
     few = keys[: max(1, MAX_PAIRS // dataset.sizes["friction"])] if choice else keys
-    return choice and replace(choice, x=_first_axis(dataset, Choice()), models=few)
+    return choice and replace(choice, x=choose_line(dataset, keys, "angle").x, models=few)
 
 
 def _of_pairs(caption: str, data: Callable[[xr.Dataset, Choice], CurveData], needed: str) -> Kind:

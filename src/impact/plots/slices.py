@@ -67,10 +67,10 @@ def numeric_axes(dataset: xr.Dataset) -> dict[str, xr.DataArray]:
     }
 
 
-def choose_line(dataset: xr.Dataset, keys: Sequence[str]) -> Choice:
-    """Choose to draw models over e, else over the first axis of several numbers."""
+def choose_line(dataset: xr.Dataset, keys: Sequence[str] | None, preferred: str = "e") -> Choice:
+    """Choose to draw models over an input, else over the first axis of several numbers."""
     axes = numeric_axes(dataset)
-    return Choice("e" if "e" in axes else next(iter(axes), None), models=keys)
+    return Choice(preferred if preferred in axes else next(iter(axes), None), models=keys)
 
 
 def choose_plane(dataset: xr.Dataset, keys: Sequence[str]) -> Choice | None:
