@@ -7,7 +7,6 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal, get_args
-from xml.etree import ElementTree
 
 import xarray as xr
 
@@ -295,6 +294,9 @@ class NoVerdict(Verdict):
 
 def as_junit(outcome: Verdict) -> str:
     """Write JUnit XML: a suite with a test for each kind of difference and variable, named by what it claims."""
+    # no other format needs it
+    from xml.etree import ElementTree
+
     tests = {
         claim: [fault.text for fault in outcome.faults if fault.kind == kind] for kind, claim in CLAIMS.items()
     }
