@@ -63,9 +63,7 @@ def render_header(seal: str) -> bytes:
     >>> render_header("0" * 64)[:24], len(render_header("0" * 64))
     (b'impact result\\nschema 2\\ns', 512)
     """
-    return RESULT_MAGIC + f"schema {SCHEMA_VERSION}\nsha256 {seal}\n".encode().ljust(
-        USER_BLOCK_BYTES - len(RESULT_MAGIC), b"\0"
-    )
+    return (RESULT_MAGIC + f"schema {SCHEMA_VERSION}\nsha256 {seal}\n".encode()).ljust(USER_BLOCK_BYTES, b"\0")
 
 
 def write_seal(file: Any) -> str:

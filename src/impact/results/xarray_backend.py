@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
+import shutil
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -30,8 +31,6 @@ from .validation import schema_violation
 
 # larger results are not loaded into memory
 MAX_LOADED_BYTES = 2**29
-# bytes of a file that are copied at a time
-COPY_BUFFER_BYTES = 2**22
 
 
 def write_sealed(
@@ -100,8 +99,7 @@ def save(
 def save_with_attributes(source: Path, path: Path, attributes: Mapping[str, str]) -> None:
     """Copy a result file and set some attributes; its layout stays, an existing file is replaced."""
     with atomic_write(path, overwrite=True) as sink, source.open("rb") as file:
-        while content := file.read(COPY_BUFFER_BYTES):
-            sink.write(content)
+        shutil.copyfileobj(file, sink)
         sink.check()
         # the bytes of a modified attribute depend on its former value: create it again
         with h5py.File(sink, "r+") as stored:
