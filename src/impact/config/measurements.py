@@ -277,9 +277,8 @@ def _derived_problems(
     is_flight = "flight_time" in values
     if is_flight and not kept:
         yield "flight_time", rows[0], "got no two successive flights of one ball, expected at least two rows of it"
-    before, after, unit = (
-        ("flight_time", "flight_time", "s") if is_flight else ("drop_height", "rebound_height", "m")
-    )
+    before, after = ("flight_time", "flight_time") if is_flight else ("drop_height", "rebound_height")
+    unit = LABORATORY[before][0].unit
     most = MEASURED_OUTPUTS["e_out"].most
     large = [index for index, e in enumerate(derived.get("e_out", ())) if e > most]
     if large:

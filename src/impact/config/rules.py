@@ -115,21 +115,17 @@ def _stiffness_problems(draft: Draft) -> Iterable[ConfigProblem]:
     value = sweep.get("n")
     is_axis = isinstance(value, list) or (isinstance(value, dict) and "fit" not in value)
     if is_axis and not _vary_together(draft, "K", "n"):
-        yield (
-            ("sweep", "K"),
-            "its unit N/m^n depends on n, which is an axis; expected one K for each n, zipped with it",
-        )
+        expected = "expected one K for each n, zipped with it"
+        yield ("sweep", "K"), f"its unit N/m^n depends on n, which is an axis; {expected}"
     for model in draft.models:
         if has_other_stiffness(draft, model):
             exponent = "an axis n" if n is None else f"n = {n:g}"
             # setting n of the sweep helps unless two models have different fixed exponents
             serves = n is not None and {other.exponent for other in draft.models} <= {None, model.exponent}
             remedy = f"n = {model.exponent:g} under [sweep], " if serves else ""
-            yield (
-                ("sweep", "K"),
-                f"got a stiffness for {exponent}, but {model.key} has n = {model.exponent:g}; "
-                f"expected {remedy}K under [model.{model.key}], or no K{_exclusion_hint(draft, model)}",
-            )
+            expected = f"{remedy}K under [model.{model.key}], or no K{_exclusion_hint(draft, model)}"
+            got = f"got a stiffness for {exponent}, but {model.key} has n = {model.exponent:g}"
+            yield ("sweep", "K"), f"{got}; expected {expected}"
 
 
 def _material_problems(draft: Draft) -> Iterable[ConfigProblem]:

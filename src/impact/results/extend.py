@@ -217,11 +217,9 @@ def _check_changes(old: Plan, new: Plan, name: str) -> None:
         for field, value in properties.items()
         if key in used and used[key][field] != value and f"materials.{key}.{field}" not in swept
     ]
-    outputs = old.config.output, new.config.output
+    before, after = vars(old.config.output), vars(new.config.output)
     # copied values have the variables and the precision of the result
-    changed += [
-        f"output.{key}" for key in ("variables", "dtype") if getattr(outputs[0], key) != getattr(outputs[1], key)
-    ]
+    changed += [f"output.{key}" for key in ("variables", "dtype") if before[key] != after[key]]
     changed += [key for key in old.inputs.names() if key not in new.inputs.names()]
     # a material, or a law, that is added has inputs that the result does not have
     owners = {"", *(model.key for model in old.models), *(law.key for law in old.frictions)}

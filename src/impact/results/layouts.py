@@ -317,10 +317,7 @@ def _read_stiffness(inputs: Inputs, laws: Mapping[str, LawRecord], arrays: Array
 def _check_summary(summary: SummaryRecord, dataset: xr.Dataset, shape: tuple[int, ...]) -> None:
     """Refuse a summary of other statuses, models or points than the result has."""
     statuses = {*summary.status, *(status for status, _, _ in summary.failed_at)}
-    models = {
-        *(key for _, key, _ in summary.failed_at),
-        *(key for worst in summary.worst.values() for key in worst),
-    }
+    models = {key for _, key, _ in summary.failed_at}.union(*summary.worst.values())
     indices = [index for _, _, index in summary.failed_at]
     points = sum(summary.status.values()) + summary.not_evaluated
     if (

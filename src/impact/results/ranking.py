@@ -221,9 +221,8 @@ class Ranking(Displayed, Sequence[Ranked]):
             return f"{_listed(self.best)} {verb} {self.criterion.text} within {tol} at {alone or f'all {points}'}"
         nothing = f"no {'pair' if first.friction else 'model'} gives {self.criterion.text} within {tol}"
         if first.within:
-            nearest = [
-                ranked for ranked in self.models if _rank_key(ranked, self.floor) == _rank_key(first, self.floor)
-            ]
+            best = _rank_key(first, self.floor)
+            nearest = [ranked for ranked in self.models if _rank_key(ranked, self.floor) == best]
             verb, share = "are" if len(nearest) > 1 else "is", percentage(first.share)
             return f"{nothing} everywhere; {_listed(nearest)} {verb} nearest: {share} of {points}"
         return f"{nothing} at {alone or f'any of {points}'}"
