@@ -306,13 +306,8 @@ def as_junit(outcome: Verdict) -> str:
     is_error = isinstance(outcome, NoVerdict)
     if is_error:
         tests = {"both are readable": []}
-    numbers = {
-        "tests": len(tests),
-        "failures": sum(map(bool, tests.values())),
-        "errors": int(is_error),
-        "skipped": 0,
-    }
-    counts = {name: str(number) for name, number in numbers.items()}
+    failures, errors = sum(map(bool, tests.values())), int(is_error)
+    counts = {"tests": f"{len(tests)}", "failures": f"{failures}", "errors": f"{errors}", "skipped": "0"}
     root = ElementTree.Element("testsuites", counts)
     title = f"{PROGRAM} {safe_text(outcome.new)} {safe_text(outcome.baseline)}"
     suite = ElementTree.SubElement(root, "testsuite", {"name": title, **counts})
@@ -339,10 +334,8 @@ def as_markdown(outcome: Verdict) -> str:
     if outcome.faults:
         lines += [*(f"- {_escape_markdown(fault.text)}" for fault in by_kind(outcome.faults)), ""]
     if outcome.differing:
-        lines += [
-            "| variable | differ | worst | × tolerance | at | new | baseline |",
-            "|---|--:|--:|--:|---|--:|--:|",
-        ]
+        lines.append("| variable | differ | worst | × tolerance | at | new | baseline |")
+        lines.append("|---|--:|--:|--:|---|--:|--:|")
         for variable in outcome.differing:
             numbers = f"{number(variable.worst, 3)} | {number(variable.ratio, 3)}"
             values = f"{number(variable.new, 12)} | {number(variable.baseline, 12)}"

@@ -442,12 +442,8 @@ class Quantity:
 
     def refusal(self, value: object, number: float) -> str:
         """Say what is wrong with a number that is not allowed; one of radians may be an angle in degrees."""
-        is_bare = not isinstance(value, str)
-        if (
-            self.unit == "rad"
-            and math.isfinite(number)
-            and (is_bare or re.fullmatch(r"[^a-zA-Z]+rad\s*", str(value)))
-        ):
+        is_in_radians = not isinstance(value, str) or re.fullmatch(r"[^a-zA-Z]+rad\s*", value)
+        if self.unit == "rad" and math.isfinite(number) and is_in_radians:
             # between pi/2 and pi only whole numbers seem to be degrees
             if 0.0 < number < math.degrees(self.most) and (number > math.pi or number.is_integer()):
                 return f'got {number:.15g} rad; did you mean "{number:.15g} deg"?'
