@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -20,8 +20,6 @@ from ..errors import ResultError, UsageError
 from ..formatting import argument, prefixed, safe_text
 from .attributes import PluginRecord, read_attribute
 from .selection import match_labels
-
-InputValue = TypeVar("InputValue")
 
 
 def stored_config(
@@ -149,7 +147,7 @@ def command_start(path: str, dataset: xr.Dataset, act: str = "run") -> tuple[str
     return ("impact", act, path, *(word for file in dict.fromkeys(files) for word in ("--plugin", str(file))))
 
 
-def inputs_of_model(at: Mapping[str, InputValue]) -> dict[str, InputValue]:
+def inputs_of_model(at: Mapping[str, Any]) -> dict[str, Any]:
     """Leave out the parameters of other models and friction laws.
 
     >>> inputs_of_model({"model": "mine", "e": 0.5, "mine.c": 2.0, "other.c": 3.0, "materials.steel.E": 2e11})
