@@ -172,6 +172,14 @@ class Draft:
             for law in laws:
                 yield from ((InputName(table, law.key, parameter.name), parameter) for parameter in law.parameters)
 
+    @property
+    def missing_parameters(self) -> Iterator[InputName]:
+        """The parameters of the selected laws that have neither a default nor a value."""
+        for name, parameter in self.parameters:
+            is_required = parameter.default is None and not parameter.optional
+            if is_required and name.key not in as_table(self.table(name.table).get(name.owner)):
+                yield name
+
     @cached_property
     def input_names(self) -> list[str]:
         """The config names of all inputs, whether or not their values are valid."""

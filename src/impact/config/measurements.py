@@ -419,13 +419,9 @@ def add_fits(draft: Draft) -> Draft:
     uses_e |= any(law.may_use_e for law in draft.frictions)
     has_e = not {"e", "alpha"}.isdisjoint({*draft.table("sweep"), *as_table(draft.table("data").get("columns"))})
     paths: list[KeyPath] = [("sweep", "e")] if uses_e and not has_e else []
-    paths += [
-        name.path for name, parameter in draft.parameters if parameter.default is None and not parameter.optional
-    ]
     data = draft.data
-    for path in paths:
-        if not contains_path(data, path):
-            data, _ = set_value(data, path, {"fit": True})
+    for path in (*paths, *(name.path for name in draft.missing_parameters)):
+        data, _ = set_value(data, path, {"fit": True})
     return replace(draft, data=data)
 
 

@@ -17,14 +17,7 @@ from .draft import Draft, listed_names
 from .files import as_table
 from .input_names import InputName
 from .quantities import ConfigProblem, KeyPath, Quantity
-from .tables import (
-    FIXED_STEP_INPUTS,
-    MATERIAL_QUANTITIES,
-    OBLIQUE_INPUTS,
-    SWEEP_DEFAULTS,
-    SWEEP_QUANTITIES,
-    law_quantities,
-)
+from .tables import FIXED_STEP_INPUTS, MATERIAL_QUANTITIES, OBLIQUE_INPUTS, SWEEP_DEFAULTS, SWEEP_QUANTITIES
 
 
 def _sets_stiffness(draft: Draft, model: ForceModel) -> bool:
@@ -195,12 +188,10 @@ def _radius_problems(draft: Draft) -> Iterable[ConfigProblem]:
 
 def _parameter_problems(draft: Draft) -> Iterable[ConfigProblem]:
     """Check that parameters without a default are set."""
-    for table, law in ((table, law) for table, laws in draft.laws.items() for law in laws):
-        given = as_table(draft.table(table).get(law.key))
-        hint = _exclusion_hint(draft, law) if isinstance(law, ForceModel) else ""
-        for parameter in law.parameters:
-            if parameter.default is None and not parameter.optional and parameter.name not in given:
-                yield (table, law.key, parameter.name), _missing(law_quantities(law)[parameter.name]) + hint
+    for name in draft.missing_parameters:
+        quantity, model = name.quantity(draft.known_models), draft.known_models.get(name.model)
+        assert quantity is not None
+        yield name.path, _missing(quantity) + ("" if model is None else _exclusion_hint(draft, model))
 
 
 def _fixed_step_problems(draft: Draft) -> Iterable[ConfigProblem]:
