@@ -143,6 +143,25 @@ def test_with_much_friction_a_linear_spring_never_slips() -> None:
     assert spring["beta"].item() == pytest.approx(-math.cos(w * spring["contact_time"].item()), abs=1e-6)
 
 
+@pytest.mark.parametrize("friction", ["lammps-mindlin-rescale", "yade-mindlin"])
+def test_springs_of_a_permanent_indentation_are_those_of_small_steps(friction: str) -> None:
+    """k = k_t x^(1/2) with the whole indentation x, also where the contact ends before x = 0."""
+    parameters = {"lammps-mindlin-rescale": {"xt": 0.0}, "yade-mindlin": {"betas": 0.1}}
+    source = {
+        "models": ["thornton-1997", "lankarani-nikravesh-1994", "jackson-green-2010"],
+        "frictions": friction,
+        "materials": {"soft": {"E": 7e6, "nu": 0.2, "yield_strength": 2e5}},
+        "sweep": {"v1": 1.5, "e": 0.6, "n": 1.5, "m1": 0.4, "m2": 0.2, "R1": 0.016, "R2": 0.076, "mu": 0.4}
+        | {"material": "soft", "u1": [0.3, 1.2]},
+        "friction": {friction: {"kt_over_kn": 0.8, **parameters[friction]}},
+    }
+    steps = {"sweep.steps_per_contact": 5_000, "sweep.phase": 0.5, "solver.integrator": "kick-drift"}
+    result, small_steps = impact.sweep(source), impact.sweep(source, overrides=steps)
+    assert (result["permanent_indentation"] > 0.1 * result["peak_indentation"]).all()
+    assert np.abs(result["friction_residual"]).max() < 1e-9
+    np.testing.assert_allclose(result["beta"].values, small_steps["beta"].values, atol=1e-3)
+
+
 def test_a_slip_sticks_where_the_normal_force_jumps_up_as_in_small_steps() -> None:
     """The force of Kogut and Etsion jumps by 1.7 % at six times the indentation of first yield."""
     source = {

@@ -28,6 +28,7 @@ from ..ode.problem import Margins, Params, Problem
 from . import motion
 from .formula_calls import Formula, argument_names, call_by_name
 from .piecewise import STEP_BEYOND, Breakpoint
+from .powers import integer_power, power
 from .velocity_coordinates import signed_power
 
 FrictionKind = Literal["coulomb", "spring", "dashpot", "regularized", "cone"]
@@ -136,7 +137,7 @@ class Columns(NamedTuple):
     `limit`, `spring` and `dashpot` are the factors of F, X^r z and x^q Gamma in the force, zero in other modes;
     `memory_limit` is the factor of F in phi_e for the memory work. `share` is N/F over G0: positive, and in
     tension negative or zero; `sign` is the sign of F. `root` is the root of kappa', and `compliance` the inverse
-    of kappa', zero without a spring.
+    of kappa', zero without a spring. `residual` is the permanent indentation, above which s is.
     """
 
     mode: Array
@@ -152,6 +153,7 @@ class Columns(NamedTuple):
     damping: Array
     G0: Array
     is_positive: Array
+    residual: Array
 
     def changed(self, mode: Array, sign: Array) -> Columns:
         """Make the columns of other modes and signs of the normal force."""
@@ -288,6 +290,14 @@ class SlipPhase:
         """The s that belongs to END_X."""
         return float(END_X ** (1.0 / self.law.model.coordinate_power))
 
+    def whole(self, s: Array, columns: Columns) -> tuple[Array, Array | float]:
+        """Compute the s of the whole indentation, of which spring and dashpot are, and its rate over that of s."""
+        if not (self.unloads and self.law.model.is_permanent):
+            return s, 1.0
+        p = self.law.model.coordinate_power
+        whole = power(integer_power(np.abs(s), p) + columns.residual, 1.0 / p)
+        return whole, integer_power(s / _away_from_zero(whole), p - 1)
+
     def columns(self, params: Params) -> Columns:
         return Columns(*params[self.first : self.first + len(Columns._fields)])
 
@@ -316,7 +326,8 @@ class SlipPhase:
         weight = out[TIME_ROW] if len(out) > TIME_ROW else np.empty(n)
         force = out[-1] if len(out) > TIME_ROW + len(rows) else np.empty(n)
         self._write_normal((out[0], out[1], weight, None, force), y[:2], params)
-        v, s, slip = out[0], y[0], y[SLIP_ROW]
+        v, slip = out[0], y[SLIP_ROW]
+        s, growth = self.whole(y[0], columns)
         phi = slip_spring = columns.limit * force
         if form.coefficient is not None:
             names, values = argument_names(form.coefficient), params[self.first + len(columns) :]
@@ -327,7 +338,7 @@ class SlipPhase:
             spring_force = self._times(columns.spring * y[SPRING_ROW], s, self.memory * self.stiffness_power)
             phi = phi + spring_force
             np.multiply(columns.spring, slip, out[SPRING_ROW])
-            out[SPRING_ROW] *= self._stretch(s, weight)
+            out[SPRING_ROW] *= self._stretch(s, growth, weight)
         else:
             out[SPRING_ROW] = 0.0
         if form.has_dashpot:
@@ -351,7 +362,7 @@ class SlipPhase:
             np.multiply(weight * slip, spring_force, out[rows["stick_work"]])
             memory_work = out[rows["limit_memory"]]
             # beyond the end of the contact it does not matter
-            np.divide(v, signed_power(np.maximum(s, LEAST_S), self.stiffness_power + 1.0), memory_work)
+            np.divide(growth * v, signed_power(np.maximum(s, LEAST_S), self.stiffness_power + 1.0), memory_work)
             memory_work *= (0.5 - self.memory) * self.stiffness_power * columns.compliance
             memory_work *= slip_spring * slip_spring
         return out
@@ -360,13 +371,13 @@ class SlipPhase:
         """Multiply by a power of s."""
         return factor * signed_power(s, exponent) if exponent else factor
 
-    def _stretch(self, s: Array, weight: Array) -> Array:
+    def _stretch(self, s: Array, growth: Array | float, weight: Array) -> Array:
         """Compute w X^(1-r)."""
         exponent = (1.0 - self.memory) * self.stiffness_power
         if exponent >= 0.0:
             return self._times(weight, s, exponent)
         p = self.law.model.coordinate_power
-        return p * signed_power(s, p - 1.0 + exponent)
+        return np.asarray(growth * (p * signed_power(s, p - 1.0 + exponent)))
 
     def _energy(self, s: Array, force: Array, columns: Columns) -> Array:
         """Compute the energy of a spring of this force, over G0^2; zero without a spring."""
@@ -375,8 +386,8 @@ class SlipPhase:
 
     def local(self, y: Array, k: Array, params: Params) -> Local:
         """Compute the state of friction at components y with rates k."""
-        form, columns, s = self.form, self.columns(params), y[0]
-        d_force = self._rate_of_force(y, k, params)
+        form, columns = self.form, self.columns(params)
+        d_force, (s, _) = self._rate_of_force(y, k, params), self.whole(y[0], columns)
         N, drag = columns.share * k[-1], NO_FORCE
         if form.has_dashpot:
             drag = self._times(columns.damping * y[SLIP_ROW], s, self.drag_power)
@@ -414,15 +425,17 @@ class SlipPhase:
 
     def trial_rate(self, y: Array, k: Array, columns: Columns, spring_force: Array, phi: Array) -> Array:
         """Compute the rate of the trial force if the contact sticks, at a force phi and one of the spring."""
-        form, s, slip, weight, rate = self.form, y[0], y[SLIP_ROW], k[TIME_ROW], NO_FORCE
+        form, slip, weight, rate = self.form, y[SLIP_ROW], k[TIME_ROW], NO_FORCE
+        s, growth = self.whole(y[0], columns)
+        rate_of_s = growth * k[0]
         if self.form.kind == "spring":
             rate = self._times(columns.root * columns.root * weight * slip, s, self.stiffness_power)
             if self.memory and self.stiffness_power:
-                rate = rate + self.memory * self.stiffness_power * k[0] / _away_from_zero(s) * spring_force
+                rate = rate + self.memory * self.stiffness_power * rate_of_s / _away_from_zero(s) * spring_force
         if form.has_dashpot and (form.is_total or form.kind == "dashpot"):
             rate = rate - self._times(columns.damping * (weight * phi), s, self.drag_power)
             if self.drag_power:
-                growing = self._times(columns.damping * (self.drag_power * k[0]), s, self.drag_power - 1.0)
+                growing = self._times(columns.damping * (self.drag_power * rate_of_s), s, self.drag_power - 1.0)
                 rate = rate + growing * slip
         return rate
 
@@ -550,7 +563,8 @@ class SlipPhase:
         """Go on in other modes, with a force of the spring if the contact sticks; account for its energies."""
         form, track, columns = self.form, self.track, self.columns(params)
         index = columns.row.astype(np.intp)
-        old, before, after = track.mode[index], *(self._energy(y[0], f, columns) for f in (force_before, force))
+        old, (s, _) = track.mode[index], self.whole(y[0], columns)
+        before, after = self._energy(s, force_before, columns), self._energy(s, force, columns)
         was_slip, is_slip = np.abs(old) == 1.0, np.abs(new) == 1.0
         # the work of a dashpot while slipping is a part of that against the limit
         work, memory = form.integral("work", y), form.integral("limit_memory", y)
@@ -566,7 +580,7 @@ class SlipPhase:
         # the first mode is no change
         track.changes[index] += (old != new) & (track.regime[index] != 0)
         track.regime[index] |= np.where(is_held, STICKS | SLIDES, np.where(is_slip, SLIDES, STICKS))
-        scale = self._times(columns.root, _away_from_zero(y[0]), self.memory * self.stiffness_power)
+        scale = self._times(columns.root, _away_from_zero(s), self.memory * self.stiffness_power)
         y = y.copy()
         y[SPRING_ROW] = np.where(new == 0.0, np.where(columns.root > 0.0, force / scale, 0.0), y[SPRING_ROW])
         return y, self._changed(params, new, sign)[1]
@@ -584,8 +598,9 @@ class SlipPhase:
         y = np.array([np.where(np.abs(y[0]) < self.end, self.end, y[0]), *y[1:]])
         k, columns = self.rates(y, params), self.columns(params)
         N, dN = columns.share * k[-1], columns.share * self._rate_of_force(y, k, params)
-        stiffness = self._times(columns.root * columns.root * k[TIME_ROW], y[0], self.stiffness_power)
-        fading = self.memory * self.stiffness_power * k[0] / _away_from_zero(y[0]) * N
+        s, growth = self.whole(y[0], columns)
+        stiffness = self._times(columns.root * columns.root * k[TIME_ROW], s, self.stiffness_power)
+        fading = self.memory * self.stiffness_power * (growth * k[0]) / _away_from_zero(s) * N
         return direction * (dN - fading) / stiffness, N
 
     def _held_force(self, y: Array, params: Params, direction: Array) -> Array:
@@ -601,7 +616,7 @@ class SlipPhase:
         columns, y = self.columns(params), y[:N_COMPONENTS]
         slip, N = self._held_slip(y, params, direction)
         force = self._held_force(y, params, direction)
-        drag = self._times(columns.damping * slip, y[0], self.drag_power)
+        drag = self._times(columns.damping * slip, self.whole(y[0], columns)[0], self.drag_power)
         above_slip = (force - direction * N) * np.sign(drag)
         return np.minimum(above_slip, np.abs(drag) - above_slip), above_slip < 0.5 * np.abs(drag)
 
@@ -641,7 +656,7 @@ class SlipPhase:
         if held.size:
             # between that of a slip and that of sticking; as both vanish the rate of the slip loses its digits
             limit = columns.memory_limit * k[-1]
-            drag = self._times(columns.damping * slip, y[0], self.drag_power)
+            drag = self._times(columns.damping * slip, self.whole(y[0], columns)[0], self.drag_power)
             bounds = np.sort([limit, limit + drag], axis=0)[:, held]
             direction = np.sign(columns.mode[held])
             force[held] = np.clip(self._held_force(y.take(held, 1), _taken(params, held), direction), *bounds)
@@ -746,8 +761,9 @@ class SlipPhase:
         kept = self.memory * self.form.stiffness_power
         order = np.where(columns.mode == 0.0, kept, self.track.order[index])
         is_finite = 2.0 * order > self.form.stiffness_power - ORDER_TOLERANCE
-        is_finite |= (np.abs(columns.mode) == 2.0) | (y[0] > END_S)
-        self.track.energy[index] = np.where(is_finite, self._energy(near[0], force, columns), 0.0)
+        s, _ = self.whole(near[0], columns)
+        is_finite |= (np.abs(columns.mode) == 2.0) | (s > END_S)
+        self.track.energy[index] = np.where(is_finite, self._energy(s, force, columns), 0.0)
         self.track.add_impulse(columns, k[0], y[SLIP_ROW])
 
 

@@ -219,7 +219,7 @@ def _integrate(
     track, form = Track.of(n), replace(form, has_dashpot=bool(damping.any()))
     unset, compliance = np.zeros(n), np.where(stiffness > 0.0, 1.0 / stiffness, 0.0)
     base = Columns(
-        *(unset,) * 7, np.arange(n, dtype=float), np.sqrt(stiffness), compliance, damping, slip, is_positive
+        *(unset,) * 7, np.arange(n, dtype=float), np.sqrt(stiffness), compliance, damping, slip, is_positive, unset
     )
     states: list[Array] = []
 
@@ -227,7 +227,9 @@ def _integrate(
         law: motion.MotionLaw, problem: Problem, start: Array, params: Params, recovery: simulate.Recovery | None
     ) -> Solution:
         index, residual = (slice(None), None) if recovery is None else recovery
-        columns = tuple(column[index] for column in (*base, *coefficient))
+        in_phase = Columns(*(column[index] for column in base))
+        in_phase = in_phase if residual is None else in_phase._replace(residual=residual)
+        columns = (*in_phase, *(column[index] for column in coefficient))
         rows = np.vstack([start, *(states[0][2:, index] if states else (np.ones(n), np.zeros(n)))])
         params, breakpoints = motion.breakpoints(law, params, rows, residual)
         phase = SlipPhase(form, law, problem, len(params), recovery is not None, track, breakpoints)
