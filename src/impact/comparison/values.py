@@ -165,11 +165,9 @@ def _slabs(name: str, aligned: Alignment, region: Region) -> Iterator[dict[str, 
     sizes: dict[Hashable, int] = {dim: part.stop - part.start for dim, part in region.items()}
     variable = aligned.baseline.variables[name]
     chunks = dict(zip(variable.dims, variable.encoding.get("chunksizes") or (), strict=False))
-    if slabs.is_lazy(variable) and chunks and math.prod(chunks.values()) <= slabs.SLAB_POINTS:
-        parts = slabs.slabs(sizes, chunks=[chunks.get(dim, 1) for dim in sizes])
-    else:
-        parts = slabs.slabs(sizes)
-    for slab in parts:
+    if not slabs.is_lazy(variable) or math.prod(chunks.values()) > slabs.SLAB_POINTS:
+        chunks = {}
+    for slab in slabs.slabs(sizes, chunks=[chunks.get(dim, 1) for dim in sizes]):
         yield {
             dim: slice(part.start + slab[dim].start, part.start + slab[dim].stop) for dim, part in region.items()
         }
