@@ -71,9 +71,9 @@ def align_sweeps(new: xr.Dataset, baseline: xr.Dataset, *, subset: bool) -> Alig
             continue
         # the column that gives the axis its name comes first
         names = sorted(columns[0], key=lambda name: name != axis)
-        new_labels, labels = ([coords[name].values for name in names] for coords in (a, b))
-        positions[axis] = match_labels(new_labels, labels)
-        faults += _unmatched_labels(new_labels, labels, names, positions[axis], subset=subset)
+        labels = [[coords[name].values for name in names] for coords in (a, b)]
+        positions[axis] = match_labels(*labels)
+        faults += _unmatched_labels(labels, names, positions[axis], subset=subset)
     faults += _changed_scalars(a, b, "nothing in common" if subset else "physics config")
     if any(fault.kind == "nothing in common" for fault in faults):
         return Alignment(xr.Dataset(), xr.Dataset(), {}, tuple(faults))
@@ -180,22 +180,17 @@ def _label_columns(dataset: xr.Dataset, axis: str) -> list[str]:
 
 
 def _unmatched_labels(
-    new: Sequence[Labels],
-    baseline: Sequence[Labels],
-    names: Sequence[str],
-    positions: tuple[IndexArray, IndexArray],
-    *,
-    subset: bool,
+    labels: Sequence[Sequence[Labels]], names: Sequence[str], positions: Sequence[IndexArray], *, subset: bool
 ) -> list[Difference]:
-    """List the labels of an axis that only one result has; labels of a zip group with all columns."""
+    """List the labels of an axis that only one of two results has; labels of a zip group with all columns."""
     axis = names[0]
     if not len(positions[0]):
-        sides = f"{_first_labels(new, names)}, in BASELINE {_first_labels(baseline, names)}"
+        sides = ", in BASELINE ".join(_first_labels(columns, names) for columns in labels)
         return [Difference("nothing in common", axis, f"no value of {safe_text(axis)} is in both: {sides}")]
     if subset:
         return []
     texts = []
-    for columns, common, side in ((new, positions[0], "NEW"), (baseline, positions[1], "BASELINE")):
+    for columns, common, side in zip(labels, positions, ("NEW", "BASELINE"), strict=True):
         unmatched = [np.delete(values, common) for values in columns]
         if len(unmatched[0]):
             texts.append(
