@@ -178,10 +178,8 @@ def build(draft: Draft, max_points: int = MAX_POINTS, purpose: Purpose = "sweep"
     draft = draft.with_problems(problems)
     if not draft.problems:
         draft = draft.with_problems(_settings_problems(document, axes, draft))
-    if not draft.problems and draft.measurements is not None:
-        draft = draft.with_problems(
-            measurements.count_problems(draft.measurements, fits, draft.models, draft.frictions)
-        )
+    if not draft.problems:
+        draft = draft.with_problems(measurements.count_problems(draft, fits))
     if draft.problems or draft.lines:
         raise draft.error()
     measured = draft.measurements.inputs if draft.measurements is not None else {}

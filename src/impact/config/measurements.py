@@ -563,21 +563,18 @@ def fitted_parameters(
     return tuple(filter(is_used, fits))
 
 
-def count_problems(
-    measurements: Measurements,
-    fits: Mapping[str, tuple[float, float]],
-    models: Sequence[ForceModel],
-    frictions: Sequence[FrictionLaw] = (),
-) -> Iterator[ConfigProblem]:
+def count_problems(draft: Draft, fits: Mapping[str, tuple[float, float]]) -> Iterator[ConfigProblem]:
     """Check that there are as many measured values as parameters of a law."""
-    n_values = len(measurements.lines) * len(measurements.outputs)
+    if draft.measurements is None:
+        return
+    n_values = len(draft.measurements.lines) * len(draft.measurements.outputs)
     counts = {
         law_name(*(law.key for law in (model, friction) if law)): len(fitted_parameters(fits, model, friction))
-        for model in models
-        for friction in frictions or (None,)
+        for model in draft.models
+        for friction in draft.frictions or (None,)
     }
     key = max(counts, key=lambda name: counts[name])
     if counts[key] > n_values:
         got = f"{n_values} measured value{'s' * (n_values != 1)}"
         expected = f"at least {counts[key]}, the number of parameters to fit of {key}"
-        yield ("data", "file" if measurements.file else "columns"), f"got {got}, expected {expected}"
+        yield ("data", "file" if draft.measurements.file else "columns"), f"got {got}, expected {expected}"
