@@ -271,7 +271,7 @@ def align_calibrations(new: xr.Dataset, baseline: xr.Dataset, *, subset: bool) -
     both = [name for name in CALIBRATION if name in new and name in baseline] if is_same_data else []
     names = [name for name in both if new[name].size]
     scales = {name: _scale(name, baseline) for name in names}
-    return _align(new, baseline, scales, faults, _fit_notes(new, baseline))
+    return _align((new, baseline), scales, faults, _fit_notes(new, baseline))
 
 
 def _of_laws(study: xr.Dataset, keys: Sequence[str], *, subset: bool) -> xr.Dataset:
@@ -304,7 +304,7 @@ def align_boards(new: xr.Dataset, baseline: xr.Dataset, *, subset: bool) -> Alig
     new, baseline = (dataset.sel(common) for dataset in (new, baseline))
     # all numbers are dimensionless; what is not supported in one of them differs by its status
     scales = {name: np.maximum(1.0, np.abs(np.nan_to_num(baseline[name].values.astype(float)))) for name in names}
-    return _align(new, baseline, scales, faults, _version_notes(new, baseline))
+    return _align((new, baseline), scales, faults, _version_notes(new, baseline))
 
 
 def _version_notes(new: xr.Dataset, baseline: xr.Dataset) -> Iterator[str]:
@@ -318,16 +318,13 @@ def _version_notes(new: xr.Dataset, baseline: xr.Dataset) -> Iterator[str]:
 
 
 def _align(
-    new: xr.Dataset,
-    baseline: xr.Dataset,
-    scales: Mapping[str, Array],
-    faults: Iterable[Difference],
-    notes: Iterable[str],
+    studies: Sequence[xr.Dataset], scales: Mapping[str, Array], faults: Iterable[Difference], notes: Iterable[str]
 ) -> Alignment:
     """Align two studies whose points are in the same order; the variables that have a scale are compared."""
+    baseline = studies[1]
     labels = {dim: baseline.variables[dim] for dim in baseline.dims if dim in baseline.coords}
     coords = xr.Coordinates(labels, indexes={})
-    a, b = (xr.Dataset({name: study.variables[name] for name in scales}, coords) for study in (new, baseline))
+    a, b = (xr.Dataset({name: study.variables[name] for name in scales}, coords) for study in studies)
     dims = {name: tuple(map(str, baseline[name].dims)) for name in scales}
     return Alignment(a, b, dims, tuple(faults), scales, tuple(notes))
 

@@ -116,10 +116,10 @@ def compare_values(
         weight = math.prod(aligned.baseline.sizes[dim] for dim in dims if dim not in region)
         for slab in _slabs(variable.name, aligned, region):
             part = {dim: slab.get(dim, slice(0, 1)) for dim in dims}
-            a, b = (slabs.read_slab(result, variable.name, part) for result in (aligned.new, aligned.baseline))
-            if np.array_equal(a, b):
+            sides = [slabs.read_slab(result, variable.name, part) for result in (aligned.new, aligned.baseline)]
+            if np.array_equal(sides[0], sides[1]):
                 continue
-            ratio, difference = _ratio(variable, aligned, part, a, b, tol)
+            ratio, difference = _ratio(variable, aligned, part, sides, tol)
             different += int(np.count_nonzero(ratio > 1.0)) * weight
             if not ratio.max():
                 continue
@@ -127,7 +127,7 @@ def compare_values(
             sizes = np.ones_like(ratio) if variable.scale == "exact" else np.nan_to_num(difference, nan=np.inf)
             index = np.unravel_index(int(np.argmax(np.where(ratio == ratio.max(), sizes, -1.0))), ratio.shape)
             place = tuple(-part[dim].start - int(offset) for dim, offset in zip(dims, index, strict=True))
-            values = (float(array[index]) for array in (difference, a, b))
+            values = (float(array[index]) for array in (difference, *sides))
             worst = max(worst, Worst(float(ratio[index]), float(sizes[index]), place, *values))
             for axis, dim in enumerate(dims):
                 maxima = ratio.max(axis=tuple(other for other in range(len(dims)) if other != axis))
@@ -174,21 +174,17 @@ def _slabs(name: str, aligned: Alignment, region: Region) -> Iterator[dict[str, 
 
 
 def _ratio(
-    variable: Variable,
-    aligned: Alignment,
-    region: Region,
-    a: NDArray[Any],
-    b: NDArray[Any],
-    tol: float,
+    variable: Variable, aligned: Alignment, region: Region, sides: Sequence[NDArray[Any]], tol: float
 ) -> tuple[NDArray[Any], NDArray[Any]]:
     """Compute the differences over the tolerance, inf if none is allowed or a NaN is unexplained, and in SI."""
+    a, b = sides
     missing = np.isnan(a.astype(float)), np.isnan(b.astype(float))
     with np.errstate(all="ignore"):
         difference = np.where(a == b, 0.0, np.abs(a.astype(float) - b.astype(float)))
         largest = np.maximum(np.abs(a), np.abs(b))
         scale = _scale(variable, aligned, region, b.shape)
         # allow for the rounding of values that were stored in single precision
-        lost = sum(float(np.finfo(values.dtype).eps) for values in (a, b) if values.dtype == np.float32)
+        lost = sum(float(np.finfo(values.dtype).eps) for values in sides if values.dtype == np.float32)
         allowed = tol * scale + (lost * largest if lost else 0.0)
         # a residual is noise: any value within its bound is accepted
         counted = np.minimum(difference, largest) if variable.scale == "bounded by 10 rtol" else difference
