@@ -13,7 +13,7 @@ from ..errors import did_you_mean
 from ..formatting import argument
 from .draft import Draft
 from .input_names import InputName, input_values
-from .quantities import MAX_PROBLEMS, ConfigProblem, Names, Numbers, Range, as_text
+from .quantities import MAX_PROBLEMS, ConfigProblem, Range, Values, as_text
 
 # default limit of the points of all models together
 MAX_POINTS = 10**9
@@ -61,19 +61,13 @@ class Axis:
 
 
 def build_grid(
-    draft: Draft,
-    values: Mapping[str, Numbers | Names],
-    groups: Sequence[Sequence[str]],
-    samples: Sequence[str],
-    max_points: int,
-    *,
-    in_full: bool,
+    draft: Draft, values: Values, groups: Sequence[Sequence[str]], samples: Sequence[str], max_points: int | None
 ) -> tuple[tuple[Axis, ...], list[ConfigProblem]]:
     """Build the axes of valid values by config name, and list problems.
 
     `groups` and `samples` name those that vary together.
 
-    Unless every point is stored (`in_full`), the number of trajectories is limited later.
+    Without `max_points`, where not every point is stored, the number of trajectories is limited later.
     """
     cases = [str(InputName.of_path(path)) for path in draft.cases]
     sizes = {name: value.size for name, value in values.items() if isinstance(value, Range)}
@@ -98,13 +92,13 @@ def build_grid(
     most_axes = MAX_AXES - bool(draft.frictions)
     if len(leaders) > most_axes:
         problems.append((("sweep",), f"got {len(leaders)} axes, expected at most {most_axes}"))
-    limit = max_points if in_full else MAX_COUNTED_POINTS
+    limit = MAX_COUNTED_POINTS if max_points is None else max_points
     if points > limit:
         times = "models and friction laws" if draft.frictions else "models"
         number_of_bytes = 8 * len(default_variables(bool(draft.frictions))) * points
         size = f"{points:,} points (axes times {times}), up to {number_of_bytes / 1e9:,.0f} GB"
         option = argument("max_points")
-        hint = f' in layout "full" ({option}); layout = "factored" stores any number' if in_full else ""
+        hint = "" if max_points is None else f' in layout "full" ({option}); layout = "factored" stores any number'
         problems.append((("sweep",), f"got {size}, expected at most {limit:,} points{hint}"))
     columns: dict[str, AxisValues] = {}
     for name in axis_names:

@@ -25,7 +25,7 @@ from .files import as_table, override_text, set_value
 from .grid import MAX_POINTS, Axis, build_grid, chunk_problems
 from .input_names import InputName, paths_with
 from .library import library
-from .quantities import VALUE_FORMS, Column, ConfigProblem, Distribution, FitRange, KeyPath, as_text
+from .quantities import VALUE_FORMS, Column, ConfigProblem, Distribution, FitRange, KeyPath, Values, as_text
 from .rules import check_rules, materials_of
 from .samples import design_problems, draw_columns, unit_samples
 
@@ -173,8 +173,8 @@ def build(draft: Draft, max_points: int = MAX_POINTS, purpose: Purpose = "sweep"
         draft = draft.with_problems((InputName.parse(name).path, message) for name, message in refused.items())
         values |= {name: tuple(column.tolist()) for name, column in drawn.items()}
     groups = document.sweep.zip if purpose == "sweep" else ()
-    in_full = document.output.is_full
-    axes, problems = build_grid(draft, values, groups, list(distributions), max_points, in_full=in_full)
+    limit = max_points if document.output.is_full else None
+    axes, problems = build_grid(draft, values, groups, list(distributions), limit)
     draft = draft.with_problems(problems)
     if not draft.problems:
         draft = draft.with_problems(_settings_problems(document, axes, draft))
@@ -294,9 +294,7 @@ def _valid_values(document: tables.Document, draft: Draft) -> dict[str, quantiti
     }
 
 
-def _fit_bounds(
-    values: Mapping[str, quantities.Numbers | quantities.Names], draft: Draft
-) -> tuple[dict[str, tuple[float, float]], list[ConfigProblem]]:
+def _fit_bounds(values: Values, draft: Draft) -> tuple[dict[str, tuple[float, float]], list[ConfigProblem]]:
     """Find the bounds of the parameters to fit; NaN for those that the size of the contact gives."""
     fits: dict[str, tuple[float, float]] = {}
     problems: list[ConfigProblem] = []
@@ -329,11 +327,7 @@ def _build_material(table: tables.MaterialTable) -> Material:
 
 
 def _calibration_problems(
-    data: Mapping[str, Any],
-    values: Mapping[str, quantities.Numbers | quantities.Names],
-    fits: Mapping[str, tuple[float, float]],
-    *,
-    are_valid: bool,
+    data: Mapping[str, Any], values: Values, fits: Mapping[str, tuple[float, float]], *, are_valid: bool
 ) -> Iterator[ConfigProblem]:
     """Check that a calibration has measurements, a parameter to fit and no axes, given its valid values.
 

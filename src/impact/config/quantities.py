@@ -364,6 +364,8 @@ class Distribution(_OneForm):
 # the values of keys that may be axes
 Numbers: TypeAlias = float | tuple[float, ...] | Range | Column | FitRange | Distribution
 Names: TypeAlias = str | tuple[str, ...] | Column
+# the valid values of inputs by config name
+Values: TypeAlias = Mapping[str, Numbers | Names]
 
 
 def value_form(value: object) -> str:
