@@ -118,27 +118,21 @@ def build_grid(
     # a group member with an invalid value has no column; that problem is reported by the validation
     groups = [member_of.get(name, (name,)) for name in leaders]
     is_complete = not problems and all(name in columns for group in groups for name in group)
-    return _build_axes(groups, columns, cases, samples) if is_complete else (), problems
+    dimension_of = dict.fromkeys(cases, "case") | dict.fromkeys(samples, SAMPLE)
+    return _build_axes(groups, columns, dimension_of) if is_complete else (), problems
 
 
 def _build_axes(
-    groups: Sequence[Sequence[str]],
-    columns: Mapping[str, AxisValues],
-    cases: Sequence[str],
-    samples: Sequence[str],
+    groups: Sequence[Sequence[str]], columns: Mapping[str, AxisValues], dimension_of: Mapping[str, str]
 ) -> tuple[Axis, ...]:
     """Build the axes of groups of columns; the first column without repeated values names the axis."""
     axes: list[Axis] = []
     # the points of cases, and of a group without such a column, are numbered: "case", then "case_2" and so on
-    numbered = 1 if cases else 0
+    numbered = int("case" in dimension_of.values())
     for group in groups:
         naming = [name for name in group if len(set(columns[name])) == len(columns[name])]
-        dimension = ""
-        if group[0] in cases:
-            dimension = "case"
-        elif group[0] in samples:
-            dimension = SAMPLE
-        elif not naming:
+        dimension = dimension_of.get(group[0], "")
+        if not dimension and not naming:
             numbered += 1
             dimension = "case" if numbered == 1 else f"case_{numbered}"
         names = group if dimension else (naming[0], *(name for name in group if name != naming[0]))
@@ -164,10 +158,7 @@ def chunk_problems(
 
 
 def _zip_groups(
-    groups: Sequence[Sequence[str]],
-    sizes: Mapping[str, int],
-    refused: Mapping[str, str],
-    config_names: Sequence[str],
+    groups: Sequence[Sequence[str]], sizes: Mapping[str, int], refused: Mapping[str, str], known: Sequence[str]
 ) -> tuple[dict[str, Sequence[str]], list[ConfigProblem]]:
     """Find the group of each zipped name; `sizes` has the axes, and `refused` what is wrong with other names."""
     member_of: dict[str, Sequence[str]] = {}
@@ -177,9 +168,9 @@ def _zip_groups(
         names = [str(InputName.parse(name)) for name in group[:MAX_PROBLEMS]]
         for member_index, name in enumerate(names):
             path = ("sweep", "zip", group_index, member_index)
-            if name not in config_names:
-                axes = [key for key in config_names if key in sizes]
-                suggestion = did_you_mean(name, axes or list(config_names))
+            if name not in known:
+                axes = [key for key in known if key in sizes]
+                suggestion = did_you_mean(name, axes or list(known))
                 problems.append((path, f"got {as_text(name)}, expected an axis; {suggestion}"))
             elif name in member_of:
                 problems.append((path, f"got {as_text(name)} twice, expected each name once"))
