@@ -106,19 +106,12 @@ INDEX_HEADINGS = ("input", "first-order", "95 %", "total", "95 %", "first-order,
 def _index_rows(study: Mapping[str, Any]) -> list[tuple[str, ...]]:
     """Write a row for each input that matters, the largest total index first, under INDEX_HEADINGS."""
 
-    def interval(row: Mapping[str, float], name: str) -> str:
+    def index(row: Mapping[str, float], name: str) -> tuple[str, str]:
         lower, upper = (row[f"{name}_{end}"] for end in ("lower", "upper"))
-        return "–" if lower != lower else f"{decimals(lower)} to {decimals(upper)}"
+        return decimals(row[name]), "–" if lower != lower else f"{decimals(lower)} to {decimals(upper)}"
 
     return [
-        (
-            row["input"],
-            decimals(row["first"]),
-            interval(row, "first"),
-            decimals(row["total"]),
-            interval(row, "total"),
-            *(decimals(row[name]) for name in HALF),
-        )
+        (row["input"], *index(row, "first"), *index(row, "total"), *(decimals(row[name]) for name in HALF))
         for row in sorted(study["indices"], key=lambda row: -np.nan_to_num(row["total"]))
         # NaN without a result
         if abs(row["total"]) > 0.0
