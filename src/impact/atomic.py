@@ -153,8 +153,8 @@ def atomic_write(path: Path, *, overwrite: bool, part: Path | None = None) -> It
         ) from error
 
 
-def check_output(path: Path, *, overwrite: bool, source: Path | None = None) -> None:
-    """Raise a UsageError, before any work, for an output that cannot be written or is the file to be read."""
+def check_output(path: Path, *sources: Path, overwrite: bool) -> None:
+    """Raise a UsageError, before any work, for an output that cannot be written or is a file to be read."""
     folder = path.parent
     if not folder.is_dir():
         raise UsageError(f"{path}: the folder {folder} does not exist")
@@ -169,7 +169,7 @@ def check_output(path: Path, *, overwrite: bool, source: Path | None = None) -> 
         raise UsageError(f"{path}: {error.strerror}") from None
     if not stat.S_ISREG(mode):
         raise UsageError(f"{path}: is not a regular file, and is not modified")
-    if source is not None and source.exists() and path.samefile(source):
+    if any(source.exists() and path.samefile(source) for source in sources):
         raise UsageError(f"{path}: is the file to be read, and is not modified")
     if not overwrite:
         raise UsageError(f"{path}: exists; give another name, or overwrite it ({argument('overwrite', True)})")
@@ -178,10 +178,9 @@ def check_output(path: Path, *, overwrite: bool, source: Path | None = None) -> 
 def check_outputs(outputs: Iterable[str | Path | None], inputs: Iterable[object], *, overwrite: bool) -> None:
     """Check several outputs, but those that are None, against each path among the inputs; see `check_output`."""
     paths = [Path(output) for output in outputs if output is not None]
-    sources: list[Path | None] = [Path(source) for source in inputs if isinstance(source, str | Path)]
+    sources = [Path(source) for source in inputs if isinstance(source, str | Path)]
     for path in paths:
-        for source in sources or [None]:
-            check_output(path, overwrite=overwrite, source=source)
+        check_output(path, *sources, overwrite=overwrite)
     for path in {path for path in paths if paths.count(path) > 1}:
         raise UsageError(f"{path}: is named for two outputs")
 

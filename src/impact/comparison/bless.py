@@ -61,7 +61,7 @@ def bless(
     if re.search("[\0\ud800-\udfff]", reason):
         raise UsageError(f'{argument("reason")}: got "{safe_text(reason, 60)}", expected UTF-8 text without NUL')
     new, baseline = Path(new), Path(baseline)
-    check_output(baseline, overwrite=True, source=new)
+    check_output(baseline, new, overwrite=True)
     result = load(new)
     check_comparable(result, str(new))
     if not allow_failed:
