@@ -102,6 +102,14 @@ def test_a_dataset_of_the_user_stays_open(results: dict[str, xr.Dataset], tmp_pa
         assert dataset["energy_loss"].equals(results["part"]["energy_loss"])
 
 
+def test_the_conditions_are_those_of_the_laws_that_are_shown(
+    table_file: Path, results: dict[str, xr.Dataset]
+) -> None:
+    for result in (table_file, results["full"]):
+        assert "(1\N{NO-BREAK SPACE}for\N{NO-BREAK SPACE}bilinear)" in impact.page(result)
+        assert "bilinear" not in impact.page(result, models=["tsuji-1992"])
+
+
 def test_inputs_that_vary_together_are_named_beside_their_slider() -> None:
     sweep = {"e": [0.5, 0.6], "m1": [1.0, 2.0], "m2": [1.0, math.inf], "zip": [["m1", "m2"]], "K": 1e9, "v1": 1.0}
     _, axis = content_of(impact.page(impact.sweep({"models": "hertz", "sweep": sweep})))["axes"]

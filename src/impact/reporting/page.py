@@ -99,17 +99,15 @@ def _page_of(dataset: xr.Dataset, models: Sequence[str] | None) -> str:
         raise UsageError(
             "expected the result of a sweep over an axis; impact report takes other results, but no time history"
         )
-    positions = law_positions(models, dataset)
-    table = table_of_result(dataset)
+    positions, table = law_positions(models, dataset), table_of_result(dataset)
+    dataset = dataset.isel(model=positions)
     if table is None:
-        dataset, positions = dataset.isel(model=positions), [*range(len(positions))]
         inputs = read_inputs(dataset, axes_of(dataset))
         arrays = _stored_values(dataset, inputs)
     else:
         inputs = table.inputs
         arrays = _trajectories(table, positions)
-    of_dataset = dataset.isel(model=positions)
-    laws = [{**law, **columns} for law, columns in zip(_laws(of_dataset), arrays, strict=True)]
+    laws = [{**law, **columns} for law, columns in zip(_laws(dataset), arrays, strict=True)]
     axes = [_axis(dataset, axis) for axis in inputs.axes]
     content = {
         "title": page_title(dataset),
