@@ -400,19 +400,16 @@ class SolveProblem:
         def is_needed(values: Array) -> bool:
             if target is None:
                 return True
-            lower, upper = self.reach(values)
+            # the range of its values doubled bounds the function; no restitution is negative
+            lower, upper = float(np.nanmin(values)), float(np.nanmax(values))
+            beyond = 0.5 * (upper - lower)
+            lower, upper = max(lower - beyond, 0.0 if self.variable == "e_out" else -math.inf), upper + beyond
             is_extreme = lower < smallest - self.digits(smallest) or upper > largest + self.digits(largest)
             # where integrations fail the range is that of the scan
             return lower <= target <= upper or (with_range and is_extreme and bool(np.isfinite(values).all()))
 
         floors = np.full(self.n_conditions, float(self.is_of_order_one))
         return Interpolant(function, scan, floors, MAX_DIVISIONS, is_needed)
-
-    def reach(self, values: Array) -> tuple[float, float]:
-        """Bound a function that has some values, by its range doubled; no restitution is negative."""
-        smallest, largest = float(np.nanmin(values)), float(np.nanmax(values))
-        lower, beyond = -math.inf if self.variable != "e_out" else 0.0, 0.5 * (largest - smallest)
-        return max(smallest - beyond, lower), largest + beyond
 
     def digits(self, value: float) -> float:
         """How far values of the variable are from each other that count as equal."""
