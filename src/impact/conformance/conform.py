@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -91,11 +90,11 @@ def conform(
     checked = [(trial, name) for trial in judged for name in checks.checks_of(trial)]
     engines: list[EngineChecks] = []
     for position, (name, command, version) in enumerate(commands):
-        with ExitStack() as stack:
-            # engines of the package may leave files where they run
-            folder = stack.enter_context(TemporaryDirectory(prefix="impact-")) if position < len(names) else None
-            ask = stack.enter_context(open_adapter(command, timeout, folder))
-            facts, answers, again = _ask_all(ask, judged)
+        # engines of the package may leave files where they run
+        with TemporaryDirectory(prefix="impact-") as empty:
+            folder = empty if position < len(names) else None
+            with open_adapter(command, timeout, folder) as ask:
+                facts, answers, again = _ask_all(ask, judged)
         # an adapter may name its engine; names are labels of the board
         label = facts.engine or name
         alike = sum(other.engine == label or other.engine.startswith(f"{label} #") for other in engines)
