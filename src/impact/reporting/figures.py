@@ -82,13 +82,11 @@ class Drawing:
         # numbered as they stand on the page: those of friction have a section of their own
         for of_friction in (False, True):
             more_figures: list[tuple[FigurePlan, str, PlotData]] = []
-            for plan in plans:
-                kind, _, position = plan
-                if kind.of_friction != of_friction:
-                    continue
+            for plan in (plan for plan in plans if plan.kind.of_friction == of_friction):
+                kind, choice, position = plan
                 number = len(figures) + 1
                 try:
-                    plot_data = get_plot_data(self.dataset, kind.name, plan.choice, self.plugins)
+                    plot_data = get_plot_data(self.dataset, kind.name, choice, self.plugins)
                     comparison, more = _compare_values(self, plan, plot_data)
                     conditions = _condition_sentences(self.dataset, position, self.keys)
                     sentences = [kind.caption, *conditions, *comparison]

@@ -9,6 +9,7 @@ import base64
 import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -82,12 +83,9 @@ def page(
     True
     """
     check_page_path(output, [dataset], overwrite=overwrite)
-    if isinstance(dataset, str | Path):
-        # values of a trajectory table are not computed
-        with open_result(dataset) as opened:
-            text = _page_of(opened, models)
-    else:
-        text = _page_of(result_of(dataset), models)
+    # of a file, values of a trajectory table are not computed
+    with open_result(dataset) if isinstance(dataset, str | Path) else nullcontext(result_of(dataset)) as result:
+        text = _page_of(result, models)
     if output is not None:
         write_file(Path(output), text.encode(), overwrite=overwrite)
     return text
