@@ -266,7 +266,7 @@ def align_calibrations(new: xr.Dataset, baseline: xr.Dataset, *, subset: bool) -
         for dim in sorted({"output_name", "grid"} & {*new.dims} & {*baseline.dims}):
             labels = [new[dim].values], [baseline[dim].values]
             positions = match_labels(*labels)
-            faults += _unmatched_labels(*labels, [dim], positions, subset=subset)
+            faults += _unmatched_labels(labels, [dim], positions, subset=subset)
             new, baseline = new.isel({dim: positions[0]}), baseline.isel({dim: positions[1]})
     both = [name for name in CALIBRATION if name in new and name in baseline] if is_same_data else []
     names = [name for name in both if new[name].size]
