@@ -71,6 +71,12 @@ def of_rounding(rows: Array) -> Array:
     return result
 
 
+def stopping(rows: Array) -> Array:
+    """A constant, and shares that grow with the second parameter up to 1, as friction does until balls stick."""
+    shares = np.minimum(rows[:, 1:] * np.linspace(3.0, 40.0, 10), 1.0)
+    return np.hstack([np.repeat(rows[:, :1], 10, axis=1), shares])
+
+
 def pair(rows: Array) -> Array:
     return np.repeat(rows[:, :1], 2, axis=1)
 
@@ -85,6 +91,7 @@ FUNCTIONS = {
     "centred line": centred_line,
     "saturating": saturating,
     "rounding": of_rounding,
+    "stopping": stopping,
 }
 
 
@@ -176,6 +183,13 @@ def test_one_start_alone_is_where_a_parameter_changes_nothing() -> None:
     starts = scan(problem, lambda function, rows: function(rows))
     assert starts.size == 4
     assert np.count_nonzero(starts > 0.5) == 1
+
+
+def test_a_parameter_that_changes_nothing_at_any_start_is_searched_for_alone() -> None:
+    result = fit("stopping", [0.05, 1e-3], [1.0, 3.0], stopping(np.array([[0.6, 0.28]]))[0], 0.01)
+    np.testing.assert_allclose(result.estimate, [0.6, 0.28], rtol=1e-9)
+    # only the first share is below 1
+    assert result.upper[1] - result.lower[1] == pytest.approx(2.0 * 1.959964 * 0.01 / 3.0, rel=1e-4)
 
 
 def test_rounding_errors_do_not_identify_a_parameter() -> None:

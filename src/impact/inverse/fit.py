@@ -673,6 +673,15 @@ def _run_each(groups: Sequence[Sequence[Callable[[Evaluate], T]]]) -> list[list[
 def _minimum(problem: FitProblem, best: Estimate, evaluate: Evaluate) -> _Minimum:
     """Evaluate the minimum of a problem, from that of the likelihood."""
     minimum = _Minimum(problem, best.objective, best, *final_jacobian(problem, evaluate, best.u))
+    for parameter in np.flatnonzero(~minimum.identifiable):
+        # all starts may be beyond the value from which on it changes nothing
+        rows = np.tile(best.u, (N_SCAN + 1, 1))
+        rows[1:, parameter] = (np.arange(N_SCAN) + 0.5) / N_SCAN
+        cost = (problem.residuals(evaluate, rows) ** 2).sum(axis=1)
+        if cost.min() < (1.0 - 1e-9) * cost[0]:
+            best = best_of([best, minimize(problem, rows[cost.argmin()], evaluate)])
+    if best is not minimum.best:
+        minimum = _Minimum(problem, best.objective, best, *final_jacobian(problem, evaluate, best.u))
     if minimum.taken is None:
         return minimum
     restricted = minimize(problem, best.u, evaluate, taken=minimum.taken)
