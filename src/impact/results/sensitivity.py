@@ -4,22 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from ..config.grid import SAMPLE
 from ..config.input_names import InputName
 from ..contact.units import names_in, with_numbers
 from ..contact.variables import LAW_DIMS, OUTPUTS
 from ..display import Block, Displayed, Table
-from ..engine.plan import Plan
 from ..formatting import NO_BREAK, decimals, number, quantity, safe_text, scaled_unit
 from .attributes import read_attribute
 from .provenance import describe_point
-from .schema import SENSITIVITY, parts_of_laws, plan_coordinates, provenance_attributes, template
+from .schema import parts_of_laws
 
 # probabilities of the quantiles
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
@@ -29,23 +27,6 @@ MIN_SAMPLES = 64
 HALF = ("first_half", "total_half")
 # numbers of an uncertain input in JSON
 INDICES = ("first", "first_lower", "first_upper", "total", "total_lower", "total_upper", *HALF)
-
-
-def sensitivity_template(plan: Plan, of: str, others: Sequence[str]) -> xr.Dataset:
-    """Build the dataset of a study of an output with placeholders; `others` are axes but of models and samples."""
-    variables_of_plan = plan_coordinates(plan).variables.items()
-    coordinates = {name: variable for name, variable in variables_of_plan if SAMPLE not in variable.dims}
-    paths = [InputName.parse(name).config_key for name in plan.config.distributions]
-    studied = {
-        "input": ("input", paths, {"long_name": "uncertain input, by its path in the config"}),
-        "quantile": ("quantile", list(QUANTILES), {"long_name": "probability", "units": "1"}),
-    }
-    variables = [
-        replace(variable, unit=OUTPUTS[of].unit) if variable.unit == "output" else variable
-        for variable in SENSITIVITY.values()
-    ]
-    coords = xr.Coordinates(coordinates | studied)
-    return xr.Dataset(template(variables, coords.sizes, others), coords, provenance_attributes(plan) | {"of": of})
 
 
 def distribution_texts(dataset: xr.Dataset) -> Iterator[str]:

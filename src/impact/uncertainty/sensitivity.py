@@ -29,8 +29,9 @@ from ..engine.plan import Plan
 from ..engine.run import Run
 from ..errors import ConfigError, UsageError, require_known
 from ..formatting import argument
+from ..results.schema import SENSITIVITY, plan_coordinates, provenance_attributes, template
 from ..results.selection import as_keys
-from ..results.sensitivity import HALF, QUANTILES, sensitivity_template
+from ..results.sensitivity import HALF, QUANTILES
 from ..results.sweep import read_plan, sweep_in_memory
 from ..results.xarray_backend import save
 
@@ -193,15 +194,23 @@ def sensitivity_of(plan: Plan, of: str, swept: xr.Dataset) -> xr.Dataset:
     outputs = swept[of].broadcast_like(swept["model"]).transpose("model", ..., SAMPLE)
     others = [str(dim) for dim in outputs.dims if dim not in ("model", SAMPLE)]
     values = np.asarray(outputs.values, float).reshape(-1, len(inputs) + 2, n)
-    result = sensitivity_template(plan, of, others)
     statistics = _statistics(values, config)
     if OUTPUTS[of].of_friction:
         # a pair that has no meaning has not failed
         status = swept["friction_status"].transpose("model", ..., SAMPLE).values.reshape(values.shape)
         statistics["failed"] -= (status == FrictionStatus.NOT_COMBINABLE).sum(axis=(1, 2))
-    for name, array in statistics.items():
-        result[name].values = array.reshape(result[name].shape).astype(result[name].dtype)
-    return result
+    of_plan, paths = plan_coordinates(plan).variables, [InputName.parse(name).config_key for name in inputs]
+    studied = {
+        "input": ("input", paths, {"long_name": "uncertain input, by its path in the config"}),
+        "quantile": ("quantile", list(QUANTILES), {"long_name": "probability", "units": "1"}),
+    }
+    coords = xr.Coordinates({name: v for name, v in of_plan.items() if SAMPLE not in v.dims} | studied)
+    variables = (replace(v, unit=OUTPUTS[of].unit) if v.unit == "output" else v for v in SENSITIVITY.values())
+    arrays = {
+        name: (dims, statistics[name].reshape(zeros.shape).astype(zeros.dtype), attributes)
+        for name, (dims, zeros, attributes) in template(variables, coords.sizes, others).items()
+    }
+    return xr.Dataset(arrays, coords, provenance_attributes(plan) | {"of": of})
 
 
 def _statistics(values: Array, config: Config) -> dict[str, Array]:
