@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from ..contact.frictions import frictions
@@ -115,16 +115,13 @@ class InputName:
 
     def unknown_message(self, models: Mapping[str, ForceModel]) -> str:
         """Describe an input that does not exist, with the nearest name."""
-        name, names = str(self), [*SWEEP_INPUTS]
-        if self.table == "materials":
-            names = [str(InputName("materials", self.owner, key)) for key in MATERIAL_QUANTITIES]
-        elif self.owner:
+        keys: Iterable[str] = MATERIAL_QUANTITIES if self.table == "materials" else SWEEP_INPUTS
+        if self.table in ("model", "friction"):
             laws = laws_of(self.table, models)
-            if self.owner in laws:
-                names = [str(InputName(self.table, self.owner, key)) for key in law_quantities(laws[self.owner])]
-            else:
-                name, names = self.owner, list(laws)
-        return f"no such input; {did_you_mean(name, names)}"
+            if self.owner not in laws:
+                return f"no such input; {did_you_mean(self.owner, list(laws))}"
+            keys = law_quantities(laws[self.owner])
+        return f"no such input; {did_you_mean(str(self), [str(replace(self, key=key)) for key in keys])}"
 
 
 def with_words(inputs: Mapping[str, float | str]) -> dict[str, float | str]:
