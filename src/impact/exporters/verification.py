@@ -30,8 +30,6 @@ SPACINGS = 10.0
 FLOOR = 1e-7
 # times the indentation over R*: tolerance on beta where codes turn the normal, or shorten the arms of the force
 TURNING = 4.0
-# least part of mu P_n that is the impulse of friction which slides throughout
-SLIDING = 0.95
 
 
 @dataclass(frozen=True)
@@ -44,8 +42,7 @@ class Verification(Displayed):
     phases : phases of a step, one for each row; NaN for an extrapolation to dt = 0 of the mean over the phases
     measured, predicted : the restitution by the code and by this program; one that is not a number differs
     uncertainty : tolerance on the restitution
-    beta_measured, beta_predicted : the tangential restitution likewise; empty without friction. Where the normal
-        turns, that of friction which slides throughout is predicted with the measured normal impulse
+    beta_measured, beta_predicted : the tangential restitution likewise; empty without friction
     beta_uncertainty : tolerance on it
     """
 
@@ -208,12 +205,6 @@ def _with_friction(
     turn = abs(tangential) * problem.law.contact_time / (collision["R1"] + collision["R2"])
     turning = max(turning, turn)
     is_turning = problem.code.shortens_arms or not problem.has_wall
-    if is_turning:
-        # friction that slides throughout is mu times the normal impulse (1 + e) m v0, and e is judged by itself
-        ones = [1.0 + np.reshape(e, predicted.shape) for e in (verification.measured, verification.predicted)]
-        most = oblique.mu * v0 / (oblique.mass_ratio * abs(slip)) * ones[1]
-        slides = 1.0 + predicted >= SLIDING * most
-        predicted = np.where(slides, (1.0 + predicted) * ones[0] / ones[1] - 1.0, predicted)
     return replace(
         verification,
         uncertainty=exact if problem.has_wall and not problem.law.is_coupled else max(exact, turning * speed / v0),
