@@ -264,6 +264,16 @@ def test_an_engine_with_a_friction_law_of_the_catalogue_is_judged_by_it() -> Non
     assert "friction" in failed(impact.conform(adapter=spring, only=only))
 
 
+@pytest.mark.parametrize("model", ["hertz", "tsuji-1992-no-tension"])
+def test_an_engine_may_name_a_contact_force_of_hertz(model: str) -> None:
+    """Where a spring slides all the time, as here, its beta is that of rigid balls."""
+    law = {"law": "lammps-mindlin-force", "parameters": {"kt_over_kn": 0.3, "xt": 0.0}}
+    e = {"hertz": 1.0, "tsuji-1992-no-tension": 0.9018}[model]
+    answer = lambda c: rigid(c | {"e": e}) | law | {"model": model}  # noqa: E731
+    board = impact.conform(adapter=answer, only="slide-mu10-85-equal", tol={"friction": 1e-4})
+    assert "friction" not in failed(board)
+
+
 def test_rigid_balls_have_the_beta_of_coulomb_with_a_contact_force_that_does_not_pull() -> None:
     """As docs/conform.md says: the default one pulls, and its friction is mu |F|."""
     only, law = "slide-mu30-75-wall", {"law": "coulomb-1785"}

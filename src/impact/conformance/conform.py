@@ -10,6 +10,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from ..atomic import check_outputs
+from ..contact.models import catalogue
 from ..errors import UsageError, did_you_mean, require_known
 from ..formatting import argument, number
 from ..reporting.report import report
@@ -184,18 +185,19 @@ def betas_of_law(
     ------
     ConfigError : a parameter is none of the law, or the law is not combinable with the contact force
     """
-    inputs = [_inputs(question) for question in questions]
+    n = catalogue()[model].exponent or 1.5
+    inputs = [_inputs(question, n) for question in questions]
     cases = {name: [values[name] for values in inputs] for name in inputs[0]}
     table = {law: dict(parameters)}
-    result = sweep({"models": model, "frictions": law, "sweep": {"cases": cases, "n": 1.0}, "friction": table})
+    result = sweep({"models": model, "frictions": law, "sweep": {"cases": cases, "n": n}, "friction": table})
     return dict(zip((str(question["id"]) for question in questions), result["beta"].values.ravel(), strict=True))
 
 
-def _inputs(question: Question) -> dict[str, float]:
+def _inputs(question: Question, n: float) -> dict[str, float]:
     """Write a collision as the inputs of a config.
 
-    The stiffness is that of a linear spring with the contact time of the collision, K = m (pi^2 + ln^2 e)/t^2;
-    beta depends on it only if a parameter of the law has a unit.
+    The stiffness is that of a spring K x^n with the contact time of the collision, of n = 1 with its dashpot,
+    K = m (pi^2 + ln^2 e)/t^2; beta depends on it only if a parameter of the law has a unit.
     """
     names = ("v1", "v2", "u1", "u2", "omega1", "omega2", "e", "mu", "contact_time")
     values = {name: float(question[name] or 0.0) for name in names}
@@ -204,5 +206,9 @@ def _inputs(question: Question) -> dict[str, float]:
         inertia = question[f"inertia{ball}"]
         factor = 0.4 if inertia is None else float(inertia) / (mass * radius**2)
         values |= {f"m{ball}": mass, f"R{ball}": radius, f"inertia_factor{ball}": factor}
-    frequency = math.hypot(math.pi, math.log(values["e"])) / values.pop("contact_time")
-    return values | {"K": frequency**2 / (1.0 / values["m1"] + 1.0 / values["m2"])}
+    contact_time = values.pop("contact_time") * math.pi / math.hypot(math.pi, math.log(values["e"]))
+    m, v0 = 1.0 / (1.0 / values["m1"] + 1.0 / values["m2"]), values["v1"] - values["v2"]
+    # the contact time in units of the peak indentation over v0; pi for n = 1
+    ratio = 2.0 * math.sqrt(math.pi) * math.gamma(1.0 + 1.0 / (n + 1.0)) / math.gamma(0.5 + 1.0 / (n + 1.0))
+    peak = contact_time * v0 / ratio
+    return values | {"K": 0.5 * (n + 1.0) * m * v0**2 / peak ** (n + 1.0)}
