@@ -169,6 +169,14 @@ MANY_AXES = {
 }
 
 
+def test_a_mass_is_noted_in_any_row_of_a_table_of_masses_and_radii(tmp_path: Path) -> None:
+    change = "sweep.zip=[['m2', 'R2']]", "sweep.R2=[0.1, 0.2, 0.3]", "sweep.m2=[32.88, 263.1, 800.0]"
+    notes: list[str] = []
+    (tmp_path / "c.toml").write_text(SWEEP, encoding="utf-8")
+    impact.sweep_to_file(tmp_path / "c.toml", tmp_path / "r.h5", overrides=change, on_note=notes.append)
+    assert [note.partition(",")[0] for note in notes] == ["m2: got 800 kg"]
+
+
 def notes_of(page: str) -> list[str]:
     """The notes of a report."""
     return [html.unescape(note) for note in re.findall("<p>Note: (.*?)</p>", page)]

@@ -430,7 +430,9 @@ def input_notes(inputs: Inputs) -> Iterator[str]:
 
 def _mass_notes(inputs: Inputs, ball: str) -> Iterator[str]:
     """Say that the mass of a ball is not that of a sphere of its radius and density, where all three are given."""
-    index = probe_index(inputs)
+    # masses and radii that vary together may agree at the first two values
+    together = [f"m{ball}"] if inputs.axes_of(f"m{ball}") == inputs.axes_of(f"R{ball}") else []
+    index = probe_index(inputs, together)
     mass, radius = (input_at(inputs, f"{name}{ball}", index) for name in "mR")
     stated, R, density = np.broadcast_arrays(mass, radius, property_at(inputs, ball, "rho", index))
     expected = sphere_mass(R, density)
