@@ -214,6 +214,27 @@ def test_angles_are_in_degrees_and_texts_do_not_overlap(beads: xr.Dataset, kind:
     assert len(names_of(figure)) == 6
 
 
+def test_a_restitution_that_depends_on_the_cone_of_friction_names_it() -> None:
+    """The normal motion of MuJoCo's cone depends on its friction."""
+    cone = "friction.mujoco-elliptic.b_t"
+    result = impact.sweep(
+        {
+            "models": "mujoco-solref",
+            "frictions": "mujoco-elliptic",
+            "sweep": {"m1": 0.045, "R1": 0.0213, "m2": math.inf, "R2": math.inf, "mu": [0.1, 0.2, 0.4]}
+            | {"speed": 3.0, "angle": "30 deg", "e": 0.6, "dt": 1e-3, "phase": 0.5, "omega1": -100.0},
+            "friction": {"mujoco-elliptic": {"b_t": [100.0, 1000.0]}},
+            "solver": {"integrator": "mujoco-cone"},
+        }
+    )
+    for kind in ("restitution", "error"):
+        for b_t in (100, 1000):
+            assert f", b_t = {b_t} 1/s, m1 = " in conditions_of(curves_of(result, kind, x="mu", sel={cone: b_t}))
+    plane = get_plot_data(result, "map", Choice(variable="e_out"))
+    assert isinstance(plane, MapData)
+    assert "elliptic cone" in plane.conditions
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("config", ["configs/oblique.toml", "docs/spin.toml"])
 def test_conditions_of_84_mm_have_three_lines(config: str) -> None:

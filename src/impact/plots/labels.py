@@ -242,10 +242,17 @@ def split_by_law(data: xr.Dataset, *, numbered: bool) -> Iterator[LawPart]:
 
 
 def with_model(conditions: str, data: xr.Dataset, *, numbered: bool) -> str:
-    """Name the single model of pairs in the conditions, since the names of `split_by_law` do not have it."""
-    is_single = "friction" in data.dims and data.sizes["model"] == 1
-    model = model_label(data.isel(model=0), numbered=numbered) if is_single else ""
-    return ", ".join(filter(None, (model, conditions)))
+    """Name the single model of pairs in the conditions, since the names of `split_by_law` do not have it.
+
+    Without friction, name that in a cone, which changes the normal motion.
+    """
+    if "friction" in data.dims:
+        laws = [model_label(data.isel(model=0), numbered=numbered)] if data.sizes["model"] == 1 else []
+    else:
+        keys = dict.fromkeys(InputName.parse(name).friction for name in data.coords)
+        cones = [key for key in keys if key in frictions() and frictions()[key].kind == "cone"]
+        laws = [friction_text(key, scalars_of(data, f"friction.{key}.")) for key in cones]
+    return ", ".join(filter(None, (*laws, conditions)))
 
 
 def friction_text(key: str, inputs: Inputs) -> str:
