@@ -811,6 +811,39 @@ def test_the_tolerance_on_beta_is_four_indentations_over_the_effective_radius_an
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
+    ("modulus", "measured", "verdict", "exit_code"),
+    [
+        ("5 GPa", 0.9, "agrees", 0),
+        ("5 MPa", 0.9, "UNDECIDED", 0),
+        ("5 MPa", 0.1, "DIFFERS", 1),
+    ],
+)
+def test_an_uncertainty_with_which_no_script_could_fail_does_not_agree(
+    cli: Run, tmp_path: Path, modulus: str, measured: float, verdict: str, exit_code: int
+) -> None:
+    """The normal of soft balls turns by 0.1 rad while they touch."""
+    config = tmp_path / "balls.toml"
+    config.write_text(
+        'models = "lammps-coeff-restitution-hertz"\nfrictions = "lammps-mindlin"\n'
+        f'[materials.glass]\nE = "{modulus}"\nnu = 0.22\nrho = 2500\n'
+        '[sweep]\nmaterial = "glass"\nR1 = "1 mm"\nR2 = "1 mm"\n'
+        'speed = "1 m/s"\nangle = "45 deg"\nmu = 0.15\nomega1 = 500\ne = 0.9\n',
+        encoding="utf-8",
+    )
+    beta = impact.export("lammps", source=config).at_dt.beta_mean
+    program = write_program(tmp_path / "lmp", RELEASE + f'echo "beta = {beta}"; echo "e_out = {measured}"')
+    command = ("export", config, "--to", "lammps", "--verify", "--program", program)
+    done = cli(*command)
+    assert done.returncode == exit_code
+    assert f"\n{verdict}: largest difference" in done.stdout
+    explanation = "\nan uncertainty above 0.05 shows nothing: the normal of two balls turns while they touch; try "
+    assert (explanation in done.stdout) == (verdict == "UNDECIDED")
+    verification = json.loads(cli(*command, "--json").stdout)["verification"]
+    assert (verification["agrees"], verification["differs"]) == (verdict == "agrees", verdict == "DIFFERS")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
     ("code", "run"), [("lammps", r"^run +(\d+)$"), ("mujoco", r"^mujoco.mj_step\(model, data, (\d+)\)$")]
 )
 def test_a_script_runs_until_two_contact_times_after_the_first_contact(code: str, run: str) -> None:

@@ -75,7 +75,7 @@ def export(
         show(result, as_json=as_json)
     elif output is None:
         print(result.text, end="")
-    return exits.EXIT_OK if result.verification is None or result.verification.agrees else exits.EXIT_NOT_EQUAL
+    return exits.EXIT_NOT_EQUAL if result.verification and result.verification.differs else exits.EXIT_OK
 
 
 def _check_alone(command: Callable[..., int], given: Mapping[str, object], *accepted: str) -> None:

@@ -30,6 +30,8 @@ SPACINGS = 10.0
 FLOOR = 1e-7
 # times the indentation over R*: tolerance on beta where codes turn the normal, or shorten the arms of the force
 TURNING = 4.0
+# beside a larger uncertainty of e or beta even a wrong script may look right: nothing is shown
+MAX_UNCERTAINTY = 0.05
 
 
 @dataclass(frozen=True)
@@ -44,6 +46,7 @@ class Verification(Displayed):
     uncertainty : tolerance on the restitution
     beta_measured, beta_predicted : the tangential restitution likewise; empty without friction
     beta_uncertainty : tolerance on it
+    reason : where most of the uncertainty comes from, and what makes it smaller
     """
 
     program: str
@@ -55,11 +58,13 @@ class Verification(Displayed):
     beta_measured: tuple[float, ...] = ()
     beta_predicted: tuple[float, ...] = ()
     beta_uncertainty: float = 0.0
+    reason: str = ""
 
     def as_dict(self) -> dict[str, Any]:
         return {
             "program": self.program,
             "agrees": self.agrees,
+            "differs": self.differs,
             "uncertainty": self.uncertainty,
             "rows": self.records(),
         }
@@ -85,12 +90,14 @@ class Verification(Displayed):
         ]
         yield Table(rows, ("dt [s]", "phase", "measured", "predicted", "difference"), text=(0,))
         yield ""
-        word = "agrees" if self.agrees else "DIFFERS"
+        word = "DIFFERS" if self.differs else "agrees" if self.agrees else "UNDECIDED"
         largest = self.not_numbers or f"largest difference {number(self.difference, 2)}"
         beta = ""
         if self.beta_measured:
             beta = f"; of beta {number(self.beta_difference, 2)}, uncertainty {number(self.beta_uncertainty, 2)}"
         yield f"{word}: {largest}, uncertainty {number(self.uncertainty, 2)}{beta}"
+        if not (self.differs or self.agrees):
+            yield f"an uncertainty above {MAX_UNCERTAINTY} shows nothing: {self.reason}"
 
     @property
     def difference(self) -> float:
@@ -105,8 +112,14 @@ class Verification(Displayed):
             return float(np.abs(np.subtract(self.beta_measured, self.beta_predicted)).max(initial=0.0))
 
     @property
+    def differs(self) -> bool:
+        """Whether a difference is larger than its uncertainty, or no number."""
+        return not (self.difference <= self.uncertainty and self.beta_difference <= self.beta_uncertainty)
+
+    @property
     def agrees(self) -> bool:
-        return self.difference <= self.uncertainty and self.beta_difference <= self.beta_uncertainty
+        """Whether no difference is larger than its uncertainty, and both uncertainties are at most 0.05."""
+        return not self.differs and max(self.uncertainty, self.beta_uncertainty) <= MAX_UNCERTAINTY
 
     @property
     def not_numbers(self) -> str:
@@ -159,6 +172,7 @@ def verify_scripts(problem: ExportProblem, program: str, dt: float, n_phases: in
     share = problem.collision(dt, 0.5).largest_radius / problem.law.continuous["peak_indentation"]
     tolerance = max(code.uncertainty.get(problem.model.key, ROUNDING), SPACINGS * code.resolution * share)
     steps = np.array([dt] if code.scheme is not None else [dt, dt / 2, dt / 4])
+    reason = "the indentation is small beside the spacing of coordinates; try a faster impact or softer balls"
     runs = []
     for dt in steps.tolist():
         collisions = [problem.collision(dt, phase) for phase in phases.tolist()]
@@ -171,6 +185,8 @@ def verify_scripts(problem: ExportProblem, program: str, dt: float, n_phases: in
     elif np.isfinite(measured).all():
         value, uncertainty = extrapolate(measured)
         dt_of_row, phase_of_row, measured, predicted = np.array([[0.0], [np.nan], [value], predicted[0, :1]])
+        if uncertainty > tolerance:
+            reason = "the restitution depends on the step; try a smaller dt"
         tolerance = max(uncertainty, FLOOR, tolerance)
     verification = Verification(
         program=program,
@@ -179,6 +195,7 @@ def verify_scripts(problem: ExportProblem, program: str, dt: float, n_phases: in
         measured=tuple(measured.ravel().tolist()),
         predicted=tuple(predicted.ravel().tolist()),
         uncertainty=tolerance,
+        reason=reason,
     )
     return verification if problem.law.oblique is None else _with_friction(verification, problem, steps, runs)
 
@@ -205,12 +222,19 @@ def _with_friction(
     turn = abs(tangential) * problem.law.contact_time / (collision["R1"] + collision["R2"])
     turning = max(turning, turn)
     is_turning = problem.code.shortens_arms or not problem.has_wall
+    reason = verification.reason
+    if exact <= MAX_UNCERTAINTY:
+        reason = "the indentation shortens the arms of friction; try stiffer balls"
+        if not problem.has_wall:
+            advice = "try a plane wall, stiffer balls or a smaller angle"
+            reason = f"the normal of two balls turns while they touch; {advice}"
     return replace(
         verification,
         uncertainty=exact if problem.has_wall and not problem.law.is_coupled else max(exact, turning * speed / v0),
         beta_measured=tuple(run.get("beta", math.nan) for row in runs for run in row),
         beta_predicted=tuple(predicted.ravel().tolist()),
         beta_uncertainty=max(exact, turning * max(1.0, speed / abs(slip))) if is_turning else exact,
+        reason=reason,
     )
 
 
