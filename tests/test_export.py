@@ -487,7 +487,7 @@ def test_the_axes_of_a_source_take_their_first_values_and_the_header_says_so() -
         "lammps", default_law("lammps"), source=config, at={"v1": 2.0}, code_version="22Jul2025"
     )
     assert export.e == 0.4
-    assert "first value of each axis of the source: e" in export.header
+    assert "first value of each axis of the source: e = 0.4" in export.header
 
 
 @pytest.mark.slow

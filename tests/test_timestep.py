@@ -6,6 +6,7 @@ import json
 import math
 import shlex
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -142,6 +143,22 @@ def test_json_of_the_command(cli: Run) -> None:
         pytest.approx(printed["contact_time"] / 1e-6),
     ]
     assert printed["needed"].keys() == {"tol", "steps_per_contact", "dt"}
+
+
+def test_the_first_values_of_axes_are_named(cli: Run, tmp_path: Path) -> None:
+    """The slowest impact of the source may need the least steps."""
+    config = tmp_path / "speeds.toml"
+    config.write_text(
+        'models = "hertz"\n[sweep]\nv1 = { geomspace = ["0.01 m/s", "2 m/s", 7] }\nm1 = 1\nm2 = inf\n'
+        "n = 1.5\nK = [1e6, 2e6]\n",
+        encoding="utf-8",
+    )
+    command = ("timestep", config, "--model", "hertz", "--phases", "8", "--at")
+    line = "first value of each axis of the source: v1 = 10 mm/s"
+    assert line in cli(*command, "K=1e6").stdout.splitlines()
+    assert json.loads(cli(*command, "v1=2", "--json").stdout)["first_value_of"] == ["K"]
+    # one value each, and nothing is said
+    assert "first value" not in cli("timestep", "--model", LINEAR, "--at", "e=0.5", "--phases", "8").stdout
 
 
 @pytest.mark.parametrize("steps", [0.5, 1.0, 2.0, 3.0])

@@ -21,7 +21,7 @@ from ..engine.plan import Plan
 from ..engine.plugins import Plugins
 from ..errors import UsageError, did_you_mean
 from ..formatting import argument, law_keys, number, quantity
-from ..inverse.timestep import FixedStepLaw, law_at_point
+from ..inverse.timestep import FixedStepLaw, first_values_line, law_at_point
 from ..results.calibration import position_of_law, unidentified_notes
 from ..results.single_impact import Calibration, ConfigSource, PointSource, open_source
 from .code import Code, Collision
@@ -168,8 +168,8 @@ def prepare_export(
         notes += [better_fit, *fit_notes] if better_fit else fit_notes
     if point_source.is_starter and (defaults := _defaults(point_source, at, fixed.config)):
         notes.append(f"defaults of Table 1 of the paper: {', '.join(defaults)}")
-    if fixed.defaulted_axes:
-        notes.append(f"first value of each axis of the source: {', '.join(fixed.defaulted_axes)}")
+    if fixed.first:
+        notes.append(first_values_line(fixed.first))
     return ExportProblem(
         code=code,
         version=version,

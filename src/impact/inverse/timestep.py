@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import cache, partial
 from pathlib import Path
 from typing import Any, SupportsFloat
@@ -26,7 +26,7 @@ from scipy.optimize import elementwise
 from ..arguments import require_counts
 from ..array_types import Array
 from ..config.files import read_number, read_numbers
-from ..config.input_names import InputName
+from ..config.input_names import InputName, with_words
 from ..config.load import Config
 from ..config.tables import DEFAULT_RTOL, SWEEP_QUANTITIES, TOLERANCE
 from ..contact import simulate
@@ -57,7 +57,7 @@ from ..engine.plan import Plan
 from ..engine.plugins import read_plugins
 from ..engine.trajectories import PlanLaw, model_of
 from ..errors import ModelError, UsageError, warn
-from ..formatting import argument, decimals, law_name, number, quantity, rounded
+from ..formatting import argument, decimals, law_name, number, prefixed, quantity, rounded
 from ..results.single_impact import PointSource, open_source, single_point, warn_of_ignored_e
 from ..results.summary import depth_notes
 from .solve import config_name, placeholder, solve_damping, unknown_of
@@ -88,6 +88,8 @@ EXACT_ERROR = 1e-300
 HELD_E = 1e-8
 # largest logarithm of the factor by which a parameter changes
 MAX_LOGARITHM = 50.0
+# digits of the first value of an axis
+FIRST_DIGITS = 6
 # digits of a parameter that is found, and of the contact there
 SHOWN_DIGITS = 4
 # C/K, which Drake's SAP takes in place of C
@@ -226,6 +228,7 @@ class TimestepResult(Displayed):
     rayleigh_time : the smaller one of the two balls [s]; NaN if the law's stiffness does not follow from materials
     friction : key of the friction law; "" without one
     beta_continuous : tangential restitution of the continuous law
+    first : names of axes of the source that are at their first value, with that value as text
     """
 
     model: str
@@ -243,6 +246,7 @@ class TimestepResult(Displayed):
     rayleigh_time: float = math.nan
     friction: str = ""
     beta_continuous: float = math.nan
+    first: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -251,10 +255,11 @@ class TimestepResult(Displayed):
 
     def as_dict(self) -> dict[str, Any]:
         """Convert to plain data; numbers that do not apply are NaN."""
-        options = {"phases", "tol", "parameter", "needed_parameter"}
+        options = {"phases", "tol", "parameter", "needed_parameter", "first"}
         options |= set() if self.friction else {"friction", "beta_continuous"}
         data = {name: value for name, value in asdict(self).items() if name not in options}
         data["rows"] = tuple(self.records())
+        data["first_value_of"] = list(self.first)
         return {**data, "for": self.needed_parameter and self.needed_parameter.as_dict()}
 
     def records(self) -> Sequence[Mapping[str, Any]]:
@@ -269,6 +274,8 @@ class TimestepResult(Displayed):
         beta = f", beta = {number(self.beta_continuous)}" if self.friction else ""
         law = law_name(self.model, self.friction)
         yield f"{law}: {e}e_out = {number(self.e_continuous)}{beta} in a contact time of {contact_time}"
+        if self.first:
+            yield first_values_line(self.first)
         yield f"scheme: {self.scheme}"
         yield ""
         cells = [row.cells(self.rayleigh_time, bool(self.friction)) for row in self.rows]
@@ -380,6 +387,7 @@ def timestep(
         rayleigh_time=law.rayleigh_time,
         friction=law.friction,
         beta_continuous=law.continuous.get("beta", math.nan),
+        first=law.first,
     )
 
 
@@ -392,7 +400,7 @@ class FixedStepLaw:
     law : the model, or its pair with a friction law, which has the tangential inputs `oblique`
     continuous : outputs of the continuous law by name, in SI
     rayleigh_time : the smaller one of both balls [s]
-    defaulted_axes : axes of the source that are at their first value
+    first : names of axes of the source that are at their first value, with that value as text
     solved : the damping that gives the e of a law without one; None if none was asked for
     replaced : inputs that replace those of the source; None without any
     """
@@ -405,7 +413,7 @@ class FixedStepLaw:
     phases: int
     scheme: str
     rayleigh_time: float
-    defaulted_axes: tuple[str, ...] = ()
+    first: Mapping[str, str] = field(default_factory=dict)
     solved: Mapping[str, float] | None = None
     replaced: Mapping[str, float] | None = None
 
@@ -565,6 +573,12 @@ def needed_steps(
             return NeededSteps(tol, upper, law.contact_time / upper)
         upper = math.floor(beyond.max()) + 1
     return None
+
+
+def first_values_line(first: Mapping[str, str]) -> str:
+    """Name the axes of the source that are at their first value."""
+    values = ", ".join(f"{name} = {value}" for name, value in first.items())
+    return f"first value of each axis of the source: {values}"
 
 
 def missing_parameter(name: str, tol: float) -> str:
@@ -743,6 +757,8 @@ def law_at_point(
             raise UsageError(f"{argument('at')}: got e and {model.damping}, expected one of the two")
         at = {**at, **placeholder(model, unknown_of(model, model.damping))}
     config, defaulted_axes = single_point(source, model.key, at, friction=friction)
+    values = with_words(config.scalars)
+    first = {name: prefixed(values[name], InputName.parse(name).unit, FIRST_DIGITS) for name in defaulted_axes}
     replaced, solved = replacing(config), None
     config = replace(config, scalars={**config.scalars, **(replaced or {})})
     if is_solved:
@@ -754,7 +770,7 @@ def law_at_point(
     if not is_solved and source.has_own_e and "e" not in defaulted_axes:
         warn_of_ignored_e(config, law.continuous["e_out"])
     warn(*depth_notes(law.continuous["peak_indentation"], law.impact.R1.item(), law.impact.R2.item()))
-    return replace(law, defaulted_axes=defaulted_axes, solved=solved, replaced=replaced)
+    return replace(law, first=first, solved=solved, replaced=replaced)
 
 
 def fixed_step_law(
