@@ -474,6 +474,21 @@ def test_a_parameter_that_does_not_set_the_time_scale_is_refused(cli: Run) -> No
     assert (refused.returncode, refused.stderr) == (2, '--dt: got "2 m", expected a unit of s, such as "1 s"\n')
 
 
+def test_a_recommended_step_longer_than_the_rayleigh_time_is_for_one_impact() -> None:
+    """The contact of an elastic ball is long, and a few steps of it are enough."""
+    note = "this dt is longer than the Rayleigh time, 5.358e-05 s: for one impact alone; packings commonly take"
+    for e, is_longer in ((0.99, True), (0.5, False)):
+        given = {"at": {"e": e, "v1": 0.01}}
+        result = impact.timestep("liggghts-hertz", tol=0.01, phases=8, **given)
+        assert result.needed is not None
+        assert (result.needed.dt > result.rayleigh_time, note in str(result)) == (is_longer, is_longer)
+        header = impact.export("liggghts", code_version="3.8.0", **given).header
+        assert any(line.startswith(note) for line in header) == is_longer
+    # the stiffness of the user has no Rayleigh time
+    stiff = impact.timestep("liggghts-hertz", at={"e": 0.99, "v1": 0.01, "K": 1e6}, tol=0.01, phases=8)
+    assert "Rayleigh" not in str(stiff)
+
+
 @pytest.mark.slow
 def test_a_step_longer_than_the_contact_is_a_warning(cli: Run) -> None:
     done = cli("timestep", "--model", LINEAR, "--at", "e=0.5", "--dt", "1 ms", "--dt", "1 us", "--phases", "9")

@@ -343,6 +343,7 @@ def _header(
             within = f"within {number(100.0 * ADVISED_TOL)} % of {number(problem.requested_e)}"
             dt = quantity(rounded(advised.dt, 3, up=False), "s", 3)
             yield f"recommended: dt <= {dt} keeps e {within} whatever the phase"
+            yield from timestep.packing_notes(advised.dt, law.rayleigh_time)
         if needed:
             yield needed
     yield from code.notes(collision)

@@ -291,6 +291,7 @@ class TimestepResult(Displayed):
         else:
             steps, dt = self.needed.steps_per_contact, quantity(rounded(self.needed.dt, 6, up=False), "s")
             yield f"within {percent} at every phase: {steps} steps per contact, dt <= {dt}"
+            yield from packing_notes(self.needed.dt, self.rayleigh_time)
         if self.parameter:
             yield str(self.needed_parameter or missing_parameter(self.parameter, self.tol))
 
@@ -573,6 +574,13 @@ def needed_steps(
             return NeededSteps(tol, upper, law.contact_time / upper)
         upper = math.floor(beyond.max()) + 1
     return None
+
+
+def packing_notes(dt: float, rayleigh_time: float) -> Iterator[str]:
+    """Yield a sentence if a recommended step is longer than the Rayleigh time [s], which may be unknown, NaN."""
+    if dt > rayleigh_time:
+        limit = f"longer than the Rayleigh time, {quantity(rayleigh_time, 's', 4)}"
+        yield f"this dt is {limit}: for one impact alone; packings commonly take 0.1 to 0.3 of that time"
 
 
 def first_values_line(first: Mapping[str, str]) -> str:
