@@ -450,6 +450,30 @@ def test_an_indentation_that_is_large_beside_a_ball_is_noted(act: str) -> None:
         acts[act](at={"R1": 0.1, "R2": 0.1, "v1": 0.1, "e": 0.8})
 
 
+@pytest.mark.parametrize("act", ["run", "timestep", "export"])
+def test_a_normal_that_turns_while_two_balls_touch_is_noted(act: str) -> None:
+    law, friction = "lammps-tsuji", "lammps-mindlin-force"
+    acts = {
+        "run": lambda **inputs: impact.run(model=law, friction=friction, **inputs),
+        "timestep": lambda **inputs: impact.timestep(law, friction=friction, **inputs),
+        "export": lambda **inputs: impact.export("lammps", law, friction=friction, **inputs),
+    }
+    overrides = {"materials.soft": {"E": 5e6, "nu": 0.22, "rho": 2500.0}, "sweep.material": "soft"}
+    # the balls have a mean velocity, which turns nothing
+    at = {"e": 0.9, "R1": 0.001, "R2": 0.001, "v1": 0.7, "u1": 10.5, "u2": 9.8, "mu": 0.15}
+    touch = impact.run(model=law, at={"e": 0.9, "R1": 0.001, "R2": 0.001, "v1": 0.7}, overrides=overrides)
+    turn = 0.7 * touch.values["contact_time"] / 0.002
+    assert turn > 0.1
+    words = f"normal turns by {turn:.2g} rad .*, and is taken as fixed: errors of about {turn:.0%} of the speed"
+    with pytest.warns(impact.ImpactWarning, match=words):
+        acts[act](at=at, overrides=overrides)
+    # that of a plane does not turn, and these balls move slowly along the tangent
+    for other in ({"R2": math.inf, "m2": math.inf}, {"u1": 9.9}):
+        with warnings.catch_warnings():
+            warnings.filterwarnings("error", "the normal turns")
+            acts[act](at=at | other, overrides=overrides)
+
+
 def test_a_part_of_a_result_runs_a_law_without_the_parameters_of_the_others(tmp_path: Path, cli: Run) -> None:
     sweep = {
         "e": [0.3, 0.6],

@@ -59,7 +59,7 @@ from ..engine.trajectories import PlanLaw, model_of
 from ..errors import ModelError, UsageError, warn
 from ..formatting import argument, decimals, law_name, number, prefixed, quantity, rounded
 from ..results.single_impact import PointSource, open_source, single_point, warn_of_ignored_e
-from ..results.summary import depth_notes
+from ..results.summary import depth_notes, turn_notes
 from .solve import config_name, placeholder, solve_damping, unknown_of
 
 # steps per contact if none are given
@@ -777,7 +777,11 @@ def law_at_point(
     law = fixed_step_law(config, phases, scheme, of_friction=of_friction)
     if not is_solved and source.has_own_e and "e" not in defaulted_axes:
         warn_of_ignored_e(config, law.continuous["e_out"])
-    warn(*depth_notes(law.continuous["peak_indentation"], law.impact.R1.item(), law.impact.R2.item()))
+    radii = law.impact.R1.item(), law.impact.R2.item()
+    warn(*depth_notes(law.continuous["peak_indentation"], *radii))
+    # the radius that replaces that of a wall is none of a ball
+    if law.oblique is not None and replaced is None:
+        warn(*turn_notes((law.oblique.u1 - law.oblique.u2).item(), law.contact_time, *radii))
     return replace(law, first=first, solved=solved, replaced=replaced)
 
 

@@ -48,7 +48,7 @@ from .provenance import changed_plugins, stored_config, stored_draft, unknown_pl
 from .schema import DEFAULT_RTOL_FACTOR, history_dataset, is_case, kind_of, require_result, require_sweep, scale_of
 from .seal import is_result
 from .selection import chosen_laws
-from .summary import depth_notes, input_notes
+from .summary import depth_notes, input_notes, turn_notes
 from .xarray_backend import open_result
 
 ConfigSource = str | Path | Mapping[str, object] | xr.Dataset | None
@@ -305,7 +305,11 @@ def run(
     impact = run_single_impact(Plan(config, plugin_set.of(config.models)), first, samples)
     if "e" not in first and (opened.has_own_e or "e" in (at or {})):
         warn_of_ignored_e(config, impact.values["e_out"])
-    warn(*depth_notes(impact.values["peak_indentation"], impact.derived["R1"], impact.derived["R2"]))
+    radii = impact.derived["R1"], impact.derived["R2"]
+    warn(*depth_notes(impact.values["peak_indentation"], *radii))
+    if impact.friction:
+        tangential = impact.derived["u1"] - float(impact.point["u2"])
+        warn(*turn_notes(tangential, impact.values["contact_time"], *radii))
     return impact
 
 

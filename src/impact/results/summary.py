@@ -40,6 +40,8 @@ ERROR_HEADINGS = {
 MAX_FAILED_AT = 3
 # limit of small indentations, as a fraction of the smaller radius
 MAX_SMALL_INDENTATION = 0.1
+# limit of the angle by which the normal, which is taken as fixed, turns during the contact [rad]
+MAX_TURN = 0.02
 # Young's moduli outside these limits are probably in another unit: gels have 1e3 Pa, diamond has 1e12 Pa
 MIN_MODULUS_PA, MAX_MODULUS_PA = 1e3, 1e13
 # a mass and that of the sphere may differ by rounding of measured values
@@ -460,6 +462,20 @@ def depth_notes(indentation: float, R1: float, R2: float) -> Iterator[str]:
     if share > MAX_SMALL_INDENTATION:
         depth = f"peak indentation of {prefixed(indentation, 'm', 3)} is {share:.0%} of the smaller radius"
         yield f"{depth}; Hertz theory assumes small indentation"
+
+
+def turn_notes(tangential: float, contact_time: float, R1: float, R2: float) -> Iterator[str]:
+    """Yield a sentence if the normal turns, by the tangential velocity of the centres, while the balls touch.
+
+    >>> list(turn_notes(1.0, 2e-4, 1e-3, 1e-3))
+    ['the normal turns by 0.1 rad while the balls touch, and is taken as fixed: errors of about 10% of the speed']
+    >>> list(turn_notes(1.0, 2e-4, 1e-3, float("inf")))
+    []
+    """
+    angle = abs(tangential) * contact_time / (R1 + R2)
+    if angle > MAX_TURN:
+        turn = f"the normal turns by {number(angle, 2)} rad while the balls touch, and is taken as fixed"
+        yield f"{turn}: errors of about {angle:.0%} of the speed"
 
 
 def with_depths(summary: Summary, dataset: xr.Dataset) -> Summary:
