@@ -281,6 +281,7 @@ def test_a_rejected_law_and_its_largest_residuals_are_named(cli: Run, tmp_path: 
     assert (first["place"], first["output"], first["measured"]) == ("beads.csv:5", "e_out", 0.7)
     robust = cli("calibrate", config, "--set", 'data.loss="huber"').stdout
     assert "rejected" not in robust
+    assert re.search(r"anagno.* –  +[-0-9.]+", robust)
     assert 0.5 < float(re.search(r" e +([0-9.]+)", robust)[1]) < 0.51  # type: ignore[index]
 
 

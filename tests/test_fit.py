@@ -350,6 +350,8 @@ def test_a_robust_loss_resists_an_outlier(loss: str) -> None:
     assert squares.estimate[0] - clean.estimate[0] == pytest.approx(0.025, rel=0.2)
     assert abs(robust.estimate[0] - clean.estimate[0]) < 0.005
     assert robust.lower[0] < 0.7 < robust.upper[0]
+    # an outlier rejects no law: the loss allows it
+    assert (squares.p_value < 1e-100, bool(np.isnan(robust.p_value))) == (True, True)
 
 
 def test_a_huber_loss_of_two_values_has_the_standard_error_of_their_mean() -> None:

@@ -160,7 +160,8 @@ class Fit:
     other_predicted, other_half_width : the other values that the final function predicts, and the half-widths of
         their intervals of 95 %, without the noise, shape (k,)
     chi2_reduced : with noise "scale" the variance of the points in units of the given variances
-    p_value : probability of a larger chi2; NaN where the noise is estimated from the residuals
+    p_value : probability of a larger chi2; NaN where the noise is estimated from the residuals, and for
+        another loss than "linear"
     aicc : corrected information criterion of Akaike; NaN with too few points
     loo : root mean square of the residuals of each point in the fit without it, in its given standard deviations
     loo_residual : those residuals in their own standard deviations, in the linear approximation, shape (n,)
@@ -616,6 +617,8 @@ class _Minimum:
                 for matrix in (covariance, deviation)
             )
             half_width = t_quantile(degrees_of_freedom(variance, spread)) * np.sqrt(variance)
+        # a robust loss allows residuals that the noise alone does not give
+        has_p = data.noise == "given" and data.loss == "linear"
         left_out = (data.values - np.array(predictions)) / data.sigma if predictions else np.array([np.nan])
         return Fit(
             status=self._status(),
@@ -631,7 +634,7 @@ class _Minimum:
             other_predicted=self.all_predicted[data.values.size :],
             other_half_width=half_width,
             chi2_reduced=squares / self.freedom if self.freedom > 0 else math.nan,
-            p_value=float(chi2.sf(squares, self.freedom)) if data.noise == "given" else math.nan,
+            p_value=float(chi2.sf(squares, self.freedom)) if has_p else math.nan,
             excess=best.excess,
             aicc=self.aicc,
             loo=float(np.sqrt(np.mean(left_out**2))),
