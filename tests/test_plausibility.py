@@ -208,3 +208,15 @@ def test_the_report_has_every_note_of_the_sweep(cli: Run, tmp_path: Path, layout
     # without the values, or what the radii follow from, there is none
     without = (result.drop_vars("peak_indentation"), result.assign_attrs(materials="{}"))
     assert [len(notes_of(impact.report(each, sections=["inputs"]))) for each in without] == [2, 0]
+
+
+def test_the_material_of_the_starter_config_contradicts_no_mass(recwarn: pytest.WarningsRecorder) -> None:
+    """A note names a density only if the user chose the material."""
+    ball = {"m1": "45 g", "R1": "21.3 mm", "R2": math.inf}
+    impact.run(at=ball)
+    impact.sweep(models="hertz", **ball)
+    assert not [str(warning.message) for warning in recwarn if "a sphere of" in str(warning.message)]
+    with pytest.warns(match=r"^m1: got 0.045 kg, but a sphere of R1 = 0.0213 m and 7800 kg/m\^3 has"):
+        impact.run(at={**ball, "material": "steel"})
+    with pytest.warns(match=r"^m1: got 0.045 kg, but a sphere of R1 = 0.0213 m and 2700 kg/m\^3 has"):
+        impact.sweep(models="hertz", overrides={"materials.table1.rho": 2700}, **ball)

@@ -102,6 +102,11 @@ class Config:
         """The settings as PATH=VALUE."""
         return tuple(setting.override for setting in self.settings)
 
+    @property
+    def sets_material(self) -> bool:
+        """Whether a setting names a material or gives a property of one."""
+        return any("material" in override for override in self.overrides)
+
 
 def read_config(
     source: str | Path | Mapping[str, object] | None,

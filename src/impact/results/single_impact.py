@@ -652,7 +652,8 @@ def single_point(
         if is_case(name) and name not in {axis.numbered for axis in config.axes}:
             raise _unknown_input(draft, name)
     config, defaulted = _without_axes(config, {**labels, **fixed}, over)
-    warn(*config.notes, *input_notes(Plan(config).inputs))
+    has_density = not source.is_starter or config.sets_material
+    warn(*config.notes, *input_notes(Plan(config).inputs, has_density=has_density))
     return config, defaulted
 
 

@@ -406,8 +406,10 @@ def error_table(worst: Mapping[str, Mapping[str, float]]) -> Table:
     return Table(rows, ("model", *(ERROR_HEADINGS[name] for name in names)))
 
 
-def input_notes(inputs: Inputs) -> Iterator[str]:
+def input_notes(inputs: Inputs, *, has_density: bool = True) -> Iterator[str]:
     """Yield a sentence for each material or ball with an implausible Young's modulus or mass.
+
+    Without `has_density` the density is that of the starter config, which contradicts no mass.
 
     >>> from impact.contact.materials import Material
     >>> materials = {"steel": Material(E=210.0, nu=0.3), "glass": Material(E=6e10, nu=0.2, rho=2500.0)}
@@ -425,7 +427,7 @@ def input_notes(inputs: Inputs) -> Iterator[str]:
                 hint = f"did you mean {number(modulus)} GPa?" if too_small else "no material is as stiff"
                 yield f"materials.{safe_text(name)}.E: got {number(modulus)} Pa; {hint}"
                 break
-    for ball in "12":
+    for ball in "12" if has_density else "":
         if {f"m{ball}", f"R{ball}"} <= {*inputs.names()}:
             yield from _mass_notes(inputs, ball)
 

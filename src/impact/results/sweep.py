@@ -229,7 +229,9 @@ def read_plan(
     plan = Plan(config, plugin_set.of(config.models))
     name = str(source) if isinstance(source, str | Path) else "config"
     plan.check_count(run.max_points, name)
-    for note in (*config.notes, *input_notes(plan.inputs), *plan.pair_notes(f"{name}: frictions")):
+    has_density = source is not None or config.sets_material
+    implausible = input_notes(plan.inputs, has_density=has_density)
+    for note in (*config.notes, *implausible, *plan.pair_notes(f"{name}: frictions")):
         run.on_note(note)
     return plan
 
