@@ -292,6 +292,7 @@ def test_friction_laws_are_selected_as_models_are(
         ("beads.h5", "-k", "psi"): "this result has no psi1, psi2; list them in [output] variables",
         ("beads.h5", "-k", "beta", "--sel", "angle=9 deg"): "no angle = 9 deg in this result; the nearest are "
         "8° and 15°",
+        ("beads.h5", "-k", "beta", "--sel", "angle=45"): '--sel angle=45.0: got 45 rad; did you mean "45 deg"?',
     }
     for options, message in refused.items():
         failed = cli("plot", *options, "-o", "b.svg", cwd=tmp_path)

@@ -13,6 +13,7 @@ from ..array_types import Mask
 from ..config.files import to_plain_data, to_plain_value
 from ..config.input_names import InputName
 from ..config.quantities import number_in
+from ..config.tables import SWEEP_QUANTITIES
 from ..contact.variables import LAW_DIMS, OUTPUTS
 from ..errors import UsageError, did_you_mean, require_known
 from ..formatting import argument, prefixed, safe_text
@@ -100,6 +101,9 @@ def select(dataset: xr.Dataset, sel: Mapping[str, object]) -> xr.Dataset:
             same = values.astype(str) == str(number)
         if dim in masks and same.any():
             same &= masks[dim]
+        angle = SWEEP_QUANTITIES["angle"]
+        if name == "angle" and not angle.allows(_as_number(number)):
+            raise UsageError(f"{argument('sel', {name: plain})}: {angle.refusal(plain, _as_number(number))}")
         if not same.any():
             # where what varies with it is selected, that leaves some of its values
             at, left = ("there", masks[dim]) if dim in masks else ("in this result", slice(None))
