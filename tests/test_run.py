@@ -384,6 +384,33 @@ def test_several_values_of_an_input_are_refused_in_one_line(values: Any) -> None
         impact.run(model="hertz", at={"e": values})
 
 
+@pytest.mark.parametrize(
+    ("words", "advice"),
+    [
+        (["E=65 GPa"], """--set 'materials.table1.E="65 GPa"'"""),
+        (["rho=2500", "material=glass"], "--set materials.glass.rho=2500.0"),
+        (["materials.glass.E=65e9"], "--set materials.glass.E=65000000000.0 with --at material=glass"),
+        (["materials.ice.E=9 GPa"], """--set 'materials.ice.E="9 GPa"' with nu, rho and --at material=ice"""),
+    ],
+)
+def test_a_property_that_is_no_axis_is_told_how_to_set_it(cli: Run, words: list[str], advice: str) -> None:
+    refused = cli("run", *(word for setting in words for word in ("--at", setting)))
+    name = words[0].partition("=")[0]
+    assert (refused.returncode, refused.stderr) == (2, f'no input "{name}" here; write {advice}\n')
+
+
+def test_a_property_of_an_axis_is_named() -> None:
+    source = {"models": "hertz", "sweep": {"v1": 1.0, "m1": 1.0, "m2": 1.0, "material": "steel"}}
+    with pytest.raises(UsageError, match=r'^no input "E" here; did you mean "materials.steel.E"\?$'):
+        impact.run(source, overrides={"materials.steel.E": [1e9, 2e9]}, at={"E": 2e9})
+    two = {"sweep.material": ["steel", "glass"]}
+    with pytest.raises(UsageError, match=r'^no input "E" here; write overrides=\["materials.NAME.E=2.0"\]$'):
+        impact.run(source, overrides=two, at={"E": 2.0})
+    # a picture of a result takes no settings
+    with pytest.raises(UsageError, match=r'^no input "nu" here; known: '):
+        impact.plot(impact.sweep(source, overrides=two), kind="loop", sel={"nu": 0.2})
+
+
 @pytest.mark.parametrize("name", ["materials..v1", "materials..E"])
 def test_a_property_of_no_material_is_an_unknown_input(name: str) -> None:
     with pytest.raises(UsageError, match=f'^no input "{name}" here'):

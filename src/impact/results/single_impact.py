@@ -15,13 +15,21 @@ import xarray as xr
 from ..arguments import require_counts
 from ..config.columns import without_replaced_inputs
 from ..config.draft import Draft, Overrides, Setting, open_config, open_text, reject_law_key, settings_of
-from ..config.files import as_table, to_plain_value
+from ..config.files import as_table, override_text, to_plain_value
 from ..config.grid import Axis
 from ..config.input_names import SWEEP_INPUTS, InputName, input_values, paths_with, with_words
+from ..config.library import library
 from ..config.load import Config, build, inline_files
 from ..config.quantities import DISTRIBUTION_FORMS
 from ..config.rules import has_other_stiffness
-from ..config.tables import DEFAULT_RTOL, SWEEP_DEFAULTS, expand_laws, law_quantities
+from ..config.tables import (
+    DEFAULT_RTOL,
+    MATERIAL_KEYS,
+    MATERIAL_QUANTITIES,
+    SWEEP_DEFAULTS,
+    expand_laws,
+    law_quantities,
+)
 from ..contact.fixed_step import EXACT
 from ..contact.force_expressions import unload_to_residual, unload_with_stiffness
 from ..contact.friction import FrictionLaw, Pair
@@ -630,6 +638,8 @@ def single_point(
     joint = _joint_inputs(draft)
     varying = {str(name) for name, value in input_values(draft.data) if isinstance(value, list | dict)}
     labels = {name: value for name, value in source.labels.items() if name in varying | joint or is_case(name)}
+    # `impact plot --sel` takes no other settings
+    settable = fixed if source.at_name == "at" else {}
     # the exponent n decides whose stiffness K is
     for name, value in sorted({**labels, **fixed}.items(), key=lambda item: item[0] == "K"):
         if name in joint or is_case(name):
@@ -637,7 +647,7 @@ def single_point(
         parsed = InputName.parse(name)
         if not _has_input(draft, parsed):
             if name in fixed:
-                raise _unknown_input(draft, name)
+                raise _unknown_input(draft, name, settable)
             # a parameter of another law, which the part of a result has as well
             continue
         path, value = parsed.path, parsed.word(value)
@@ -650,7 +660,7 @@ def single_point(
     config = build(draft)
     for name in fixed:
         if is_case(name) and name not in {axis.numbered for axis in config.axes}:
-            raise _unknown_input(draft, name)
+            raise _unknown_input(draft, name, settable)
     config, defaulted = _without_axes(config, {**labels, **fixed}, over)
     has_density = not source.is_starter or config.sets_material
     warn(*config.notes, *input_notes(Plan(config).inputs, has_density=has_density))
@@ -684,13 +694,33 @@ def _has_input(draft: Draft, name: InputName) -> bool:
     return name.key in SWEEP_INPUTS
 
 
-def _unknown_input(draft: Draft, name: str) -> UsageError:
+def _unknown_input(draft: Draft, name: str, at: Mapping[str, object]) -> UsageError:
     names = {*draft.input_names, *SWEEP_DEFAULTS, *(str(parameter) for parameter, _ in draft.parameters)}
     choices = {choice for choice in names if _has_input(draft, InputName.parse(choice))} | _joint_inputs(draft)
-    hint = did_you_mean(name, [*choices, *SWEEP_INPUTS])
-    # without a similar name, the inputs that this config has
-    hint = hint if hint.startswith("did") else did_you_mean(name, sorted(choices))
+    parsed = InputName.parse(name)
+    if name in at and parsed.table in ("sweep", "materials") and parsed.key in MATERIAL_QUANTITIES:
+        hint = _property_hint(draft, parsed, at, choices)
+    else:
+        hint = did_you_mean(name, [*choices, *SWEEP_INPUTS])
+        # without a similar name, the inputs that this config has
+        hint = hint if hint.startswith("did") else did_you_mean(name, sorted(choices))
     return UsageError(f'no input "{name}" here; {hint}')
+
+
+def _property_hint(draft: Draft, name: InputName, at: Mapping[str, object], inputs: set[str]) -> str:
+    """Say how to set a property of a material, which is an input only if it is an axis."""
+    sweep = {**draft.table("sweep"), **at}
+    used = [material for key, material in sweep.items() if key in MATERIAL_KEYS]
+    is_single = used == used[:1] * len(used) and all(isinstance(material, str) for material in used)
+    material = name.material or (str(used[0]) if used and is_single else "NAME")
+    full_name = InputName("materials", material, name.key)
+    if str(full_name) in inputs:
+        return f'did you mean "{full_name}"?'
+    hint = f"write {argument('overrides', [override_text(full_name.path, at[str(name)])])}"
+    if not name.material or material in (*used, *draft.table("materials")):
+        return hint
+    others = "" if material in library() else "nu, rho and "
+    return f"{hint} with {others}{argument('at', {'material': material})}"
 
 
 def _without_axes(
