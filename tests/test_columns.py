@@ -180,6 +180,16 @@ def test_columns_of_any_name_are_mapped_and_the_others_named_once(folder: Path) 
     assert (again.data, again.notes) == (config.data, ())
 
 
+@pytest.mark.parametrize("mark", ["-", "–", "—", "n.a.", "k.A.", "NA", " "])
+def test_a_mark_of_a_missing_value_leaves_out_its_row(folder: Path, mark: str) -> None:
+    (folder / "a.csv").write_text(f"v1 [m/s];e_out\n1;0,9\n2;{mark}\n{mark};0,8\n", encoding="utf-8")
+    for table in ({"file": "a.csv"}, {"columns": {"v1": [1.0, 2.0, mark], "e_out": [0.9, mark, 0.8]}}):
+        config = read(table)
+        assert config.data is not None
+        assert values(config.data)[:2] == ({"v1": (1.0,)}, {"e_out": (0.9,)})
+        assert "".join(config.notes).endswith("1 of 3 rows has no v1, 1 has no e_out: left out")
+
+
 @pytest.mark.slow
 def test_a_calibration_prints_what_is_left_out_as_notes(folder: Path, cli: Run) -> None:
     (folder / "a.csv").write_text(GERMAN, encoding="utf-8")

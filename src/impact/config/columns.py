@@ -57,7 +57,7 @@ THOUSANDS = re.compile(r"[-+]?[1-9][0-9]{0,2}(?:,[0-9]{3})+")
 # keys that say how a CSV file is written, and their values; what is missing is recognised
 CSV_KEYS = {"separator": SEPARATORS, "decimal": DECIMALS}
 # what cells without a value contain
-MISSING = ("", "na", "n/a", "nan", "none", "null", "<na>")
+MISSING = ("", "na", "n/a", "n.a.", "k.a.", "nan", "none", "null", "<na>", "-", "–", "—")
 
 
 @dataclass(frozen=True)
