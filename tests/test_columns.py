@@ -190,6 +190,21 @@ def test_a_mark_of_a_missing_value_leaves_out_its_row(folder: Path, mark: str) -
         assert "".join(config.notes).endswith("1 of 3 rows has no v1, 1 has no e_out: left out")
 
 
+@pytest.mark.parametrize(
+    ("text", "notes"),
+    [
+        ("10;12\n20;24\n30;36", ("a.csv: all 3 restitutions are above 1; are the columns exchanged?",)),
+        ("10;12", ("a.csv: the restitution is above 1; are the columns exchanged?",)),
+        ("10;12\n20;20\n30;36", ()),
+    ],
+)
+def test_restitutions_above_1_ask_whether_the_columns_are_exchanged(
+    folder: Path, text: str, notes: tuple[str, ...]
+) -> None:
+    (folder / "a.csv").write_text(f"drop_height [cm];rebound_height [cm]\n{text}\n", encoding="utf-8")
+    assert read({"file": "a.csv"}, sweep=BALLS["sweep"]).notes == notes
+
+
 @pytest.mark.slow
 def test_a_calibration_prints_what_is_left_out_as_notes(folder: Path, cli: Run) -> None:
     (folder / "a.csv").write_text(GERMAN, encoding="utf-8")

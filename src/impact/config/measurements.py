@@ -503,7 +503,18 @@ def read_measurements(draft: Draft) -> Draft:
     for name, values in measurements.inputs.items():
         # rules between inputs apply to the first value
         data, _ = set_value(data, InputName.parse(name).path, values[0])
-    return replace(draft, data=data, measurements=measurements, notes=(*draft.notes, *points.notes))
+    notes = (*draft.notes, *points.notes, *_exchange_notes(measurements))
+    return replace(draft, data=data, measurements=measurements, notes=notes)
+
+
+def _exchange_notes(measured: Measurements) -> Iterator[str]:
+    """Ask about restitutions that are all above 1, as those of a rebound height in the column of the drop."""
+    restitutions = measured.outputs.get("e_out", ())
+    if restitutions and min(restitutions) > 1.0:
+        count = len(restitutions)
+        text = f"all {count} restitutions are" if count > 1 else "the restitution is"
+        place = f"{safe_text(measured.file)}: " if measured.file else ""
+        yield f"{place}{text} above 1; are the columns exchanged?"
 
 
 def _read_sigma(value: object, output: str, n_points: int) -> tuple[tuple[Any, ...], list[ConfigProblem]]:
