@@ -612,3 +612,23 @@ def test_variables_name_the_scalar_coordinates_as_cf_asks(tmp_path: Path) -> Non
     impact.sweep_to_file({"models": ["hertz"], "sweep": sweep}, tmp_path / "r.h5")
     with h5py.File(tmp_path / "r.h5") as file:
         assert {"v1", "m1", "m2", "K"} <= {*file["e_out"].attrs["coordinates"].decode().split()}
+
+
+@pytest.mark.parametrize("name", ["zz.csv", "zz.PNG", "zz.json", "zz.toml", "zz.parquet"])
+def test_a_result_with_the_name_of_another_kind_of_file_is_refused(tmp_path: Path, cli: Run, name: str) -> None:
+    tables = "impact plot --data and to_dataframe make tables"
+    message = f"{name}: expected the name of a result, such as zz.h5; {tables}"
+    config = {"models": "hertz", "sweep": {"v1": [1.0, 2.0], "m1": 1.0, "m2": 1.0, "K": 1e6}}
+    (tmp_path / "c.json").write_text(json.dumps(config), encoding="utf-8")
+    impact.sweep_to_file(config, tmp_path / "r.dat")
+    for words in (
+        ("sweep", "c.json"),
+        ("sweep", "c.json", "--shard", "1/2"),
+        ("expand", "r.dat"),
+        ("extend", "r.dat", "--set", "sweep.v1=[3.0]"),
+    ):
+        refused = cli(*words, "-o", name, cwd=tmp_path)
+        assert (refused.returncode, refused.stderr) == (2, f"{message}\n")
+    with pytest.raises(UsageError, match=re.escape(message)):
+        impact.save(impact.load(tmp_path / "r.dat"), tmp_path / name)
+    assert {path.name for path in tmp_path.iterdir()} == {"c.json", "r.dat"}

@@ -34,6 +34,9 @@ UNSYNCABLE_ERRNOS = {
     errno.ENOSYS,
     errno.EISDIR,
 }
+# endings of the names of files that this program reads or writes, and that are no results
+FILE_SUFFIXES = (".toml", ".json", ".py", ".csv", ".tex", ".parquet", ".html", ".htm")
+PICTURE_SUFFIXES = (".png", ".svg", ".pdf", ".eps", ".pgf", ".gif")
 # age of a temporary file from which on it may be left by a process that was killed
 MIN_STALE_S = 60.0
 
@@ -183,6 +186,15 @@ def check_outputs(outputs: Iterable[str | Path | None], inputs: Iterable[object]
         check_output(path, *sources, overwrite=overwrite)
     for path in {path for path in paths if paths.count(path) > 1}:
         raise UsageError(f"{path}: is named for two outputs")
+
+
+def check_result_name(path: str | Path) -> None:
+    """Raise a UsageError, before any work, for a result with a name of another kind of file, such as a table."""
+    path = Path(path)
+    if path.suffix.lower() in FILE_SUFFIXES + PICTURE_SUFFIXES:
+        example = safe_text(path.with_suffix(".h5").name, 60)
+        tables = "impact plot --data and to_dataframe make tables"
+        raise UsageError(f"{path}: expected the name of a result, such as {example}; {tables}")
 
 
 def _check_name_length(path: Path) -> None:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..arguments import require_counts
 from ..array_types import Array
-from ..atomic import check_outputs, write_file
+from ..atomic import check_outputs, check_result_name, write_file
 from ..config.files import override_text
 from ..config.input_names import InputName
 from ..config.load import Config, parse_config, read_config
@@ -114,6 +114,9 @@ def calibrate(
     plugin_set = read_plugins(plugins)
     config = read_config(source, overrides, plugin_set.models, purpose="calibrate")
     check_outputs([output, best], [source, *plugins, *config.files], overwrite=overwrite)
+    is_table = output is not None and Path(output).suffix.lower() in TABLE_SUFFIXES
+    if output is not None and not is_table:
+        check_result_name(output)
     if model is not None:
         if best is None:
             best_file = argument("best", "FILE")
@@ -122,7 +125,7 @@ def calibrate(
     name = str(source) if isinstance(source, str | Path) else "config"
     warn(*config.notes, *Plan(config).pair_notes(f"{name}: frictions"))
     result = calibrate_config(config, plugin_set.of(config.models), jobs)
-    if output is not None and Path(output).suffix.lower() in TABLE_SUFFIXES:
+    if output is not None and is_table:
         write_table(Fits(result), Path(output), TableForm(), overwrite=overwrite)
     elif output is not None:
         save(result, output, overwrite=overwrite)

@@ -15,7 +15,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from .._version import __version__
-from ..atomic import check_outputs
+from ..atomic import check_outputs, check_result_name
 from ..config.draft import Setting, settings_of
 from ..config.files import override_text
 from ..config.grid import MAX_POINTS, Axis
@@ -131,6 +131,8 @@ def extend_to_file(
         backend or SERIAL, resume, overwrite, max_points, on_progress or ignore, should_stop=should_stop or never
     )
     check_outputs([target], plugins, overwrite=True)
+    if output is not None:
+        check_result_name(output)
     plugin_set = read_plugins(plugins)
     name, changes = str(source), settings_of(overrides)
     with run.connected() as connected, open_result(source) as before:

@@ -18,7 +18,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
-from ..atomic import atomic_write, check_outputs
+from ..atomic import atomic_write, check_outputs, check_result_name
 from ..config.draft import settings_of
 from ..config.grid import MAX_POINTS
 from ..config.tables import CORES
@@ -141,6 +141,7 @@ def sweep_shard(
     ...     impact.sweep_shard("configs/figure6.toml", "1/1", f"{folder}/results.h5").trajectories
     303
     """
+    check_result_name(output)
     told = on_progress or ignore, on_note or warn, should_stop or never
     run = Run(backend or SERIAL, not overwrite, overwrite, max_points, *told)
     plan = read_plan(source, overrides, plugins, run)
@@ -218,6 +219,7 @@ def merge(
     303
     """
     check_outputs([output], plugins, overwrite=overwrite)
+    check_result_name(output)
     output = Path(output)
     run = Run(overwrite=overwrite, on_progress=on_progress or ignore, should_stop=should_stop or never)
     plugin_set = read_plugins(plugins)

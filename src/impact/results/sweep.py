@@ -16,7 +16,7 @@ from typing import Any
 
 import xarray as xr
 
-from ..atomic import atomic_write, check_output, check_outputs
+from ..atomic import atomic_write, check_output, check_outputs, check_result_name
 from ..config.draft import Setting, reject_law_key, settings_of
 from ..config.grid import MAX_POINTS
 from ..config.input_names import InputName
@@ -211,6 +211,7 @@ def sweep_to_file(
         run.check_stop(f"{output} already contains this sweep")
         return outcome
     check_outputs([output], [source, *plugins, *plan.config.files], overwrite=overwrite)
+    check_result_name(output)
     with run.connected() as connected:
         outcome = sweep_into(output, plan, connected)
     run.check_stop(f"{output} is complete")

@@ -13,7 +13,7 @@ import h5py
 import xarray as xr
 from xarray.backends import BackendEntrypoint
 
-from ..atomic import Sink, atomic_write, check_output, check_outputs
+from ..atomic import Sink, atomic_write, check_output, check_outputs, check_result_name
 from ..config.files import RESULT_MAGIC
 from ..config.grid import MAX_POINTS
 from ..config.tables import Output
@@ -79,6 +79,7 @@ def save(
     1
     """
     path = Path(path)
+    check_result_name(path)
     if "schema_version" not in dataset.attrs:
         raise UsageError(f"{path}: this dataset is not a result of impact: it has no schema_version")
     if violation := schema_violation(dataset):
@@ -249,6 +250,7 @@ def expand(
     """
     output, shown = Path(output), safe_text(str(result))
     check_outputs([output], [result], overwrite=overwrite)
+    check_result_name(output)
     opened = open_result(result)
     require_sweep(opened, "expand")
     dataset = select(opened, sel or {})

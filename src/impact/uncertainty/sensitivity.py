@@ -15,7 +15,7 @@ import numpy as np
 import xarray as xr
 
 from ..array_types import Array
-from ..atomic import check_outputs
+from ..atomic import check_outputs, check_result_name
 from ..config.files import path_text
 from ..config.grid import MAX_POINTS, SAMPLE
 from ..config.input_names import InputName
@@ -145,6 +145,8 @@ def sensitivities(
             )
     plan = sensitivity_plan(plan, of, max_points, str(source) if isinstance(source, str | Path) else "config")
     check_outputs([output], [source, *plugins, *plan.config.files], overwrite=overwrite)
+    if output is not None:
+        check_result_name(output)
     swept = (execute or sweep_in_memory)(plan)
     results = [sensitivity_of(plan, name, swept) for name in of]
     if output is not None:
