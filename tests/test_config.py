@@ -203,6 +203,9 @@ BAD = [
     ('"steel"', "3", ["x.toml:8: sweep.material: got 3, expected the name of a material of [materials]"]),
     # unknown, missing and misplaced keys
     ("e = 0.5", "e = 0.5\nmasss1 = 3", ['x.toml:5: sweep.masss1: unknown key; did you mean "m1"?']),
+    ("e = 0.5", "e = 0.5\nmodel = 'hertz'\nfrictons = 'none'",
+     ['x.toml:5: sweep.model: unknown key; did you mean "models", before all tables?',
+      'x.toml:6: sweep.frictons: unknown key; did you mean "frictions", before all tables?']),
     ("m1 = 1.0", "m1 = 1.0\nr1 = 3", ['x.toml:7: sweep.r1: unknown key; did you mean "R1"?']),
     ("[materials", "[materails",
      ['x.toml:9: materails: unknown key; did you mean "materials"?']),

@@ -612,6 +612,7 @@ def test_cases_of_a_file_replace_inputs_of_the_starter_config(tmp_path: Path) ->
     ("inputs", "message"),
     [
         ({"overide": ["a"]}, "overide: sweep.overide: unknown key; known: K, "),
+        ({"model": "hertz"}, 'model: sweep.model: unknown key; did you mean "models", before all tables?'),
         ({"e": 2}, "e: sweep.e: got 2, expected a number from 0 to 1"),
         ({"models": "hert"}, 'models: models: got "hert", expected a model; did you mean "hertz"?'),
     ],

@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, Literal
 
@@ -44,6 +45,7 @@ HOMES: Mapping[str, Iterable[str]] = {
     "under [materials.NAME]": tables.MaterialTable.model_fields,
     "before all tables": ("models", "frictions", "title"),
 }
+LAW_KEYS = ("models", "frictions")
 # other words that users may write for a key
 KEY_SYNONYMS = {
     "restitution": "e",
@@ -421,6 +423,8 @@ def _unknown_key_hint(location: KeyPath, models: Mapping[str, ForceModel]) -> st
             keys = tables.laws_of(table, models)
         case ("model" | "friction" as table, key):
             keys = tables.law_quantities(tables.laws_of(table, models)[str(key)])
+        case ("sweep",) if name not in KEY_SYNONYMS and (meant := get_close_matches(name[:64], LAW_KEYS, 1, 0.8)):
+            return f'did you mean "{meant[0]}", before all tables?'
         case ("sweep",) if owners := [
             table
             for table in tables.LAW_TABLES
