@@ -14,6 +14,7 @@ from ..atomic import check_output
 from ..errors import ResultError, UsageError
 from ..formatting import argument, safe_text
 from ..results.provenance import command_start, describe_point, inputs_at
+from ..results.schema import kind_of
 from ..results.summary import summarize
 from ..results.xarray_backend import load, save_with_attributes
 from .compare import Tolerances, check_comparable, compare, effective_tolerances
@@ -63,6 +64,10 @@ def bless(
     new, baseline = Path(new), Path(baseline)
     check_output(baseline, new, overwrite=True)
     result = load(new)
+    kind = kind_of(result)
+    if kind in ("calibration", "board"):
+        advice = f"impact compare takes two {kind}s as they are"
+        raise UsageError(f"{new}: this is a {kind}, expected the result of a sweep; {advice}")
     check_comparable(result, str(new))
     if not allow_failed:
         _check_no_failures(result, new)
