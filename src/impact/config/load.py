@@ -39,13 +39,14 @@ EXPECTED_BY_KEY = {
     **{name: str(info.description) for name, info in Column.model_fields.items()},
     "n": f"the number of {tables.Design.model_fields['n'].description}, such as 1024",
 }
+# of the config itself, which choose its laws
+LAW_KEYS = ("models", "frictions")
 # where keys that are in another table belong
 HOMES: Mapping[str, Iterable[str]] = {
     **{f"under [{table}]": tables.KEYS_BY_TABLE[table] for table in ("sweep", "solver", "output")},
     "under [materials.NAME]": tables.MaterialTable.model_fields,
-    "before all tables": ("models", "frictions", "title"),
+    "before all tables": (*LAW_KEYS, "title"),
 }
-LAW_KEYS = ("models", "frictions")
 # other words that users may write for a key
 KEY_SYNONYMS = {
     "restitution": "e",
