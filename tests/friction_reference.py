@@ -716,7 +716,7 @@ def solve(normal: NormalLaw, friction: Friction, g0: float) -> Outcome:
     first = Trajectory(normal, friction, g0)
     first.phase.counts_memory = False
     outcome = first.solve()
-    powers = [normal.damping[1]] * bool(normal.damping and normal.damping[0])
+    powers = [normal.damping[1]] if normal.damping and normal.damping[0] else []
     powers += [friction.q] * bool(friction.c_t and friction.cap == "total")
     slides = [first.begins_at_limit, first.mode != STICK and normal.release == "gap"]
     if any(slides) and powers and 2.0 * min(powers) <= friction.kp:
