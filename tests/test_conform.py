@@ -269,7 +269,10 @@ def test_an_engine_may_name_a_contact_force_of_hertz(model: str) -> None:
     """Where a spring slides all the time, as here, its beta is that of rigid balls."""
     law = {"law": "lammps-mindlin-force", "parameters": {"kt_over_kn": 0.3, "xt": 0.0}}
     e = {"hertz": 1.0, "tsuji-1992-no-tension": 0.9018}[model]
-    answer = lambda c: rigid(c | {"e": e}) | law | {"model": model}  # noqa: E731
+
+    def answer(collision: Any) -> Any:
+        return rigid(collision | {"e": e}) | law | {"model": model}
+
     board = impact.conform(adapter=answer, only="slide-mu10-85-equal", tol={"friction": 1e-4})
     assert "friction" not in failed(board)
 

@@ -78,10 +78,10 @@ def export(
     return exits.EXIT_NOT_EQUAL if result.verification and result.verification.differs else exits.EXIT_OK
 
 
-def _check_alone(command: Callable[..., int], given: Mapping[str, object], *accepted: str) -> None:
-    """Refuse what a list of a command would ignore."""
+def _check_alone(command: Callable[..., int], options_used: Mapping[str, object], *accepted: str) -> None:
+    """Refuse options that a list of a command would ignore."""
     parameters = inspect.signature(command).parameters
-    if any(given[name] != parameters[name].default for name in parameters.keys() - accepted):
+    if any(options_used[name] != parameters[name].default for name in parameters.keys() - accepted):
         raise UsageError("--list: got more than this option, expected it alone")
 
 

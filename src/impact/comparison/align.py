@@ -279,9 +279,9 @@ def _of_laws(study: xr.Dataset, keys: Sequence[str], *, subset: bool) -> xr.Data
     study = study.sel(model=keys)
     if not subset:
         return study
-    own = study["parameter"].values[(study["identifiable"] >= 0).any("model").values]
+    parameters = study["parameter"].values[(study["identifiable"] >= 0).any("model").values]
     is_whole = np.isclose(study["weight"].sum().item(), 1.0)
-    return study.sel(parameter=own, other_parameter=own).drop_vars([] if is_whole else "weight")
+    return study.sel(parameter=parameters, other_parameter=parameters).drop_vars([] if is_whole else "weight")
 
 
 def align_boards(new: xr.Dataset, baseline: xr.Dataset, *, subset: bool) -> Alignment:

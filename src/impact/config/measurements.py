@@ -513,8 +513,8 @@ def _exchange_notes(measured: Measurements) -> Iterator[str]:
     if restitutions and min(restitutions) > 1.0:
         count = len(restitutions)
         text = f"all {count} restitutions are" if count > 1 else "the restitution is"
-        place = f"{safe_text(measured.file)}: " if measured.file else ""
-        yield f"{place}{text} above 1; are the columns exchanged?"
+        file = f"{safe_text(measured.file)}: " if measured.file else ""
+        yield f"{file}{text} above 1; are the columns exchanged?"
 
 
 def _read_sigma(value: object, output: str, n_points: int) -> tuple[tuple[Any, ...], list[ConfigProblem]]:

@@ -196,8 +196,8 @@ def check_friction(pair: Pair, oblique: ObliqueImpacts) -> NDArray[np.int8]:
         status = replace_where(status, ~(value >= 0.0), np.int8(FrictionStatus.OUT_OF_RANGE))
     law, impacts, mu = pair.friction, oblique.impacts, oblique.mu
     invalid = [_value(law, oblique, "mu_d") > mu, (mu == 0.0) & (_value(law, oblique, "mu_v") > 0.0)]
-    given = [name for name, values in oblique.parameters.items() if not np.isnan(values).all()]
-    if "e" in required_inputs(law, given, distinct_values(impacts.n).tolist()):
+    names = [name for name, values in oblique.parameters.items() if not np.isnan(values).all()]
+    if "e" in required_inputs(law, names, distinct_values(impacts.n).tolist()):
         is_off = law.damping == "liggghts" and _value(law, oblique, "tangential_damping") == 0.0
         invalid.append(~((impacts.e >= 0.0) & (impacts.e <= 1.0)) & ~np.asarray(is_off))
     for mask in invalid:
