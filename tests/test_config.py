@@ -629,6 +629,10 @@ def test_a_density_is_required_only_where_a_radius_is_derived_from_it() -> None:
     radii = "R1 = 0.1\nR2 = inf"
     assert read(bare.replace("e = 0.5", f"e = 0.5\n{radii}")).materials["steel"].rho is None
     assert read(bare.replace("e = 0.5", "e = 0.5\nK = 1e9")).materials["steel"].rho is None
+    # neither is that of a wall or a plane
+    ball = re.sub("m[12] = .*\n", "", bare).replace("e = 0.5", "e = 0.5\nm1 = 1.0\nR1 = 0.1\n{} = inf")
+    for size in ("m2", "R2"):
+        assert read(ball.format(size)).materials["steel"].rho is None
     # only one radius is set, or the model depends on a radius
     needs = "x.toml:10: materials.steel.rho: missing, expected a number > 0 kg/m^3, or R{} under [sweep]: {} needs a radius"
     for line, ball, key in (("R1 = 0.1", 2, "hertz"), ("R2 = 0.1", 1, "hertz"), ("K = 1e9", 1, "test-radius")):

@@ -73,6 +73,11 @@ def _numbers(draft: Draft, name: str) -> Sequence[float]:
     return [SWEEP_QUANTITIES[name].read_or_nan(each) for each in (value if isinstance(value, list) else [value])]
 
 
+def _has_finite(draft: Draft, name: str) -> bool:
+    """Whether a mass or a radius is that of a sphere at any value: it then has a density."""
+    return not all(map(math.isinf, _numbers(draft, name)))
+
+
 def check_rules(draft: Draft) -> Draft:
     """Add the problems of all rules."""
     if not isinstance(draft.data.get("sweep"), dict):
@@ -163,7 +168,7 @@ def _mass_problems(draft: Draft) -> Iterable[ConfigProblem]:
             continue
         if radius not in sweep or not {"material", f"material{ball}"} & sweep.keys():
             yield ("sweep", mass), f"{_missing(SWEEP_QUANTITIES[mass])}; or {radius} and a material with rho"
-        for name in _materials_without(draft, ball, "rho") if radius in sweep else ():
+        for name in _materials_without(draft, ball, "rho") if _has_finite(draft, radius) else ():
             expected = f"{MATERIAL_QUANTITIES['rho'].expected}, or {mass} under [sweep]"
             yield ("materials", name, "rho"), f"missing, expected {expected}: the mass of ball {ball} is not set"
 
@@ -176,7 +181,7 @@ def _radius_problems(draft: Draft) -> Iterable[ConfigProblem]:
     for ball in ("1", "2"):
         radius = f"R{ball}"
         users = [model.key for model in draft.models if radius in _depends_on(model, draft)]
-        if users and radius not in sweep and f"m{ball}" in sweep:
+        if users and radius not in sweep and _has_finite(draft, f"m{ball}"):
             keys |= dict.fromkeys(users)
             for name in _materials_without(draft, ball, "rho"):
                 radii.setdefault(name, []).append(radius)

@@ -22,10 +22,10 @@ class Material:
 def sphere_radius(mass: Array, density: Array) -> Array:
     """Radius [m] of a solid sphere from its mass [kg] and density [kg/m3]; an infinite mass is a plane.
 
-    >>> print(sphere_radius(np.array([1.0]), np.array([2712.0]))[0].round(10))
-    0.0444843486
+    >>> sphere_radius(np.array([1.0, np.inf]), np.array([2712.0, np.nan])).round(10).tolist()
+    [0.0444843486, inf]
     """
-    return np.cbrt(mass * (3.0 / (4.0 * np.pi)) / density)
+    return np.where(np.isinf(mass), np.inf, np.cbrt(mass * (3.0 / (4.0 * np.pi)) / density))
 
 
 def sphere_mass(radius: Array, density: Array) -> Array:
