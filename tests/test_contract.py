@@ -7,7 +7,7 @@ import pytest
 
 from impact.contact.checks import check_model
 from impact.contact.closed_forms.hysteresis import delivered_restitution
-from impact.contact.model import ForceModel
+from impact.contact.model import ForceModel, Parameter
 from impact.contact.models import catalogue
 from impact.contact.models.hysteresis import hysteresis
 
@@ -100,7 +100,26 @@ WRONG_LAWS = {
         "at e = 1 the status is OK",
     ),
     "a force that drifts": (drifting_law(), "a tighter tolerance moves nothing"),
-    "a force that drifts, in other units": (drifting_law(), "a change of units changes nothing"),
+    "a number that has a unit": (
+        wrong_law(lambda elastic, x: elastic + 1e3 * x),
+        "a change of units changes nothing",
+    ),
+    "a number that has a unit, on unloading": (
+        wrong_law(
+            lambda elastic: elastic,
+            unloading=lambda elastic, stretch: elastic * np.minimum(stretch / 1e-3, 1.0),
+            residual=lambda peak: 0.1 * peak,
+        ),
+        "a change of units changes nothing",
+    ),
+    "a parameter that has another unit": (
+        wrong_law(
+            lambda elastic, v, c: elastic + c * v,
+            release="force",
+            parameters=(Parameter("c", "N/m", "damping constant", least=0.0),),
+        ),
+        "a change of units changes nothing",
+    ),
     "a force that depends on other impacts": (
         wrong_law(lambda elastic, x, v, e: elastic * (1.0 + (1.0 - e) * v + 1e-12 * x.max())),
         "an impact alone has the bits that it has in a batch",
