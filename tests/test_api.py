@@ -120,6 +120,11 @@ def test_a_changed_model_has_another_fingerprint() -> None:
         ({"domain": {"e": (1, 0)}}, "domain of e: got (1, 0), expected (least, most)"),
         ({"parameters": ("c",)}, "expected a tuple of Parameter"),
         ({"coefficients": {"K": lambda e: e}}, '"K" is the name of a quantity'),
+        ({"parameters": (impact.Parameter("c", "1", ""),) * 2}, 'parameters: got "c" twice, expected it once'),
+        (
+            {"parameters": (impact.Parameter("c", "1", "", default=-1.0, least=0.0, most=2.0),)},
+            "parameter c: got the default -1, expected a number from 0 to 2",
+        ),
         (
             {"velocity_coordinate": "log"},
             'velocity_coordinate "log": expected a coefficient chi, a force of elastic and chi',

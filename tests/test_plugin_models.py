@@ -23,8 +23,9 @@ from .fork_server import CompletedCommand, ForkServer
 
 PAGE = (ROOT / "docs" / "extending.md").read_text(encoding="utf-8")
 BROKEN = """
-from impact import ForceModel
-GAINS = ForceModel("gains", "", 2026, equation="", reference="", force=lambda elastic, v: elastic * (1 - 0.3 * v))
+from impact import ForceModel, Parameter
+GAINS = ForceModel("gains", "", 2026, equation="", reference="", force=lambda elastic, v: elastic * (1 - 0.3 * v),
+                   parameters=(Parameter("gain", "1", "not in the formula", 0.3),))
 """
 PACKAGE = """
 from impact import ForceModel, hysteresis
@@ -113,6 +114,7 @@ def test_the_check_of_a_law_reports_each_clause(cli: Run, tmp_path: Path) -> Non
     assert re.search(r"no energy is gained +broken", done.stdout)
     assert re.search(r"momentum is conserved \(4\) +holds", done.stdout)
     assert "gains: has no oracle" in done.stderr
+    assert "gains: no formula uses gain" in done.stderr
 
 
 RAISING = """\

@@ -14,7 +14,7 @@ from ..display import Block, Displayed, Styled, Table
 from ..errors import ModelError, warn
 from ..formatting import number
 from .dimensionless import LawValues, dimensionless_values, required_quantities, with_coefficients, with_units
-from .formula_calls import Formula, call_by_name
+from .formula_calls import Formula, argument_names, call_by_name
 from .impacts import Impacts, stiffness
 from .materials import effective_mass, hertz_stiffness, sphere_radius
 from .model import ForceModel
@@ -115,10 +115,13 @@ class ContractResult(list[ClauseResult], Displayed):
         yield from self.notes()
 
     def notes(self) -> list[str]:
-        """List what was not checked."""
-        if any(result.clause == CLOSED_FORM for result in self):
-            return []
-        return [f"{self.model.key}: has no oracle, so that its restitution was compared with no closed form"]
+        """List what was not checked, and parameters that change nothing."""
+        model = self.model
+        used = {*model.quantities, *argument_names(model.oracle), *argument_names(model.stiffness)}
+        notes = [f"{model.key}: no formula uses {p.name}" for p in model.parameters if p.name not in used]
+        if all(result.clause != CLOSED_FORM for result in self):
+            notes.append(f"{model.key}: has no oracle, so that its restitution was compared with no closed form")
+        return notes
 
 
 def check_model(model: ForceModel) -> ContractResult:

@@ -265,9 +265,17 @@ class ForceModel:
         for name in (*parameter_names, *self.coefficients):
             if name in reserved_names:
                 raise ModelError(f'model {self.key}: "{name}" is the name of a quantity, expected another name')
+            if parameter_names.count(name) > 1:
+                raise ModelError(f'model {self.key}: parameters: got "{name}" twice, expected it once')
         dimensionless = [parameter.name for parameter in self.parameters if parameter.unit == "1"]
         for parameter in self.parameters:
             dimension(parameter.unit, {"n": 1.5, **dict.fromkeys(dimensionless, 1.0)})
+            default = parameter.least if parameter.default is None else parameter.default
+            if not parameter.least <= default <= parameter.most:
+                raise ModelError(
+                    f"model {self.key}: parameter {parameter.name}: got the default {default:g}, "
+                    f"expected a number from {parameter.least:g} to {parameter.most:g}"
+                )
         domain_names = {*QUANTITIES, *DOMAIN_INPUTS, *({"chi"} & self.coefficients.keys()), *parameter_names}
         for name, ends in self.domain.items():
             if name not in domain_names:
