@@ -120,6 +120,11 @@ def test_a_changed_model_has_another_fingerprint() -> None:
         ({"domain": {"e": (1, 0)}}, "domain of e: got (1, 0), expected (least, most)"),
         ({"parameters": ("c",)}, "expected a tuple of Parameter"),
         ({"coefficients": {"K": lambda e: e}}, '"K" is the name of a quantity'),
+        (
+            {"parameters": (impact.Parameter("2c", "1", ""),)},
+            'got the name "2c", expected letters, digits and "_"',
+        ),
+        ({"parameters": (impact.Parameter("status", "1", ""),)}, '"status" is the name of a quantity'),
         ({"parameters": (impact.Parameter("c", "1", ""),) * 2}, 'parameters: got "c" twice, expected it once'),
         (
             {"parameters": (impact.Parameter("c", "1", "", default=-1.0, least=0.0, most=2.0),)},
@@ -154,6 +159,13 @@ def test_two_models_of_one_key_are_refused() -> None:
     twin = impact.hysteresis("hertz", title="", year=1, equation="", reference="", chi=lambda e: e)
     with pytest.raises(impact.ImpactError, match="two models of this key"):
         impact.models([twin])
+
+
+def test_a_law_in_place_of_its_key_is_told_where_it_belongs() -> None:
+    with pytest.raises(
+        impact.ImpactError, match='expected its key, "mine-2026", and the law itself among the plug'
+    ):
+        impact.sweep(models=[_mine()], e=0.5)  # type: ignore[list-item]
 
 
 def test_a_stiffness_may_be_a_parameter_of_a_law() -> None:

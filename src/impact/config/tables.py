@@ -621,6 +621,8 @@ def expand_laws(
 
 def _laws_matching(word: object, laws: Mapping[str, L], what: str) -> dict[str, L]:
     """Find the laws of a key, "all", "family:NAME" or a pattern, by key."""
+    if isinstance(word, ForceModel):
+        raise mismatch_error(word, f'its key, "{word.key}", and the law itself among the plugins')
     if not isinstance(word, str):
         raise mismatch_error(word, f"the name of a {what}")
     # a law with two names is not run twice

@@ -260,11 +260,13 @@ class ForceModel:
         for name, (is_valid, expected) in allowed.items():
             if not is_valid:
                 raise ModelError(f"model {self.key}: {name}: got {getattr(self, name)!r}, expected {expected}")
-        reserved_names = {*QUANTITIES, *DOMAIN_INPUTS, *FORCE_ARGUMENTS, *UNLOADING_ARGUMENTS, "stretch"}
+        reserved_names = {*QUANTITIES, *DOMAIN_INPUTS, *FORCE_ARGUMENTS, *UNLOADING_ARGUMENTS, "stretch", "status"}
         parameter_names = [parameter.name for parameter in self.parameters]
         for name in (*parameter_names, *self.coefficients):
             if name in reserved_names:
                 raise ModelError(f'model {self.key}: "{name}" is the name of a quantity, expected another name')
+            if not name.isidentifier():
+                raise ModelError(f'model {self.key}: got the name "{name}", expected letters, digits and "_"')
             if parameter_names.count(name) > 1:
                 raise ModelError(f'model {self.key}: parameters: got "{name}" twice, expected it once')
         dimensionless = [parameter.name for parameter in self.parameters if parameter.unit == "1"]
