@@ -335,10 +335,35 @@ def test_the_table_and_the_json_have_the_same_content(cli: Run, fair_and_exact_f
         "at": {"e": 0.1},
         "e_out": pytest.approx(0.665265, abs=1e-6),
         "served": [[pytest.approx(0.8), 1.0]],
+        "crossings": [],
     }
     assert re.search(r" 30\.0% +0\.565 .* 0  e=0\.1: e_out 0\.6653 +0\.8 to 1 *$", lines[-1])
     # a range of one value is printed as that value
     assert cli("recommend", path, "--tol", "1e-9", "--model", FAIR[0]).stdout.split()[-1] == "1"
+
+
+def test_a_target_that_is_crossed_between_values_of_the_grid_is_named() -> None:
+    config = {
+        "models": "hertz",
+        "frictions": "coulomb-1785",
+        "sweep": {
+            **BALLS,
+            "m2": math.inf,
+            "e": 1.0,
+            "R1": 0.1,
+            "mu": 0.1,
+            "angle": ["20 deg", "60 deg", "80 deg"],
+        },
+        "materials": {"steel": STEEL},
+    }
+    (best,) = impact.recommend(impact.sweep(config), target={"beta": -0.4})
+    # a sphere on a wall that slides has beta = 3.5 mu (1 + e)/tan(angle) - 1
+    angle = math.atan(3.5 * 0.1 * 2.0 / 0.6)
+    ((below, above),) = best.crossings
+    assert [math.degrees(below), math.degrees(above)] == pytest.approx([20.0, 60.0])
+    assert below < angle < above
+    assert best.row[-1] == "between 20° and 60°"
+    assert not best.within
 
 
 def test_a_point_is_shown_in_degrees_and_words_and_selected_by_them() -> None:

@@ -89,6 +89,8 @@ class Ranked:
         and the value of `output` there
     served : the ranges of e, or with a target of the angle if there is one, in which all points are within the
         tolerance; None unless it varies along one axis
+    crossings : pairs of neighbouring values of that input, neither of which is in `served`, between which the
+        output crosses its target; empty if it also varies along other axes
     friction : key of the friction law; "" for a model alone
     criterion : the output that is ranked, and the input that `served` has ranges of
     units : those of the parameters, by path, where they are known
@@ -104,6 +106,7 @@ class Ranked:
     at: Mapping[str, float | str]
     e_out: float
     served: tuple[tuple[float, float], ...] | None
+    crossings: tuple[tuple[float, float], ...] = ()
     friction: str = ""
     criterion: Criterion = BY_ERROR
     units: Mapping[str, str] = field(default_factory=dict, repr=False, compare=False)
@@ -158,11 +161,14 @@ class Ranked:
 
     @property
     def _served_text(self) -> str:
-        """The first ranges that it serves."""
+        """The first ranges that it serves, and where it crosses the target."""
         if self.served is None:
             return "–"
         unit = InputName.parse(self.criterion.along).unit
-        ranges = [" to ".join(prefixed(end, unit, 6) for end in dict.fromkeys(ends)) for ends in self.served]
+        ranges = []
+        for ends in sorted((*self.served, *self.crossings)):
+            shown = [prefixed(end, unit, 6) for end in dict.fromkeys(ends)]
+            ranges.append("between " + " and ".join(shown) if ends in self.crossings else " to ".join(shown))
         more = f" and {len(ranges) - MAX_RANGES:,} more" if len(ranges) > MAX_RANGES else ""
         return ", ".join(ranges[:MAX_RANGES]) + more or "nowhere"
 
@@ -428,10 +434,11 @@ def _reduce_dims(law_data: xr.Dataset, criterion: Criterion, *more: Hashable) ->
 
 @dataclass(frozen=True)
 class _JudgedSlab:
-    """Points of a slab: the output, its distance from the target, and which points count, failed, have a distance
-    and are within tol."""
+    """Points of a slab: the output, its side of the target (-1, 0 or 1) and its distance from it, and which points
+    count, failed, have a distance and are within tol."""
 
     output: NDArray[Any]
+    side: NDArray[np.float64]
     distance: NDArray[np.float64]
     judged: Mask
     failed: Mask
@@ -448,15 +455,21 @@ def _judged_slabs(
         values = np.asarray(values, float)
         if criterion.target is None:
             target = read_slab(evaluated, "e", slab)
-            output, distance, has_target = target + values, np.abs(values), ~np.isnan(target)
+            output, error, has_target = target + values, values, ~np.isnan(target)
         else:
             # an answer without this output, such as beta without a slip, has no target
-            output, distance = values, np.abs(values - criterion.target)
+            output, error = values, values - criterion.target
             has_target = ~(np.isnan(values) & np.isin(status, (FrictionStatus.OK, FrictionStatus.SLOW_LIMIT)))
+        distance = np.abs(error)
         judged = has_target & (status != Status.NO_IMPACT)
         failed = judged & (status >= FIRST_FAILURE)
         evaluable = judged & ~failed & ~np.isnan(distance)
-        yield slab, _JudgedSlab(output, distance, judged, failed, evaluable, evaluable & (distance <= tol))
+        yield (
+            slab,
+            _JudgedSlab(
+                output, np.sign(error), distance, judged, failed, evaluable, evaluable & (distance <= tol)
+            ),
+        )
 
 
 def _best_parameters(
@@ -511,6 +524,8 @@ def _rank_law(law_data: xr.Dataset, tol: float, criterion: Criterion) -> Ranked:
     served_input = evaluated.variables[along] if along_one else xr.Variable((), 0.0)
     # for each value of an input along one axis: how many points count, and how many are within tol
     judged, within = np.zeros(served_input.shape, int), np.zeros(served_input.shape, int)
+    # and where there is one, on which side of the target it is
+    side = np.full(served_input.shape, np.nan)
     others = tuple(axis for axis, dim in enumerate(sizes) if dim not in served_input.dims)
     evaluable_points = failed_points = 0
     total, max_error, e_out = Fraction(), math.nan, math.nan
@@ -520,6 +535,8 @@ def _rank_law(law_data: xr.Dataset, tol: float, criterion: Criterion) -> Ranked:
         positions = tuple(slab[dim] for dim in served_input.dims)
         judged[positions] += part.judged.sum(axis=others)
         within[positions] += part.within.sum(axis=others)
+        if along_one and not others:
+            side[positions] = np.where(evaluable, part.side, np.nan)
         evaluable_points += weight * int(evaluable.sum())
         failed_points += weight * int(part.failed.sum())
         if evaluable.any():
@@ -546,6 +563,7 @@ def _rank_law(law_data: xr.Dataset, tol: float, criterion: Criterion) -> Ranked:
         for name in chosen
     }
     served = _served_ranges(served_input.values, judged > 0, within < judged) if along_one else None
+    crossings = _crossings(served_input.values, side, within > 0) if along_one else ()
     model, friction = _keys(law_data)
     return Ranked(
         model,
@@ -558,6 +576,7 @@ def _rank_law(law_data: xr.Dataset, tol: float, criterion: Criterion) -> Ranked:
         at,
         e_out,
         served,
+        crossings,
         friction,
         criterion,
         {path: unit for path, unit in units.items() if not names_in(unit)},
@@ -594,3 +613,11 @@ def _served_ranges(e: NDArray[Any], requested: Mask, missed: Mask) -> tuple[tupl
     served = np.bincount(value_index, missed[requested], values.size) == 0
     edges = np.diff(np.concatenate(([0], served, [0])))
     return tuple(zip(values[edges[:-1] == 1].tolist(), values[edges[1:] == -1].tolist(), strict=True))
+
+
+def _crossings(values: NDArray[Any], side: NDArray[np.float64], within: Mask) -> tuple[tuple[float, float], ...]:
+    """Find the neighbouring values, neither within the tolerance, between which the side of the target changes."""
+    order = np.argsort(values)
+    values, side, within = values[order], side[order], within[order]
+    crosses = (side[:-1] * side[1:] < 0.0) & ~within[:-1] & ~within[1:]
+    return tuple(zip(values[:-1][crosses].tolist(), values[1:][crosses].tolist(), strict=True))
