@@ -301,6 +301,13 @@ def test_a_wall_of_another_material_is_a_stiffness_in_lammps() -> None:
     assert two.lines[0].endswith("xplane NULL 0.0")
 
 
+@pytest.mark.parametrize("spring", ["hertz", "hooke"])
+def test_a_remark_on_hertz_material_at_a_wall_is_for_hertz_alone(spring: str) -> None:
+    law = f"lammps-coeff-restitution-{spring}"
+    export = impact.export("lammps", law, source=source("soft", "hard", **WALL), code_version="22Jul2025")
+    assert any("hertz/material" in remark for remark in export.header) == (spring == "hertz")
+
+
 @pytest.mark.parametrize(
     ("other", "at", "version", "spring"),
     [

@@ -219,7 +219,7 @@ def notes(collision: Collision) -> Lines:
     yield "in SI (units si, atom_style sphere); R* and m are the effective radius and mass, 1/(1/R1 + 1/R2)"
     if collision.version < MATERIAL_SINCE and spring == "hertz" and not takes_moduli(collision):
         yield "hertz/material has another stiffness at a wall and for two materials in old releases"
-    elif collision.has_wall:
+    elif collision.has_wall and spring == "hertz":
         yield "hertz/material takes one material, of the ball and the wall; hertz with k_n takes two into account"
     if takes_moduli(collision) and not collision.has_wall:
         yield (
