@@ -817,6 +817,22 @@ def test_the_tolerance_on_beta_is_four_indentations_over_the_effective_radius_an
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("release", "radius"), [("2020.01a", 0.02), ("2023.02a", 0.04)])
+def test_the_normal_of_a_wall_of_yade_does_not_turn(tmp_path: Path, release: str, radius: float) -> None:
+    """A wall of the older release has an R* of half the radius of the ball."""
+    run = f'case $1 in --version) echo {release}; exit;; esac; echo "beta = 0"; echo "e_out = 0.5"'
+    program = write_program(tmp_path / "yade", run)
+    laws = {"models": "yade-betan", "frictions": "yade-mindlin"}
+    config = source("soft", "soft", mu=0.3, angle=1.5, **WALL) | laws
+    verification = impact.export("yade", source=config, verify=True, program=str(program)).verification
+    assert verification is not None
+    at = {"e": 0.5, "v1": 1.0, "m1": 1.0, "m2": math.inf, "R1": 2.0 * radius, "R2": 2.0 * radius}
+    overrides = {"materials.soft": SOFT, "sweep.material": "soft"}
+    peak = impact.run(model="yade-betan", at=at, overrides=overrides).values["peak_indentation"]
+    assert verification.beta_uncertainty == pytest.approx(4.0 * peak / radius / math.sin(1.5), rel=1e-6)
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("modulus", "measured", "verdict", "exit_code"),
     [

@@ -218,9 +218,10 @@ def _with_friction(
     # a law that needs no radius may have none in its impact
     collision = problem.collision(float(steps[0]), 0.5)
     turning = TURNING * problem.law.continuous["peak_indentation"] / collision.effective_radius
-    # at a grazing impact the centres move far along the tangent while the balls touch; 0 of a wall
-    turn = abs(tangential) * problem.law.contact_time / (collision["R1"] + collision["R2"])
-    turning = max(turning, turn)
+    if not problem.has_wall:
+        # at a grazing impact the centres move far along the tangent while the balls touch
+        turn = abs(tangential) * problem.law.contact_time / (collision["R1"] + collision["R2"])
+        turning = max(turning, turn)
     is_turning = problem.code.shortens_arms or not problem.has_wall
     reason = verification.reason
     if exact <= MAX_UNCERTAINTY:
