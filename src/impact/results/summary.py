@@ -98,11 +98,11 @@ class Summary:
         return {name: counts_by_name(of) for name, of in counts.items() if of or name == "status"}
 
     @property
-    def first_failed(self) -> list[tuple[str, FrictionStatus, tuple[int, ...], tuple[int, ...]]]:
+    def first_failed(self) -> list[tuple[str, Status | FrictionStatus, tuple[int, ...], tuple[int, ...]]]:
         """List the first failed points of models, else of pairs: status variable, status, law and index."""
         if not self.failed_at:
             return [("friction_status", *failure) for failure in self.friction_failed_at]
-        return [("status", FrictionStatus(status), place, index) for status, place, index in self.failed_at]
+        return [("status", *failure) for failure in self.failed_at]
 
     def add(
         self,
@@ -378,9 +378,9 @@ class SweepOutcome(Displayed):
         if summary.friction_counts:
             yield Wrapped(f"with each friction law: {counts_text(summary.friction_counts)}")
         failures = self.records()
-        for failure in failures:
+        for failure, (_, status, _, _) in zip(failures, summary.first_failed, strict=True):
             inputs = ", ".join(f"{name}={label(value)}" for name, value in failure["at"].items())
-            yield Wrapped(f"failed: {inputs}: {FrictionStatus[failure['status'].upper()].meaning}")
+            yield Wrapped(f"failed: {inputs}: {status.meaning}")
             if failure["replay"]:
                 yield f"  {failure['replay']}"
         more = summary.failed - len(failures)
