@@ -224,6 +224,15 @@ def test_the_end_of_the_scan_is_no_root_where_every_larger_value_gives_the_targe
     assert [root.value for root in result.roots] == pytest.approx([math.tan(ANGLE) / 7.0], rel=1e-8)
 
 
+def test_each_root_has_the_target_variable_beside_e_out() -> None:
+    result = impact.solve("hertz", "mu", {"beta": -0.5}, friction="coulomb-1785", source=CONFIG)
+    (root,) = result.as_dict()["roots"]
+    # Hertz, e = 1, slides throughout: beta = 2/G0 - 1, G0 = (2/7) tan(angle)/mu
+    expected = {"value": math.tan(ANGLE) / 14.0, "e_out": 1.0, "beta": -0.5}
+    assert root == pytest.approx(expected, rel=1e-8)
+    assert list(result.to_dataframe()) == ["value", "e_out", "beta"]
+
+
 def test_solve_writes_a_target_with_its_unit() -> None:
     steep = impact.solve("hertz", "mu", {"rebound_angle": "20 deg"}, friction="coulomb-1785", source=CONFIG)
     text = str(steep)

@@ -81,10 +81,11 @@ SolveStatus: TypeAlias = Literal["ok", "at_bound", "several_roots", "no_root"]
 
 @dataclass(frozen=True)
 class Root:
-    """A value that gives the target, and the restitution there; over a range of inputs, its mean."""
+    """A value that gives the target, the restitution and the target variable there; over a range, their means."""
 
     value: float
     e_out: float
+    output: float
 
 
 @dataclass(frozen=True)
@@ -115,11 +116,16 @@ class SolveResult(Displayed):
     def as_dict(self) -> dict[str, Any]:
         """Convert to plain data; without a friction law there is no such field."""
         fields = {name: value for name, value in asdict(self).items() if name != "friction" or value}
+        fields["roots"] = self._root_records()
         return {"for" if name == "name" else name: value for name, value in fields.items()}
 
     def records(self) -> Sequence[Mapping[str, Any]]:
         """List the conditions of a range of inputs; without one the roots."""
-        return self.over if self.over is not None else [asdict(root) for root in self.roots]
+        return self.over if self.over is not None else self._root_records()
+
+    def _root_records(self) -> tuple[dict[str, float], ...]:
+        (variable,) = self.target
+        return tuple({"value": root.value, "e_out": root.e_out, variable: root.output} for root in self.roots)
 
     def sections(self, width: int) -> Iterator[Block]:
         """Write a line for each root, or the range that can be attained."""
@@ -464,11 +470,12 @@ def _all_roots(problem: SolveProblem, target: float) -> SolveResult:
     roots, values = _roots_and_values(problem, target)
     if not values.size:
         problem.raise_failure()
-    e_out = problem.evaluate(np.array(roots))["e_out"].tolist() if roots else []
+    names = ("e_out", problem.variable)
+    outputs = problem.evaluate(np.array(roots)) if roots else dict.fromkeys(names, np.zeros(0))
     status: SolveStatus = "no_root" if not roots else "several_roots" if len(roots) > 1 else "ok"
     if status == "ok" and roots[0] in (problem.unknown.least, problem.unknown.most):
         status = "at_bound"
-    return problem.result(target, status, map(Root, roots, e_out), values)
+    return problem.result(target, status, map(Root, roots, *(outputs[name].tolist() for name in names)), values)
 
 
 def _roots_and_values(
@@ -638,5 +645,5 @@ def _best_over_axis(problem: SolveProblem, target: float) -> SolveResult:
         for condition in range(axis.size)
     )
     status: SolveStatus = "at_bound" if value in (problem.unknown.least, problem.unknown.most) else "ok"
-    root = Root(value, float(outputs["e_out"].mean()))
+    root = Root(value, *(float(outputs[name].mean()) for name in ("e_out", problem.variable)))
     return replace(problem.result(target, status, (root,), outputs[problem.variable]), over=over)
