@@ -126,6 +126,20 @@ def test_an_input_that_changes_the_output_by_errors_of_the_integration_has_an_in
     assert (of_e > 0.5, of_n) == (True, 0.0)
 
 
+def test_an_output_that_is_an_error_of_the_integration_depends_on_nothing() -> None:
+    """Of equal masses the first one stops, to the errors of v0."""
+    config = {
+        "models": "hertz",
+        "frictions": ["coulomb-1785"],
+        "design": {"n": 16},
+        "sweep": {"v1": {"uniform": [0.8, 1.2]}, "m1": 1.0, "m2": 1.0, "R1": 0.1, "R2": 0.1, "K": 1e6, "n": 1.5}
+        | {"angle": 0.1, "mu": 0.9},
+    }
+    for study in impact.sensitivities(config, ["v1_post", "energy_loss", "slip_post"]):
+        assert abs(float(study["mean"].squeeze())) < 1e-9
+        assert np.isnan(study["total"]).all()
+
+
 SIMBODY_ENDS = {"c": (0.01, 3.0), "v1": (0.05, 3.0)}
 
 

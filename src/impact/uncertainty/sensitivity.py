@@ -29,13 +29,13 @@ from ..engine.plan import Plan
 from ..engine.run import Run
 from ..errors import ConfigError, UsageError, require_known
 from ..formatting import argument
-from ..results.schema import SENSITIVITY, plan_coordinates, provenance_attributes, template
+from ..results.schema import SENSITIVITY, plan_coordinates, provenance_attributes, scale_of, template
 from ..results.selection import as_keys
 from ..results.sensitivity import HALF, QUANTILES
 from ..results.sweep import read_plan, sweep_in_memory
 from ..results.xarray_backend import save
 
-# an output whose standard deviation is a smaller multiple of rtol and of its largest value is constant
+# an output whose standard deviation is a smaller multiple of rtol and of the largest scale of errors is constant
 CONSTANT_FACTOR = 10.0
 # resamples of the bootstrap, and its level; with 200 the ends are so uncertain that fewer intervals hold the index
 RESAMPLES, CONFIDENCE = 1000, 0.95
@@ -195,8 +195,14 @@ def sensitivity_of(plan: Plan, of: str, swept: xr.Dataset) -> xr.Dataset:
     # the reference is the same for each model
     outputs = swept[of].broadcast_like(swept["model"]).transpose("model", ..., SAMPLE)
     others = [str(dim) for dim in outputs.dims if dim not in ("model", SAMPLE)]
-    values = np.asarray(outputs.values, float).reshape(-1, len(inputs) + 2, n)
-    statistics = _statistics(values, config)
+    shape = (-1, len(inputs) + 2, n)
+    values = np.asarray(outputs.values, float).reshape(shape)
+
+    def read(name: str) -> Array:
+        return np.asarray(swept[name].broadcast_like(outputs).transpose(*outputs.dims).values)
+
+    scale = scale_of(OUTPUTS[of], read, has_peak="peak_indentation" in swept)
+    statistics = _statistics(values, np.broadcast_to(scale, outputs.shape).reshape(shape), config)
     if OUTPUTS[of].of_friction:
         # a pair that has no meaning has not failed
         status = swept["friction_status"].transpose("model", ..., SAMPLE).values.reshape(values.shape)
@@ -215,15 +221,17 @@ def sensitivity_of(plan: Plan, of: str, swept: xr.Dataset) -> xr.Dataset:
     return xr.Dataset(arrays, coords, provenance_attributes(plan) | {"of": of})
 
 
-def _statistics(values: Array, config: Config) -> dict[str, Array]:
-    """Compute the statistics of outputs, from shape (outputs, inputs + 2, n); NaN for one with a failed sample."""
+def _statistics(values: Array, scale: Array, config: Config) -> dict[str, Array]:
+    """Compute the statistics of outputs, from shape (outputs, inputs + 2, n); NaN for one with a failed sample.
+
+    `scale` is that of errors of the integration, of the same shape.
+    """
     assert config.design is not None
     outputs, blocks, n = values.shape
     failed = np.isnan(values).sum(axis=(1, 2))
     independent = values[:, :2].reshape(outputs, -1)
     mean, deviation = independent.mean(axis=1), independent.std(axis=1, ddof=1)
-    largest = np.abs(independent).max(axis=1)
-    resolution = CONSTANT_FACTOR * config.solver.rtol * largest
+    resolution = CONSTANT_FACTOR * config.solver.rtol * np.abs(scale[:, :2]).max(axis=(1, 2))
     # indices are NaN for a constant output, and zero for an input that changes it by errors of the integration
     varies = deviation > resolution
     changes = np.abs(values[:, 2:] - values[:, :1]).max(axis=2) > resolution[:, None]
