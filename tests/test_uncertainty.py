@@ -140,6 +140,13 @@ def test_an_output_that_is_an_error_of_the_integration_depends_on_nothing() -> N
         assert np.isnan(study["total"]).all()
 
 
+def test_a_law_without_the_output_has_not_failed(cli: Run, tmp_path: Path) -> None:
+    (tmp_path / "c.toml").write_text(TEXT.replace('"gonthier-2004"', '"hertz"'))
+    done = cli("sensitivity", "c.toml", "--of", "damping_ratio", "--quiet", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "damping_ratio: the law has none" in done.stdout
+
+
 SIMBODY_ENDS = {"c": (0.01, 3.0), "v1": (0.05, 3.0)}
 
 

@@ -254,7 +254,7 @@ def sensitivity_bars(dataset: xr.Dataset, choice: Choice) -> BarData:
             if int(law.data["failed"]):
                 reason = "samples failed"
             elif np.isnan(law.data["mean"]):
-                reason = "not combinable"
+                reason = "which has none"
             not_drawn.append(f"{law.law}, {reason}")
         elif len(panels) == MAX_PANELS:
             not_drawn.append(f"{law.law}, beyond {MAX_PANELS} laws")

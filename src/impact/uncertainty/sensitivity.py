@@ -23,7 +23,7 @@ from ..config.load import Config
 from ..config.samples import draw_columns, unit_samples
 from ..config.tables import power_of_two_problem
 from ..contact.model import ForceModel
-from ..contact.status import FrictionStatus
+from ..contact.status import FrictionStatus, Status
 from ..contact.variables import OUTPUTS
 from ..engine.plan import Plan
 from ..engine.run import Run
@@ -203,10 +203,10 @@ def sensitivity_of(plan: Plan, of: str, swept: xr.Dataset) -> xr.Dataset:
 
     scale = scale_of(OUTPUTS[of], read, has_peak="peak_indentation" in swept)
     statistics = _statistics(values, np.broadcast_to(scale, outputs.shape).reshape(shape), config)
-    if OUTPUTS[of].of_friction:
-        # a pair that has no meaning has not failed
-        status = swept["friction_status"].transpose("model", ..., SAMPLE).values.reshape(values.shape)
-        statistics["failed"] -= (status == FrictionStatus.NOT_COMBINABLE).sum(axis=(1, 2))
+    # a pair that has no meaning has not failed, nor has a law without the output
+    lacking = FrictionStatus.NOT_COMBINABLE if OUTPUTS[of].of_friction else Status.OK
+    is_lacking = np.isnan(values) & (read(OUTPUTS[of].status).reshape(shape) == lacking)
+    statistics["failed"] -= is_lacking.sum(axis=(1, 2))
     of_plan, paths = plan_coordinates(plan).variables, [InputName.parse(name).config_key for name in inputs]
     studied = {
         "input": ("input", paths, {"long_name": "uncertain input, by its path in the config"}),
