@@ -122,6 +122,16 @@ def test_a_law_is_not_charged_for_parameters_that_it_does_not_have() -> None:
     assert both["aicc"].item() == alone["aicc"].item() == pytest.approx(-44.557, abs=1e-3)
 
 
+@pytest.mark.parametrize("own", [1e6, {"fit": [1e5, 1e8]}])
+def test_a_law_with_a_stiffness_of_its_own_is_not_charged_for_that_of_the_sweep(own: object) -> None:
+    sweep = {"m1": 1.0, "m2": 1.0, "K": {"fit": [1e5, 1e8]}, "e": 0.5}
+    model = {"anagnostopoulos-1988": {"K": own}}
+    config = {"models": ["hertz", "anagnostopoulos-1988"], "sweep": sweep, "model": model, "data": TIMES}
+    both = impact.calibrate({**config, "solver": QUICK}).sel(model="anagnostopoulos-1988")
+    assert both["identifiable"].values.tolist() == [-1, *[1] * isinstance(own, dict)]
+    assert both["determined"].item() == ""
+
+
 def test_a_profile_with_several_minima_ends_in_an_interval() -> None:
     """The chi2 of this fit has two valleys, and a search for its end falls from one into the other."""
     sweep = {"m1": 1.0, "m2": 1.0, "K": {"fit": [1e5, 1e7]}, "alpha": {"fit": [0.01, 0.3]}}

@@ -556,9 +556,16 @@ def _noise_problems(
 
 
 def fitted_parameters(
-    fits: Mapping[str, tuple[float, float]], model: ForceModel, friction: FrictionLaw | None = None
+    fits: Mapping[str, tuple[float, float]],
+    model: ForceModel,
+    friction: FrictionLaw | None = None,
+    *,
+    has_own_K: bool = False,
 ) -> tuple[str, ...]:
-    """List the names of the fitted parameters that a law has, or its pair with a friction law."""
+    """List the names of the fitted parameters that a law has, or its pair with a friction law.
+
+    A law whose table has a K of its own does not take that of the sweep.
+    """
     used = with_base_quantities(model.quantities)
 
     def is_used(name: str) -> bool:
@@ -566,6 +573,8 @@ def fitted_parameters(
             return "e" in used or (friction is not None and friction.may_use_e)
         if name == "n":
             return model.exponent is None
+        if name == "K":
+            return not has_own_K
         input_name = InputName.parse(name)
         if input_name.key == "yield_strength":
             return bool(used & {"yield_strength1", "yield_strength2"})
@@ -579,8 +588,11 @@ def count_problems(draft: Draft, fits: Mapping[str, tuple[float, float]]) -> Ite
     if draft.measurements is None:
         return
     n_values = len(draft.measurements.lines) * len(draft.measurements.outputs)
+    own_K = {model.key for model in draft.models if contains_path(draft.data, ("model", model.key, "K"))}
     counts = {
-        law_name(*(law.key for law in (model, friction) if law)): len(fitted_parameters(fits, model, friction))
+        law_name(*(law.key for law in (model, friction) if law)): len(
+            fitted_parameters(fits, model, friction, has_own_K=model.key in own_K)
+        )
         for model in draft.models
         for friction in draft.frictions or (None,)
     }
