@@ -17,10 +17,10 @@ from scipy import stats
 import impact
 from impact.config.load import read_config
 from impact.contact.models import find
-from impact.errors import UsageError
+from impact.errors import ConfigError, UsageError
 from impact.inverse.calibrate import determined_groups
 from impact.inverse.fit import Bounds, DataPoints, FitProblem, fit_all
-from impact.results.calibration import fit_rows, unidentified_notes
+from impact.results.calibration import fit_rows, fit_status, unidentified_notes
 
 from .conftest import ROOT, Run
 
@@ -130,6 +130,24 @@ def test_a_law_with_a_stiffness_of_its_own_is_not_charged_for_that_of_the_sweep(
     both = impact.calibrate({**config, "solver": QUICK}).sel(model="anagnostopoulos-1988")
     assert both["identifiable"].values.tolist() == [-1, *[1] * isinstance(own, dict)]
     assert both["determined"].item() == ""
+
+
+def test_the_natural_range_of_a_stiffness_is_about_that_of_the_materials() -> None:
+    config = {
+        "models": "anagnostopoulos-1988",
+        "sweep": {"m1": 1.0, "m2": math.inf, "R1": 0.1, "R2": math.inf, "e": 0.5, "v1": 1.0, "material": "rubber"},
+        "materials": {"rubber": {"E": 5e6, "nu": 0.49}},
+    }
+    size = float(impact.run(config).values["stiffness"])
+    own = {"model": {"anagnostopoulos-1988": {"K": {"fit": True}}}, "solver": QUICK}
+    data = {"data": {"columns": {"contact_time": [0.09, 0.091, 0.092]}}}
+    fit = impact.calibrate({**config, **own, **data})
+    bounds = json.loads(fit.attrs["fit_bounds"])["anagnostopoulos-1988.K"]
+    assert bounds == pytest.approx([size / 1e4, size * 1e4])
+    assert fit_status(fit.isel(model=0)) == "ok"
+    del config["sweep"]["material"]  # type: ignore[attr-defined]
+    with pytest.raises(ConfigError, match=r"anagnostopoulos-1988\.K: got fit = true, .* without a material"):
+        impact.calibrate({**config, **own, **data})
 
 
 def test_a_profile_with_several_minima_ends_in_an_interval() -> None:

@@ -34,7 +34,7 @@ from ..engine.executors import choose_executor
 from ..engine.plan import Plan
 from ..engine.plugins import Plugins, read_plugins
 from ..engine.trajectories import PlanLaw, model_of
-from ..errors import UsageError, warn
+from ..errors import ConfigError, UsageError, warn
 from ..formatting import argument, law_keys
 from ..results.calibration import Fits, calibration_template, fitted_config, position_of_law
 from ..results.schema import FIT_STATUSES
@@ -165,11 +165,16 @@ def natural_bounds(config: Config) -> dict[str, tuple[float, float]]:
     for name in sorted(names, key=lambda name: (not name.endswith("K"), names.index(name))):
         parsed = InputName.parse(name)
         model = next((model for model in config.models if model.key == parsed.model), config.models[0])
-        others = {other: value for other, value in scalars.items() if name != "K" or other != "K"}
+        # of a K neither its own placeholder nor the K of other laws
+        is_K = parsed.key == "K"
+        others = {key: value for key, value in scalars.items() if not is_K or InputName.parse(key).key != "K"}
         one = replace(config, models=(model,), scalars=others, axes=())
         friction = next((law for law in config.frictions if parsed.friction in ("", law.key)), None)
         unknown = unknown_of(model, name if parsed.friction else parsed.key, friction)
-        size = SolveProblem(one, unknown, "e_out").natural_size()
+        size = SolveProblem(one, unknown, "e_out").natural_size(math.nan if is_K else 1.0)
+        if math.isnan(size):
+            expected = "expected fit = [least, most]: without a material it has no natural range"
+            raise ConfigError(f"{parsed.config_key}: got fit = true, {expected}")
         quantity = _quantity(config, name)
         bounds[name] = (max(size / NATURAL_RATIO, quantity.least), min(size * NATURAL_RATIO, quantity.most))
         scalars[name] = middle_of(*bounds[name])

@@ -427,8 +427,11 @@ class SolveProblem:
         exponent = {} if self.model.exponent is None else {"n": self.model.exponent}
         return with_numbers(self.unknown.unit, {**numbers, **exponent})
 
-    def natural_size(self) -> float:
-        """Find the size of the unknown: 1 in the contact's own units, or its typical value if it is no damping."""
+    def natural_size(self, otherwise: float = 1.0) -> float:
+        """Find the size of the unknown: 1 in the contact's own units, or its typical value if it is no damping.
+
+        `otherwise` stands for a size that does not follow from the inputs, as that of K without a material.
+        """
         if self.unknown.typical and not self.unknown.is_damping:
             return abs(self.unknown.typical)
         if self.unknown.name in ("e", "mu"):
@@ -447,7 +450,7 @@ class SolveProblem:
                 size = 1.0 / impacts.in_own_units(np.ones(1), self.unknown.unit)[0]
             else:
                 size = 1.0 / impacts.dimensionless(self.model, self.unknown.name)[0]
-        return float(size) if 0.0 < size < math.inf else 1.0
+        return float(size) if 0.0 < size < math.inf else otherwise
 
     def result(self, target: float, status: SolveStatus, roots: Iterable[Root], values: Array) -> SolveResult:
         """Make the result of roots, with the range of some values of the variable."""
