@@ -786,6 +786,11 @@ def test_a_height_without_room_for_panels_names_the_least_height(coarse: xr.Data
     assert all(12.0 <= height < 14.0 for height in heights)
 
 
+def test_a_height_with_no_room_for_the_texts_is_refused_with_the_least_one(coarse: xr.Dataset) -> None:
+    with pytest.raises(UsageError, match=r"height: got 26mm, expected at least \d+mm at this width"):
+        impact.plot(coarse, width="26mm", height="26mm")
+
+
 def test_a_plot_is_drawn_into_axes_of_the_user(coarse: xr.Dataset) -> None:
     figure = Figure((8.0, 4.0))
     axes = figure.subplots(1, 2)

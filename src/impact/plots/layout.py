@@ -355,7 +355,8 @@ class Layout(ConstrainedLayoutEngine):
         assert isinstance(fig, Picture)
         fig.fitted = {text: texts for text, texts in fig.fitted.items() if text.figure is not None}
         left, below, above = fig.place_around()
-        self.set(rect=(left, below, 1.0 - left, 1.0 - above - below))
+        # texts that are higher than the picture leave panels no room, which is no error of the solver
+        self.set(rect=(left, below, 1.0 - left, max(1.0 - above - below, 0.0)))
         # axes become shorter where a label gets another line, which may change the lines again
         before: list[str] = []
         for _ in range(MAX_LAYOUT_PASSES):
