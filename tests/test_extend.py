@@ -242,6 +242,19 @@ def test_an_extension_replaces_the_result_and_can_be_extended_again(
     assert [child.name for child in tmp_path.iterdir()] == ["r.h5"]
 
 
+def test_a_result_that_another_process_extended_meanwhile_is_not_replaced(stored_sweep: StoredSweep) -> None:
+    path = stored_sweep(BASE)
+
+    def extend_too(progress: impact.Progress) -> None:
+        if impact.load(path).sizes["v1"] == 2:
+            impact.extend(path, ["sweep.v1=[3.0]"])
+
+    with pytest.raises(impact.InUseError, match=r"r\.h5: was changed while it was extended, and is not modified"):
+        impact.extend_to_file(path, ["sweep.v1=[4.0]"], on_progress=extend_too)
+    assert impact.load(path)["v1"].values.tolist() == [1.0, 2.0, 3.0]
+    assert [other.name for other in path.parent.iterdir()] == ["r.h5"]
+
+
 def test_an_extension_that_is_complete_is_not_resumed_and_no_error(cli: Run, stored_sweep: StoredSweep) -> None:
     path = stored_sweep()
     command = ("extend", path, "--set", "sweep.m2=[3.0]", "--resume")

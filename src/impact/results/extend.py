@@ -76,6 +76,7 @@ def extend(
     ------
     ResultError : the file is not a readable result, or was written by another version of this program
     UsageError : the overrides change more than values of axes and models
+    InUseError : another process changed the result that it would replace
     StoreError : the disk is full or failed
 
     >>> import impact, tempfile

@@ -103,6 +103,14 @@ def check_seal(path: Path) -> str:
     return seal
 
 
+def has_seal(path: Path, seal: str) -> bool:
+    """Check whether a file is the intact result of a seal, whatever else it may be."""
+    try:
+        return check_seal(path) == seal
+    except ResultError:
+        return False
+
+
 def is_result(path: Path, begins: tuple[bytes, ...] = (RESULT_MAGIC, HDF5_MAGIC)) -> bool:
     """Check whether a file begins like a result of this schema version or, by default, of version 1."""
     if not path.is_file() or not path.stat().st_size:

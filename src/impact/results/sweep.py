@@ -30,11 +30,12 @@ from ..engine.plan import Plan
 from ..engine.plugins import read_plugins
 from ..engine.run import DEFAULT_RUN, ProgressCallback, ProgressCounter, Run, ignore, never, report_kept_ranges
 from ..engine.trajectories import RANGE_TRAJECTORIES, TrajectoryRange
-from ..errors import ResultError, StoreError, UnfinishedError, UsageError, warn
+from ..errors import InUseError, ResultError, StoreError, UnfinishedError, UsageError, warn
 from ..formatting import argument
 from .layouts import file_template, stiffness_to_store, table_values
 from .netcdf import MAX_LABEL_BYTES, RegionValues, encode_text, is_text
 from .schema import dataset_template, plan_coordinates, stored_variables
+from .seal import has_seal
 from .summary import Summary, SweepOutcome, input_notes, result_notes, summarize, summarize_table, with_depths
 from .trajectory_table import TrajectoryTable, expanded_slabs, in_memory, lazy_dataset, table_of_ranges
 from .validation import is_name
@@ -435,5 +436,7 @@ def store_result(
 
     with atomic_write(output, overwrite=run.overwrite or plan.replaces, part=part) as sink:
         seal = write_sealed(sink, output, template, values(), plan.config.output)
+        if plan.replaces and not has_seal(output, plan.extends):
+            raise InUseError(f"{output}: was changed while it was extended, and is not modified; extend it again")
     result.encoding = {"source": str(output), "seal": seal, "layout": plan.layout}
     return SweepOutcome(result, summary, progress.of_trajectories, output=output)
