@@ -291,6 +291,17 @@ def test_errors_of_the_solver_make_no_curve_and_angles_are_in_degrees(browser: P
     assert browser.evaluate("document.getElementById('note').textContent") == "at angle = 30°"
 
 
+@pytest.mark.slow
+def test_the_unit_of_a_horizontal_axis_has_the_prefix_that_its_slider_has(browser: Page, tmp_path: Path) -> None:
+    soft = {**SOFT, "rho": [1000.0, 2000.0, 7000.0]}
+    sweep = {"e": 0.5, "v1": 1.0, "m1": [0.01, 0.02, 0.05], "R1": 0.01, "R2": 0.02, "material": "soft"}
+    result = impact.sweep({"models": "hertz", "sweep": sweep, "materials": {"soft": soft}})
+    show(browser, result, tmp_path / "page.html")
+    for number, text in enumerate(["m1 = 20 g", "rho, soft = 2000 kg/m^3"]):
+        choose(browser, "x", number)
+        assert browser.evaluate("document.getElementById('note').textContent") == f"at {text}"
+
+
 CONTRASTS = """
 (() => {
   const context = document.createElement('canvas').getContext('2d', {willReadFrequently: true});

@@ -66,10 +66,9 @@ function value(output, law, at) {
 const PREFIXES = {"-9": "n", "-6": "µ", "-3": "m", 0: "", 3: "k", 6: "M", 9: "G"};
 const digits = number => Number.isFinite(number) ? String(+number.toPrecision(6)).replace("-", "−") : "–";
 
-// a factor, and a unit with its prefix, for values up to `largest`; degrees for angles
+// a factor, and the unit of an output with its prefix, for values up to `largest`
 function scale(unit, largest) {
   if (unit === "1") return [1, ""];
-  if (unit === "rad") return [180 / Math.PI, "°"];
   const power = largest > 0 ? 3 * Math.floor(Math.log10(largest) / 3 + 1e-4) : 0;
   const limited = Math.min(9, Math.max(-9, power));
   return [10 ** -limited, PREFIXES[limited] + unit];
@@ -164,7 +163,7 @@ function draw() {
   const room = 0.05 * (high - low > FLAT * size ? high - low : size || 1);
   [low, high] = [low - room, high + room];
   const [factor, unit] = scale(output.unit, Math.max(Math.abs(low), Math.abs(high)));
-  const [xFactor, xUnit] = scale(axis.unit, isLog ? 0 : Math.max(...x.map(Math.abs)));
+  const [xSize, xUnit] = axis.scaled, xFactor = 1 / xSize;
   const first = x[0], last = x[x.length - 1];
   const share = number => (warp(number) - warp(first)) / (warp(last) - warp(first));
   const toX = number => last > first ? left + share(number) * (right - left) : (left + right) / 2;

@@ -27,7 +27,7 @@ from ..contact.status import FIRST_FAILURE
 from ..contact.variables import OUTPUTS
 from ..engine.inputs import Inputs, build_impacts, input_at
 from ..errors import UsageError
-from ..formatting import argument, with_year
+from ..formatting import argument, scaled_unit, with_year
 from ..plots.explore import axes_of, axis_label, shown_values
 from ..plots.slices import conditions_of, parameter_text, scalars_of, unit_of
 from ..plots.style import is_geometric, model_styles
@@ -217,6 +217,9 @@ def _axis(dataset: xr.Dataset, axis: Axis) -> dict[str, Any]:
     coordinate, word = dataset[axis.name], InputName.parse(axis.name).word
     has_words = any(isinstance(word(value), str) for value in coordinate.values.tolist())
     numbers = np.arange(coordinate.size, dtype=float) if has_words else np.asarray(coordinate.values, float)
+    is_log, unit = not has_words and is_geometric(np.sort(numbers)), unit_of(coordinate)
+    # of the unit of the picture, without a prefix beside powers of ten
+    size, shown = scaled_unit(unit, 1.0 if is_log else max(map(abs, filter(math.isfinite, numbers)), default=1.0))
     texts = [text for text, _ in shown_values(coordinate)]
     for name in axis.columns:
         if name != axis.name:
@@ -225,11 +228,12 @@ def _axis(dataset: xr.Dataset, axis: Axis) -> dict[str, Any]:
     return {
         "name": axis.name,
         "label": axis_label(axis.name),
-        "unit": unit_of(coordinate),
+        "unit": unit,
+        "scaled": (size, "" if unit == "1" else shown),
         "values": [value if math.isfinite(value) else None for value in numbers.tolist()],
         "texts": texts,
         "has_words": has_words,
-        "is_log": not has_words and is_geometric(np.sort(numbers)),
+        "is_log": is_log,
     }
 
 
