@@ -261,6 +261,20 @@ def test_a_shard_of_another_sweep_is_not_continued_but_can_be_overwritten(cli: R
     assert (completed.returncode, completed.stderr) == (0, "")
 
 
+@pytest.mark.parametrize(
+    ("output", "message"),
+    [
+        ("", ".: is not a regular file"),
+        ("..", "..: is not a regular file"),
+        ("no/r.h5", "the folder no does not exist"),
+    ],
+)
+def test_a_result_of_shards_that_no_merge_could_write_is_refused(folder: Path, output: str, message: str) -> None:
+    with contextlib.chdir(folder), pytest.raises(UsageError, match=re.escape(message)):
+        impact.sweep_shard("c.toml", "1/2", output)
+    assert not [*folder.parent.glob("*.work")]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("text", ["3", "0/4", "5/4", "1/0", "-1/2", "1/2/3", "a/b", ""])
 def test_an_invalid_number_of_a_shard_is_refused(cli: Run, folder: Path, text: str) -> None:

@@ -141,6 +141,7 @@ def sweep_shard(
     ...     impact.sweep_shard("configs/figure6.toml", "1/1", f"{folder}/results.h5").trajectories
     303
     """
+    check_outputs([output], plugins, overwrite=True)
     check_result_name(output)
     told = on_progress or ignore, on_note or warn, should_stop or never
     run = Run(backend or SERIAL, not overwrite, overwrite, max_points, *told)
