@@ -608,6 +608,13 @@ def test_a_study_is_stored_drawn_and_reported(cli: Run, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+def test_a_report_of_an_uncertain_e_has_the_band_over_another_axis() -> None:
+    inputs = {"e": {"uniform": [0.5, 0.7]}, "v1": [1.0, 2.0], "m1": 1.0, "m2": 1.0, "K": 1e6}
+    result = impact.sweep({"models": "gonthier-2004", "sweep": inputs, "design": {"n": 16}})
+    assert "plot RESULT.h5 --kind=uncertainty --x=v1" in impact.report(result)
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "words",
     ["recommend s.h5", "rerun s.h5", "extend s.h5 --set sweep.m1=1", "run s.h5", "compare s.h5 s.h5",

@@ -18,7 +18,7 @@ from .curves import Curve, CurveData, Panel, curve_of, x_axis_fields
 from .kinds import Choice, Kind
 from .labels import split_by_law, with_model, words_of
 from .restitution import read_line, requested_curve
-from .slices import choose_line, conditions_of, numeric_axes
+from .slices import conditions_of, numeric_axes
 
 # ends of the band, and points of a distribution function that are drawn
 BAND, MAX_DRAWN_PROBABILITIES = (0.05, 0.95), 401
@@ -31,7 +31,7 @@ def uncertainty_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     name = choice.variable or "e_out"
     if name not in dataset.data_vars:
         raise UsageError(f'no variable "{name}" in this result')
-    x = choice.x or _free_axis(dataset, choice)
+    x = choice.x or _free_axis(select(dataset, choice.sel or {}))
     if x in dataset.coords and dataset[x].dims == (SAMPLE,):
         raise UsageError(f"{argument('x', x)}: is an uncertain input, expected another axis")
     keep = (SAMPLE, "friction") if "friction" in dataset[name].dims else (SAMPLE,)
@@ -81,19 +81,15 @@ def uncertainty_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     )
 
 
-def _free_axis(dataset: xr.Dataset, choice: Choice) -> str | None:
-    """Find e, else the first axis of several numbers that are neither selected nor samples."""
-    chosen = select(dataset, choice.sel or {})
-    lines = [str(name) for name, coord in chosen.coords.items() if coord.ndim == 1 and coord.dtype.kind == "f"]
-    free = [name for name in lines if chosen[name].dims[0] not in (SAMPLE, "model") and chosen[name].size > 1]
+def _free_axis(dataset: xr.Dataset) -> str | None:
+    """Find e, else the first axis of several numbers, which an uncertain input is not."""
+    free = [name for name, values in numeric_axes(dataset).items() if values.dims != (SAMPLE,)]
     return "e" if "e" in free else next(iter(free), None)
 
 
 def choose_axis(dataset: xr.Dataset, keys: Sequence[str]) -> Choice:
-    """Choose to draw over an axis, which an uncertain input is not."""
-    choice = choose_line(dataset, keys)
-    is_uncertain = choice.x is not None and numeric_axes(dataset)[choice.x].dims == (SAMPLE,)
-    return replace(choice, x=None) if is_uncertain else choice
+    """Choose to draw over an axis."""
+    return Choice(_free_axis(dataset), models=keys)
 
 
 UNCERTAINTY = Kind(
