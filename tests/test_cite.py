@@ -10,7 +10,7 @@ import pytest
 
 import impact
 
-from .conftest import Run
+from .conftest import ROOT, Run
 
 ENTRY = re.compile(r"@(article|misc)\{([\w.-]+),\n((?:  [a-z]+ = \{.*\},\n)+)\}")
 
@@ -50,6 +50,24 @@ def test_a_doi_stands_in_the_entry_of_its_paper() -> None:
     assert "Cundall" in first
     assert "geot.1979" in first
     assert "doi" not in second
+
+
+def test_a_law_of_a_code_has_the_year_the_place_and_the_address_of_the_version_that_was_read() -> None:
+    text = str(impact.cite("lammps-mindlin"))
+    assert "  howpublished = {lammps/lammps, src/GRANULAR/gran\\_sub\\_mod\\_tangential.cpp @079d233c" in text
+    assert "  year = {2026},\n  url = {https://github.com/lammps/lammps},\n" in text
+    # a remark after the reference is no work to cite
+    assert "mbdyn-flores-2" not in str(impact.cite("mbdyn-flores"))
+    assert "no damping at a speed of contact" in str(impact.cite("mbdyn-flores"))
+
+
+def test_the_program_is_cited_as_in_its_citation_file() -> None:
+    (program,) = impact.cite("impact")
+    text = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    for field in ("title", "  - name", "version"):
+        value = re.search(rf'^{field}: "?(.+?)"?$', text, re.MULTILINE)
+        assert value, field
+        assert value[1] in program.bibtex
 
 
 @pytest.mark.slow

@@ -125,7 +125,7 @@ def cite(
         typer.Argument(
             metavar="LAW...",
             autocompletion=complete_model,
-            help="Keys of models and friction laws, or results, of which every law is cited.",
+            help="Keys of models and friction laws; results, of which every law is cited; impact, the program.",
         ),
     ],
     plugins: options.Plugins = None,

@@ -11,6 +11,7 @@ from typing import Any
 
 import xarray as xr
 
+from .._version import __version__
 from ..contact.catalogue import look_up
 from ..contact.friction import FrictionLaw
 from ..contact.frictions import frictions
@@ -40,6 +41,13 @@ SYMBOLS = LATEX_CHARACTERS | str.maketrans(
     | {"−": "$-$", "<": "$<$", ">": "$>$"}
 )
 
+# as CITATION.cff, which an installed package does not have
+PROGRAM = f"""@misc{{impact,
+  author = {{{{The impact developers}}}},
+  title = {{{{impact: parameter sweeps of contact force models}}}},
+  howpublished = {{version {__version__}}},
+}}"""
+
 
 @dataclass(frozen=True)
 class Citation:
@@ -47,9 +55,9 @@ class Citation:
 
     Parameters
     ----------
-    model : key of the model or friction law
+    model : key of the model or friction law; "impact" for the program
     bibtex : an entry for each reference of the law; its DOI is that of the first
-    evidence : how well the formula and the DOI are verified
+    evidence : how well the formula and the DOI are verified; empty for the program
     """
 
     model: str
@@ -80,7 +88,7 @@ def cite(*laws: str | Path | xr.Dataset | ForceModel | FrictionLaw, plugins: Seq
 
     Parameters
     ----------
-    laws : keys of models and friction laws, laws, or results, of which every law is cited
+    laws : keys of models and friction laws, laws, or results, of which every law is cited; "impact" is the program
     plugins : Python files with user-defined models, or their models
 
     Returns
@@ -108,34 +116,55 @@ def cite(*laws: str | Path | xr.Dataset | ForceModel | FrictionLaw, plugins: Seq
     if not laws:
         raise UsageError("laws: got none, expected keys of laws, or results")
     known: dict[str, ForceModel | FrictionLaw] = {**models(plugins), **frictions()}
-    chosen: dict[str, ForceModel | FrictionLaw] = {}
+    chosen: dict[str, Citation] = {}
     for item in laws:
         if isinstance(item, ForceModel | FrictionLaw):
-            chosen[item.key] = item
+            found = [item]
+        elif isinstance(item, str) and item == "impact":
+            chosen[item] = Citation(item, PROGRAM, {})
             continue
-        if isinstance(item, str) and not Path(item).suffix:
-            keys = [item]
+        elif isinstance(item, str) and not Path(item).suffix:
+            found = [look_up(known, item, "law")]
         else:
             result = item if isinstance(item, xr.Dataset) else load(item)
             names = [*chosen_laws(None, result), *chosen_laws(None, result, "friction")]
             # the laws of a calibration with friction are pairs
-            keys = [key for name in names for key in law_keys(name)]
-        chosen |= {key: look_up(known, key, "law") for key in keys}
-    return Citations(Citation(key, bibtex(law), dict(vars(law.evidence))) for key, law in chosen.items())
+            found = [look_up(known, key, "law") for name in names for key in law_keys(name)]
+        chosen |= {law.key: Citation(law.key, bibtex(law), dict(vars(law.evidence))) for law in found}
+    return Citations(chosen.values())
 
 
 def bibtex(law: ForceModel | FrictionLaw) -> str:
-    """Write an entry for each reference of a law."""
+    """Write an entry for the first reference of a law, and for each further paper; others are remarks."""
+    first, *others = law.reference.split("; ")
+    papers = [reference for reference in others if PAPER.fullmatch(reference)]
+    remarks = [reference for reference in others if reference not in papers]
     entries = []
-    for index, reference in enumerate(law.reference.split("; "), 1):
+    for index, reference in enumerate((first, *papers), 1):
         kind, fields = _parse_reference(reference or law.title)
         if index == 1:
+            if "year" not in fields and law.evidence.state == "seen":
+                fields |= _version_read(law.evidence.source)
             # styles print a note, and no annote
-            fields |= {"doi": law.doi, "annote": _escape(f"formula {law.evidence}")}
+            fields |= {"doi": law.doi, "annote": _escape("; ".join((f"formula {law.evidence}", *remarks)))}
         key = law.key if index == 1 else f"{law.key}-{index}"
         lines = (f"  {name} = {{{text}}}," for name, text in fields.items() if text)
         entries.append("\n".join((f"@{kind}{{{key},", *lines, "}")))
     return "\n\n".join(entries)
+
+
+def _version_read(source: str) -> dict[str, str]:
+    """Find where the code of a law was read, the year of that version, and the address of its repository.
+
+    >>> _version_read("lammps/lammps, src/GRANULAR/gran_sub_mod.cpp @07b704ca (2026)")["url"]
+    'https://github.com/lammps/lammps'
+    """
+    repository = re.match(r"[\w.-]+/[\w.-]+(?=[ ,])", source)
+    return {
+        "howpublished": _escape(source),
+        "year": max(re.findall(r"\b20\d\d\b", source), default=""),
+        "url": f"https://github.com/{repository[0]}" if repository else "",
+    }
 
 
 def _parse_reference(reference: str) -> tuple[str, dict[str, str]]:
