@@ -54,6 +54,21 @@ def test_the_commands_of_a_figure_for_a_paper(cli: Run, tmp_path: Path) -> None:
     assert {path.name for path in tmp_path.iterdir()} >= {"contact.h5", "restitution.pdf", "restitution.csv"}
 
 
+@pytest.mark.slow
+def test_the_band_of_an_impact_with_a_fitted_law(cli: Run, tmp_path: Path) -> None:
+    (tmp_path / "docs").symlink_to(DOCS)
+    (block,) = code_blocks((DOCS / "calibrate.md").read_text(encoding="utf-8"), "sh")
+    texts = []
+    for line in block.splitlines():
+        done = cli(*shlex.split(line)[1:], cwd=tmp_path)
+        assert done.returncode == 0, (line, done.stderr)
+        texts.append(done.stdout)
+    _, highest, lowest, study = texts
+    ends = [float(re.search(r"e_out +(\S+)", text)[1]) for text in (highest, lowest)]
+    mean, deviation = map(float, re.search(r"mean (\S+), sd (\S+),", study).groups())
+    np.testing.assert_allclose(ends, [mean + 1.96 * deviation, mean - 1.96 * deviation], atol=5e-4)
+
+
 def test_the_table_of_the_laboratory_is_read_as_its_page_says() -> None:
     text = (DOCS / "tutorials" / "laboratory.md").read_text(encoding="utf-8")
     table, config = (
