@@ -230,6 +230,37 @@ def test_a_baseline_is_rewritten_only_if_it_differs(project: Path, entry_points:
     assert baseline.read_bytes() == b"no result"
 
 
+BOARD = """
+import impact
+
+def test_board(impact_regression):
+    # a ball that rebounds elastically from the wall, whatever e is
+    answer = lambda asked: {**asked, "v1": -asked["v1"]}
+    impact_regression(impact.conform(adapter=answer, only="normal-e50-slow-wall"))
+"""
+
+
+@pytest.mark.slow
+def test_a_board_has_a_baseline(project: Path, entry_points: Path) -> None:
+    test, baseline = project / "tests" / "test_engine.py", project / "tests/baselines/test_engine-test_board.h5"
+    test.write_text(BOARD, encoding="utf-8")
+    assert run_pytest(project, entry_points, str(test), "--impact-bless=first").returncode == 0
+    before = baseline.read_bytes()
+    assert b"first" in before
+    assert run_pytest(project, entry_points, str(test), "--impact-bless=second").returncode == 0
+    assert baseline.read_bytes() == before
+    test.write_text(BOARD.replace('-asked["v1"]', '-0.5 * asked["v1"]'), encoding="utf-8")
+    differs = run_pytest(project, entry_points, str(test))
+    assert differs.returncode == 1
+    assert "not equal" in differs.stdout
+    # one message, not that of another on the way
+    baseline.write_bytes(b"no result")
+    refused = run_pytest(project, entry_points, str(test), "--impact-bless=third")
+    assert refused.returncode == 1
+    assert "another exception" not in refused.stdout
+    assert baseline.read_bytes() == b"no result"
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("reason", ["", "tests/test_contact.py::test_config"])
 def test_the_option_needs_a_reason(project: Path, entry_points: Path, reason: str) -> None:

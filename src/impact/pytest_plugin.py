@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from .comparison.compare import Tolerances
     from .comparison.verdict import Verdict
     from .contact.model import ForceModel
+    from .results.board import Board
 
 # the properties of a test that bring its baselines to the summary, also from workers of pytest-xdist
 WRITTEN, OLD_NAME = "impact baseline", "impact baseline with an old name"
@@ -91,7 +92,7 @@ class ImpactRegression:
 
     def __call__(
         self,
-        source: str | Path | Mapping[str, object] | xr.Dataset,
+        source: str | Path | Mapping[str, object] | xr.Dataset | Board,
         baseline: str | Path | None = None,
         *,
         tol: float | str | Tolerances | None = None,
@@ -107,7 +108,7 @@ class ImpactRegression:
         Parameters
         ----------
         source : a config, as a mapping or the path of a TOML file, which is swept; or a result, as a dataset or
-            the path of its file
+            the path of its file, which may be a calibration or a board
         baseline : the file of the baseline; by default baselines/FILE-TEST.h5, see `baseline_name`
         tol, subset : see `impact.compare`
         overrides, plugins : of the sweep, see `impact.sweep`
@@ -132,7 +133,7 @@ class ImpactRegression:
                 path = self._baseline_with_old_name(path, is_default=baseline is None)
             verdict = impact.compare(new, path, tol=tol, subset=subset)
         except impact.ImpactError as error:
-            pytest.fail(str(error), pytrace=False)
+            raise pytest.fail.Exception(str(error), pytrace=False) from None
         if not verdict.equal:
             hint = self._hint("why the numbers change")
             pytest.fail(f"{verdict}\nnew result: {new}\nbaseline: {path}\n{hint}", pytrace=False)
@@ -155,20 +156,30 @@ class ImpactRegression:
         """Write a baseline unless it is equal to the result, so that version control shows real changes only."""
         import impact
 
+        from .results.schema import kind_of
+        from .results.xarray_backend import save_with_attributes
+
+        verdict, is_study = None, kind_of(impact.load(new)) in ("calibration", "board")
         try:
-            if baseline.exists() and (verdict := impact.compare(new, baseline, tol=tol, subset=subset)).equal:
-                return verdict
+            if baseline.exists():
+                verdict = impact.compare(new, baseline, tol=tol, subset=subset)
         except impact.ImpactError:
             # bless reports the same error and how to proceed
-            pass
+            if is_study:
+                raise
+        if verdict is not None and verdict.equal:
+            return verdict
         baseline.parent.mkdir(parents=True, exist_ok=True)
-        verdict_of_old = impact.bless(new, baseline, reason=reason, tol=tol, allow_failed=allow_failed)
+        if is_study:
+            save_with_attributes(new, baseline, {"reason": reason})
+        else:
+            verdict = impact.bless(new, baseline, reason=reason, tol=tol, allow_failed=allow_failed)
         self.request.node.user_properties.append((WRITTEN, str(baseline)))
-        return verdict_of_old
+        return verdict
 
     def _result_file(
         self,
-        source: str | Path | Mapping[str, object] | xr.Dataset,
+        source: str | Path | Mapping[str, object] | xr.Dataset | Board,
         overrides: Sequence[str],
         plugins: Sequence[ForceModel | str | Path],
     ) -> Path:
@@ -177,6 +188,8 @@ class ImpactRegression:
 
         import impact
 
+        if isinstance(source, impact.Board):
+            source = source.dataset
         path = self._path(source) if isinstance(source, str | Path) else None
         is_result = path.suffix.lower() != ".toml" if path is not None else isinstance(source, xr.Dataset)
         if is_result and (overrides or plugins):
