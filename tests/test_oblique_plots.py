@@ -317,6 +317,17 @@ def test_more_pairs_than_can_be_told_apart_are_drawn_on_request(beads: xr.Datase
 
 
 @pytest.mark.slow
+def test_pairs_of_two_codes_are_the_first_that_are_left_out() -> None:
+    models = ["lammps-tsuji", "liggghts-hertz", "yade-en"]
+    frictions = ["lammps-mindlin", "liggghts-history", "yade-mindlin", COULOMB]
+    data = curves_of(sweep(models=models, frictions=frictions, friction={}), "beta")
+    drawn = [curve.law for curve in of_pairs(data)]
+    pairs = zip(models, frictions, strict=False)
+    assert drawn[:6] == [f"{model} with {friction}" for model, own in pairs for friction in (own, COULOMB)]
+    assert drawn[6:] == ["lammps-tsuji with liggghts-history", "lammps-tsuji with yade-mindlin"]
+
+
+@pytest.mark.slow
 def test_slips_are_those_of_maw_barber_and_fawcett() -> None:
     names = ["beta", "psi1", "psi2"]
     slips = sweep(

@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
+from ..contact.models import catalogue
 from ..contact.status import FIRST_FAILURE, FrictionStatus
 from ..contact.variables import OUTPUTS
 from ..errors import UsageError
@@ -118,7 +119,9 @@ def _pairs_along(dataset: xr.Dataset, choice: Choice, *names: str) -> tuple[Line
     x = choice.x or choose_line(select(dataset, choice.sel or {}), None, "angle").x
     line = read_line(dataset, replace(choice, x=x), *names, keep=("friction",))
     pairs, not_drawn = [], []
-    for pair in split_by_law(line.data, numbered=choice.equations):
+    # of the variables that are looked at alone: a part is made for each of hundreds of pairs
+    needed = [name for name in (*names, "friction_status") if name in line.data]
+    for pair in split_by_law(line.data[needed], numbered=choice.equations):
         if any(np.isfinite(pair.data.variables[name].values).any() for name in names):
             pairs.append(pair)
         else:
@@ -130,8 +133,16 @@ def _pairs_along(dataset: xr.Dataset, choice: Choice, *names: str) -> tuple[Line
     if choice.frictions is None and len(pairs) > MAX_PAIRS:
         choice_of_pairs = f"{argument('models')} and {argument('frictions')}"
         not_drawn.append(f"{len(pairs) - MAX_PAIRS} more pairs; choose some with {choice_of_pairs}")
-        pairs = pairs[:MAX_PAIRS]
+        # the law of a code is seldom used with the friction of another
+        pairs = sorted(pairs, key=_is_of_two_codes)[:MAX_PAIRS]
     return line._replace(not_drawn=(*line.not_drawn, *not_drawn)), pairs
+
+
+def _is_of_two_codes(pair: LawPart) -> bool:
+    """Whether a model of a code stands beside the friction law of another, by the first words of the keys."""
+    codes = {key.partition("-")[0] for key, law in catalogue().items() if law.family == "codes"}
+    words = {key.partition("-")[0] for key in (pair.model or "", pair.friction)}
+    return len(words) == 2 and words <= codes
 
 
 def _panel(line: Line, pairs: Sequence[LawPart], name: str, y_label: str, guides: Sequence[Curve] = ()) -> Panel:
