@@ -220,3 +220,10 @@ def test_the_material_of_the_starter_config_contradicts_no_mass(recwarn: pytest.
         impact.run(at={**ball, "material": "steel"})
     with pytest.warns(match=r"^m1: got 0.045 kg, but a sphere of R1 = 0.0213 m and 2700 kg/m\^3 has"):
         impact.sweep(models="hertz", overrides={"materials.table1.rho": 2700}, **ball)
+
+
+def test_a_result_of_the_starter_config_contradicts_no_mass(recwarn: pytest.WarningsRecorder) -> None:
+    result = impact.sweep(models="hertz", e=[0.1, 0.9], m1="45 g", R1="21.3 mm", R2=math.inf)
+    assert notes_of(impact.report(result, sections=["inputs"])) == []
+    impact.run(result)
+    assert not [str(warning.message) for warning in recwarn if "a sphere of" in str(warning.message)]

@@ -587,9 +587,9 @@ def without_replaced_inputs(draft: Draft, fixed: Mapping[str, object]) -> Draft:
     """Leave out the inputs of the starter config that a user replaces by others.
 
     They are columns of cases; e beside a column alpha; the mass of a ball whose radius is given, which follows
-    from that and the density; v1 beside the speed of an oblique impact; and the material of both beside a column
-    of one: the other ball keeps it. The draft is that of the starter config; `fixed` has inputs that are set after
-    its settings.
+    from that and the density; the density where masses and radii are given, which may contradict it; v1 beside the
+    speed of an oblique impact; and the material of both beside a column of one: the other ball keeps it. The draft
+    is that of the starter config; `fixed` has inputs that are set after its settings.
     """
     given = {**{str(path[1]): setting.value for path, setting in draft.origins.items() if len(path) > 1}, **fixed}
     cases = as_table(draft.table("sweep").get("cases"))
@@ -608,7 +608,13 @@ def without_replaced_inputs(draft: Draft, fixed: Mapping[str, object]) -> Draft:
         others = balls - columns.keys() - given.keys()
         sweep |= dict.fromkeys(others, material)
         text = re.sub(r"(?m)^material(?= = )", others.pop() if others else "# material", text)
-    return replace(draft, data={**draft.data, "sweep": sweep}, text=text)
+    data = {**draft.data, "sweep": sweep}
+    sets_material = any(path[0] == "materials" for path in draft.origins)
+    if {"m1", "R1", "m2", "R2"} <= {*sweep, *inputs} and not sets_material:
+        text = re.sub(r"(?m)^(?=rho = )", "# ", text)
+        tables = draft.table("materials").items()
+        data["materials"] = {name: {key: table[key] for key in table if key != "rho"} for name, table in tables}
+    return replace(draft, data=data, text=text)
 
 
 def contains_path(data: Mapping[str, Any], path: KeyPath) -> bool:
