@@ -173,7 +173,7 @@ def test_a_dataset_of_another_program_is_not_a_result(function: Callable[[xr.Dat
 @pytest.mark.parametrize("act", [impact.recommend, impact.report, impact.page])
 def test_an_axis_that_no_sweep_has_is_refused(act: Callable[[xr.Dataset], object], result: xr.Dataset) -> None:
     stacked = result.stack(p=("model", "e"))
-    for other in (stacked, result.stack(p=("e",)), xr.concat([result, result], "p")):
+    for other in (stacked, result.stack(p=("e",)), xr.concat([result, result], "p"), result.rename(e="p")):
         with pytest.raises(
             impact.UsageError, match=r"p: expected an axis of a sweep|expected the result of a sweep"
         ):

@@ -198,9 +198,10 @@ def require_sweep(dataset: xr.Dataset, command: str) -> None:
 def require_axes(dataset: xr.Dataset) -> None:
     """Raise a UsageError for an axis that no sweep has, such as that of `stack`, whose labels are tuples."""
     for dim in {dim: None for name in OUTPUTS if name in dataset for dim in dataset[name].dims}:
-        if dim not in dataset.coords or hasattr(dataset.indexes.get(dim), "levels"):
-            axis = safe_text(str(dim))
-            raise UsageError(f"{axis}: expected an axis of a sweep, with numbers or names; unstack or select it")
+        is_known = dim in LAW_DIMS or is_input(dim) or is_case(str(dim))
+        if not is_known or dim not in dataset.coords or hasattr(dataset.indexes.get(dim), "levels"):
+            axis, undo = safe_text(str(dim)), "unstack it, select it or rename it to its input"
+            raise UsageError(f"{axis}: expected an axis of a sweep, with numbers or names; {undo}")
 
 
 def scale_of(variable: Variable, read: Callable[[str], NDArray[Any]], *, has_peak: bool) -> NDArray[np.float64]:
