@@ -49,33 +49,31 @@ def run_together(solvers: Sequence[Callable[[Evaluate], T]]) -> list[T]:
     if len(solvers) > MAX_THREADS:
         first, others = solvers[:MAX_THREADS], solvers[MAX_THREADS:]
         return [*run_together(first), *run_together(others)]
-    # what the running solver sends: a request, or at its end its future
-    messages: SimpleQueue[tuple[VectorFunction, Array] | Future[T]] = SimpleQueue()
+    # the turn of the running solver ends with a request, or with its future
+    turns: SimpleQueue[Future[T] | None] = SimpleQueue()
     answers: list[SimpleQueue[Array | None]] = [SimpleQueue() for _ in solvers]
     futures: list[Future[T]] = []
     requests: dict[int, tuple[VectorFunction, Array]] = {}
 
     def evaluate(number: int, function: VectorFunction, rows: Array) -> Array:
-        messages.put((function, rows))
+        requests[number] = function, rows
+        turns.put(None)
         answer = answers[number].get()
         if answer is None:
             raise _Stopped
         return answer
 
-    def wait_for(number: int) -> None:
+    def wait_for_turn() -> None:
         """Let a solver run alone: threads that compete for the interpreter's lock cost more time."""
-        message = messages.get()
-        if isinstance(message, Future):
-            message.result()
-        else:
-            requests[number] = message
+        if (finished := turns.get()) is not None:
+            finished.result()
 
     with ThreadPoolExecutor(MAX_THREADS) as executor:
         try:
             for number, solver in enumerate(solvers):
                 futures.append(executor.submit(solver, partial(evaluate, number)))
-                futures[-1].add_done_callback(messages.put)
-                wait_for(number)
+                futures[-1].add_done_callback(turns.put)
+                wait_for_turn()
             while requests:
                 values: dict[int, Array] = {}
                 # those of one function together, in the order of the solvers
@@ -87,7 +85,7 @@ def run_together(solvers: Sequence[Callable[[Evaluate], T]]) -> list[T]:
                 requests.clear()
                 for number in sorted(values):
                     answers[number].put(values[number])
-                    wait_for(number)
+                    wait_for_turn()
         finally:
             for answer in answers:
                 answer.put(None)
