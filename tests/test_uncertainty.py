@@ -14,7 +14,7 @@ import xarray as xr
 from scipy import stats
 
 import impact
-from impact.config.samples import unit_samples
+from impact.config.grid import unit_samples
 from impact.config.tables import Design
 from impact.errors import ConfigError, UsageError
 from impact.uncertainty.sensitivity import indices_of, mixed_rows

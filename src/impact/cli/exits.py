@@ -135,7 +135,9 @@ def _exit_code(command: Callable[[], object], *, debug: bool) -> int:
             size = f": {safe_text(str(error))}" if isinstance(error, MemoryError) and str(error) else ""
             print_line(f"out of memory{size}", error=True)
             return EXIT_STORAGE
-        if isinstance(error, OSError) and (error.errno in WRITE_ERRNOS or _lacks_temporary_folder(error)):
+        # `tempfile` finds no folder to which it can write, such as on a full disk
+        lacks_folder = str(getattr(error, "strerror", "")).startswith("No usable temporary directory")
+        if isinstance(error, OSError) and (error.errno in WRITE_ERRNOS or lacks_folder):
             print_line(f"cannot write: {error.strerror}", error=True)
             return EXIT_STORAGE
         if debug:
@@ -163,11 +165,6 @@ def _is_out_of_memory(error: BaseException) -> bool:
     except (OSError, MemoryError):
         return True
     return False
-
-
-def _lacks_temporary_folder(error: OSError) -> bool:
-    """Whether `tempfile` found no folder to which it can write, such as on a full disk."""
-    return str(error.strerror).startswith("No usable temporary directory")
 
 
 def _usage_message(error: TyperException) -> str:

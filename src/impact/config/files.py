@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Mapping
 from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from pydantic_core import PydanticCustomError
@@ -385,59 +385,53 @@ def key_lines(text: str) -> dict[KeyPath, int]:
     lines: dict[KeyPath, int] = {}
     tokens = _tokens(text)
 
-    def read_key(token: _Token, base: KeyPath, end: str) -> KeyPath:
+    def read_key(token: str, line: int, base: KeyPath, end: str) -> KeyPath:
         """Read a key or header, and record its line, also that of the tables that a dotted one implies."""
-        started, path = 0, base
-        while token.text != end:
-            if token.text not in ("[", "."):
+        path = base
+        while token != end:
+            if token not in ("[", "."):
                 # without quotes and escapes
-                is_quoted = token.text.startswith(("'", '"'))
-                part = next(iter(tomllib.loads(f"{token.text} = 0"))) if is_quoted else token.text
-                started, path = started or token.line, (*path, part)
-                lines.setdefault(path, started)
-            token = next(tokens)
+                part = next(iter(tomllib.loads(f"{token} = 0"))) if token.startswith(("'", '"')) else token
+                path = (*path, part)
+                lines.setdefault(path, line)
+            token, _ = next(tokens)
         return path
 
-    def read_value(token: _Token, path: KeyPath) -> _Token:
+    def read_value(token: str, line: int, path: KeyPath) -> tuple[str, int]:
         """Read a value, and return the token after it."""
-        if token.text not in ("[", "{"):
-            while token.text not in (",", "]", "}", "\n"):
-                token = next(tokens)
-            return token
-        first_line, index, element = token.line, 0, next(tokens)
-        while element.text not in ("]", "}"):
-            if token.text == "{":
-                inner, element = read_key(element, path, "="), next(tokens)
+        if token not in ("[", "{"):
+            while token not in (",", "]", "}", "\n"):
+                token, line = next(tokens)
+            return token, line
+        index, (element, start) = 0, next(tokens)
+        while element not in ("]", "}"):
+            if token == "{":
+                inner = read_key(element, start, path, "=")
+                element, start = next(tokens)
             else:
                 inner, index = (*path, index), index + 1
-                if element.line != first_line:
-                    lines[inner] = element.line
-            element = read_value(element, inner)
-            element = next(tokens) if element.text == "," else element
+                if start != line:
+                    lines[inner] = start
+            element, start = read_value(element, start, inner)
+            if element == ",":
+                element, start = next(tokens)
         return next(tokens)
 
     table: KeyPath = ()
-    for token in tokens:
-        if token.text == "[":
-            table = read_key(token, (), "]")
-        elif token.text not in ("]", "\n"):
-            path = read_key(token, table, "=")
-            read_value(next(tokens), path)
+    for token, line in tokens:
+        if token == "[":
+            table = read_key(token, line, (), "]")
+        elif token not in ("]", "\n"):
+            path = read_key(token, line, table, "=")
+            read_value(*next(tokens), path)
     return lines
 
 
-class _Token(NamedTuple):
-    """A part of a TOML text, and the line where it begins."""
-
-    text: str
-    line: int
-
-
-def _tokens(text: str) -> Iterator[_Token]:
-    """Split a TOML text, without spaces and comments, and without the line breaks in lists."""
+def _tokens(text: str) -> Iterator[tuple[str, int]]:
+    """Split a TOML text, without spaces and comments, and without the line breaks in lists; with their lines."""
     line, depth = 1, 0
     for match in TOML_TOKEN.finditer(f"{text}\n"):
         depth += (match[0] in ("[", "{")) - (match[0] in ("]", "}"))
         if match["skip"] is None and (match[0] != "\n" or depth == 0):
-            yield _Token(match[0], line)
+            yield match[0], line
         line += match[0].count("\n")

@@ -23,12 +23,11 @@ from . import measurements, quantities, tables
 from .columns import expand_cases, named_files, read_files, without_replaced_inputs
 from .draft import Draft, Measurements, Overrides, Setting, add_library_materials, open_config, open_text
 from .files import as_table, override_text, set_value
-from .grid import MAX_POINTS, Axis, build_grid, chunk_problems
+from .grid import MAX_POINTS, Axis, build_grid, chunk_problems, design_problems, draw_columns, unit_samples
 from .input_names import InputName, paths_with
 from .library import library
 from .quantities import VALUE_FORMS, Column, ConfigProblem, Distribution, FitRange, KeyPath, Values, as_text
 from .rules import check_rules, materials_of
-from .samples import design_problems, draw_columns, unit_samples
 
 # what a config is read for: only a calibration has measurements and parameters to fit, only a sweep has axes
 Purpose = Literal["sweep", "calibrate"]
@@ -46,6 +45,13 @@ HOMES: Mapping[str, Iterable[str]] = {
     **{f"under [{table}]": tables.KEYS_BY_TABLE[table] for table in ("sweep", "solver", "output")},
     "under [materials.NAME]": tables.MaterialTable.model_fields,
     "before all tables": (*LAW_KEYS, "title"),
+}
+# of a table that is a value, by its form
+KEYS_BY_FORM: Mapping[str | int, Iterable[str]] = {
+    quantities.RANGE: VALUE_FORMS,
+    quantities.FIT: ("fit",),
+    quantities.DISTRIBUTION: quantities.DISTRIBUTION_FORMS,
+    quantities.COLUMN: Column.model_fields,
 }
 # other words that users may write for a key
 KEY_SYNONYMS = {
@@ -408,14 +414,8 @@ def _unknown_key_hint(location: KeyPath, models: Mapping[str, ForceModel]) -> st
         return f"it belongs {home}"
     keys: Iterable[str]
     match location[:-1]:
-        case (*_, quantities.RANGE):
-            keys = VALUE_FORMS
-        case (*_, quantities.FIT):
-            keys = ("fit",)
-        case (*_, quantities.DISTRIBUTION):
-            keys = quantities.DISTRIBUTION_FORMS
-        case (*_, quantities.COLUMN):
-            keys = Column.model_fields
+        case (*_, form) if form in KEYS_BY_FORM:
+            keys = KEYS_BY_FORM[form]
         case ():
             keys = tables.Document.model_fields
         case ("materials", _):

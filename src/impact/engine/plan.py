@@ -187,10 +187,9 @@ class Plan:
     def layout(self) -> Literal["full", "factored"]:
         """The layout of the result; "auto" is full up to a limit, or if the config sets chunks."""
         output = self.config.output
-        if output.layout == "auto":
-            most = MAX_FULL_POINTS if self.stored_points == self.points else MAX_FULL_REPEATED
-            return "full" if output.chunks or self.stored_points <= most else "factored"
-        return output.layout
+        most = MAX_FULL_POINTS if self.stored_points == self.points else MAX_FULL_REPEATED
+        is_small = output.layout == "auto" and self.stored_points <= most
+        return "full" if output.is_full or is_small else "factored"
 
     @cached_property
     def fingerprint(self) -> str:

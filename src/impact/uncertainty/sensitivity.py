@@ -17,10 +17,9 @@ import xarray as xr
 from ..array_types import Array
 from ..atomic import check_outputs, check_result_name
 from ..config.files import path_text
-from ..config.grid import MAX_POINTS, SAMPLE
+from ..config.grid import MAX_POINTS, SAMPLE, draw_columns, unit_samples
 from ..config.input_names import InputName
 from ..config.load import Config
-from ..config.samples import draw_columns, unit_samples
 from ..config.tables import power_of_two_problem
 from ..contact.model import ForceModel
 from ..contact.status import FrictionStatus, Status
