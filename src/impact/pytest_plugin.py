@@ -17,6 +17,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+import impact
+
 if TYPE_CHECKING:
     import xarray as xr
 
@@ -119,8 +121,6 @@ class ImpactRegression:
         Verdict : the comparison; None if there was no baseline and --impact-bless wrote it
         """
         __tracebackhide__ = True
-        import impact
-
         try:
             path = self._path(
                 baseline if baseline is not None else f"baselines/{baseline_name(self.request.node)}"
@@ -154,8 +154,6 @@ class ImpactRegression:
         self, new: Path, baseline: Path, reason: str, *, tol: Any, subset: bool, allow_failed: bool
     ) -> Verdict | None:
         """Write a baseline unless it is equal to the result, so that version control shows real changes only."""
-        import impact
-
         from .results.schema import kind_of
         from .results.xarray_backend import save_with_attributes
 
@@ -185,8 +183,6 @@ class ImpactRegression:
     ) -> Path:
         """The file of the new result; pytest keeps its folder, so that commands in a verdict can be repeated."""
         import xarray as xr
-
-        import impact
 
         if isinstance(source, impact.Board):
             source = source.dataset

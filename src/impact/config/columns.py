@@ -580,7 +580,7 @@ def expand_cases(draft: Draft) -> Draft:
         if name.owner:
             data, _ = set_value(data, name.path, values)
         paths[name.path] = path
-    return replace(draft, data=data, cases=paths).with_problems(problems)
+    return replace(draft, data=data, columns=paths).with_problems(problems)
 
 
 def without_replaced_inputs(draft: Draft, fixed: Mapping[str, object]) -> Draft:

@@ -121,8 +121,8 @@ class Draft:
     # the setting of each path that a setting changed, in the order in which they were applied
     origins: Mapping[KeyPath, Setting] = field(default_factory=dict)
     files: tuple[Path, ...] | None = None  # the CSV files whose values are in the data; None before they are read
-    # the path of each input that is a column of a table of cases, and where its values are in that table
-    cases: Mapping[KeyPath, KeyPath] = field(default_factory=dict)
+    # the path of each input that is a column of cases or of measurements, and where its values are
+    columns: Mapping[KeyPath, KeyPath] = field(default_factory=dict)
     measurements: Measurements | None = None
     problems: tuple[ConfigProblem, ...] = ()
     lines: tuple[str, ...] = ()  # complete messages about settings and files
@@ -145,8 +145,8 @@ class Draft:
     def exponent(self) -> float | None:
         """The exponent n of [sweep], which the unit of K contains: None if it varies, NaN if it is invalid."""
         n = self.table("sweep").get("n", SWEEP_DEFAULTS["n"])
-        is_measured = self.measurements is not None and "n" in self.measurements.inputs
-        if is_measured or isinstance(n, list | dict) or "n" in as_table(self.table("sweep").get("cases")):
+        is_column = ("sweep", "n") in self.columns or "n" in as_table(self.table("sweep").get("cases"))
+        if is_column or isinstance(n, list | dict):
             return None
         return SWEEP_QUANTITIES["n"].read_or_nan(n)
 
@@ -229,13 +229,11 @@ class Draft:
     def error(self) -> ConfigError:
         """Build the exception with all problems: those of the file by line, then those of the settings."""
         key_line = {} if self.text.lstrip().startswith("{") else key_lines(self.text)
-        measured = self.measurements.inputs if self.measurements is not None else ()
-        columns = {InputName.parse(name).path: ("data", "columns", name) for name in measured} | dict(self.cases)
         ranked: list[tuple[tuple[int, int], str]] = []
         for path, message in self.problems:
             for end in range(len(path), 0, -1):
-                if path[:end] in columns:
-                    path = (*columns[path[:end]], *path[end:])
+                if path[:end] in self.columns:
+                    path = (*self.columns[path[:end]], *path[end:])
                     break
             rank, location = self._locate(path, key_line)
             ranked.append((rank, ": ".join(part for part in (location, path_text(path), message) if part)))

@@ -499,12 +499,13 @@ def read_measurements(draft: Draft) -> Draft:
         specimens=specimens,
         loss=loss,
     )
-    data = draft.data
+    data, columns = draft.data, dict(draft.columns)
     for name, values in measurements.inputs.items():
         # rules between inputs apply to the first value
         data, _ = set_value(data, InputName.parse(name).path, values[0])
+        columns[InputName.parse(name).path] = ("data", "columns", name)
     notes = (*draft.notes, *points.notes, *_exchange_notes(measurements))
-    return replace(draft, data=data, measurements=measurements, notes=notes)
+    return replace(draft, data=data, columns=columns, measurements=measurements, notes=notes)
 
 
 def _exchange_notes(measured: Measurements) -> Iterator[str]:

@@ -59,9 +59,8 @@ def _exclusion_hint(draft: Draft, model: ForceModel) -> str:
 
 def _vary_together(draft: Draft, *names: str) -> bool:
     """Whether inputs of [sweep] are members of one zip group, of the cases or of the measurements."""
-    cases = [str(InputName.of_path(path)) for path in draft.cases]
-    measured = draft.measurements.inputs if draft.measurements is not None else ()
-    groups = (*draft.zip_groups, cases, as_table(draft.table("sweep").get("cases")), measured)
+    columns = [str(InputName.of_path(path)) for path in draft.columns]
+    groups = (*draft.zip_groups, columns, as_table(draft.table("sweep").get("cases")))
     return any({*names} <= {*group} for group in groups)
 
 
