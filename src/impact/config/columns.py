@@ -14,7 +14,7 @@ from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
-from functools import cache, partial
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -124,6 +124,13 @@ class Columns:
         if problems:
             raise ConfigError(*(self.problem(message, column, row) for row, message in problems))
         return list(values)
+
+
+# the values that replace the name of a CSV file in a config, by path, and notes
+CsvValues = tuple[dict[KeyPath, object], Sequence[str]]
+# the name of such a file, what else is `wanted` of it, see `read_csv`, some of the CSV_KEYS, and what reads the
+# values; a KeyError is that of an unknown key
+CsvFile = tuple[str, tuple[str, ...] | None, dict[str, str], Callable[[Columns], CsvValues]]
 
 
 def read_cells(
@@ -435,7 +442,7 @@ def columns_of_table(table: Any, source: str) -> Columns:
     return columns
 
 
-def read_csv_of(draft: Draft, file: str, wanted: Collection[str] | None = None, **form: str) -> Columns:
+def read_csv_of(draft: Draft, file: str, wanted: tuple[str, ...] | None, **form: str) -> Columns:
     """Read a CSV file that a config names; `form` has some of the CSV_KEYS."""
     if draft.folder is None:
         raise ConfigError(f"{file}: not read; a stored config contains values, not file names")
@@ -454,43 +461,36 @@ def csv_form(table: Mapping[Any, Any]) -> dict[str, str]:
     return {key: table[key] for key, choices in CSV_KEYS.items() if table.get(key) in choices}
 
 
-def read_files(draft: Draft) -> tuple[dict[KeyPath, object], list[ConfigError], list[str]]:
-    """Read the CSV files of cases and of single columns: the values that replace their names, errors, notes."""
-    open_csv = cache(partial(read_csv_of, draft))
-    values: dict[KeyPath, object] = {}
-    errors: list[ConfigError] = []
-    notes: tuple[str, ...] = ()
+def csv_files(draft: Draft) -> Iterator[CsvFile]:
+    """Yield the CSV files of cases and of single columns."""
     cases = draft.table("sweep").get("cases")
     match {"file": cases} if isinstance(cases, str) else cases:
         # a table with other keys or values is left as it is, and reported
-        case {"file": str(file), **others} if others == csv_form(others):
-            try:
-                values["sweep", "cases"], notes = _read_cases(open_csv(file, **csv_form(others)), draft)
-            except ConfigError as error:
-                errors.append(error)
+        case {"file": str(file), **form} if form == csv_form(form):
+            yield file, None, csv_form(form), partial(_read_cases, draft)
+    for name, reference in input_values(draft.data):
+        match reference:
+            case {"file": str(file), "column": str(column), **form} if form == csv_form(form):
+                yield file, (column,), csv_form(form), partial(_read_column, draft, name, column)
+            case {"empirical": str(file), **others} if not others:
+                yield file, (), {}, partial(_read_column, draft, name, None)
+
+
+def _read_column(draft: Draft, name: InputName, column: str | None, columns: Columns) -> CsvValues:
+    """Convert a column, or without a name that of the input or the only one, which gives its distribution."""
+    # the single column of a file that names none may have any name
+    is_single = column is None and len(columns.units) == 1
+    found, unit = columns.find(next(iter(columns.units)) if is_single else column or str(name))
     # the values of axes that vary together stand in the same rows
-    zipped = {name for group in draft.zip_groups for name in group}
-    for name, file, column, form in _file_columns(draft.data):
-        try:
-            columns = open_csv(file, () if column is None else (column,), **form)
-            # the single column of a file that names none may have any name
-            is_single = column is None and len(columns.units) == 1
-            found, unit = columns.find(next(iter(columns.units)) if is_single else column or str(name))
-            rows, count, gaps = complete_rows(columns, [found], refuse=str(name) in zipped)
-            if gaps:
-                raise ConfigError(*(columns.problem(message, header, row) for header, row, message in gaps))
-            complete, quantity = columns.take(rows), name.quantity(draft.known_models)
-            list_of_values = complete.values(found, quantity, draft.exponent, unit)
-            notes += columns.notes(count)
-            values[name.path] = list_of_values if column is not None else {"empirical": list_of_values}
-        except ConfigError as error:
-            errors.append(error)
-        except KeyError:
-            continue  # an unknown key is reported with the others
-    return values, errors, list(notes)
+    is_zipped = any(str(name) in group for group in draft.zip_groups)
+    rows, count, gaps = complete_rows(columns, [found], refuse=is_zipped)
+    if gaps:
+        raise ConfigError(*(columns.problem(message, header, row) for header, row, message in gaps))
+    values = columns.take(rows).values(found, name.quantity(draft.known_models), draft.exponent, unit)
+    return {name.path: {"empirical": values} if column is None else values}, columns.notes(count)
 
 
-def _read_cases(columns: Columns, draft: Draft) -> tuple[dict[str, list[float | str]], tuple[str, ...]]:
+def _read_cases(draft: Draft, columns: Columns) -> CsvValues:
     """Convert the columns of a table of cases to SI units, without incomplete rows; also returns notes."""
     problems: list[str] = []
     unused: list[str] = []
@@ -516,25 +516,7 @@ def _read_cases(columns: Columns, draft: Draft) -> tuple[dict[str, list[float | 
             problems += error.problems
     if problems:
         raise ConfigError(*problems)
-    return values, columns.notes(count, unused)
-
-
-def _file_columns(data: Mapping[str, Any]) -> Iterator[tuple[InputName, str, str | None, dict[str, str]]]:
-    """Yield name, file, column and form of every `{ file = ..., column = ... }` and `{ empirical = file }`."""
-    for name, reference in input_values(data):
-        match reference:
-            case {"file": str(file), "column": str(column), **others} if others == csv_form(others):
-                yield name, file, column, csv_form(others)
-            case {"empirical": str(file), **others} if not others:
-                yield name, file, None, {}
-
-
-def named_files(data: Mapping[str, Any]) -> list[str]:
-    """List the names of all CSV files in the plain data of a config."""
-    cases = as_table(data.get("sweep")).get("cases")
-    names = [as_table(cases).get("file", cases), as_table(data.get("data")).get("file")]
-    names += [file for _, file, _, _ in _file_columns(data)]
-    return list(dict.fromkeys(name for name in names if isinstance(name, str)))
+    return {("sweep", "cases"): values}, columns.notes(count, unused)
 
 
 def expand_cases(draft: Draft) -> Draft:

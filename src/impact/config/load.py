@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, Literal
 
@@ -18,9 +19,9 @@ from ..contact.materials import Material
 from ..contact.model import ForceModel
 from ..contact.numba.dispatch import is_installed
 from ..contact.variables import OUTPUTS, default_variables
-from ..errors import MissingFileError, did_you_mean
+from ..errors import ConfigError, MissingFileError, did_you_mean
 from . import measurements, quantities, tables
-from .columns import expand_cases, named_files, read_files, without_replaced_inputs
+from .columns import csv_files, expand_cases, read_csv_of, without_replaced_inputs
 from .draft import Draft, Measurements, Overrides, Setting, add_library_materials, open_config, open_text
 from .files import as_table, override_text, set_value
 from .grid import MAX_POINTS, Axis, build_grid, chunk_problems, design_problems, draw_columns, unit_samples
@@ -226,18 +227,25 @@ def inline_files(draft: Draft) -> Draft:
     """Replace the names of CSV files by the values in them."""
     if draft.files is not None:
         return draft
-    draft = replace(draft, files=tuple((draft.folder or Path()) / file for file in named_files(draft.data)))
-    for read in (read_files, measurements.read_data_file):
-        values, errors, notes = read(draft)
-        # several columns may be of one file that cannot be read
-        lines = dict.fromkeys(problem for error in errors for problem in error.problems)
-        misses_file = draft.misses_file or any(isinstance(error, MissingFileError) for error in errors)
-        draft = replace(draft, lines=(*draft.lines, *lines), notes=(*draft.notes, *notes), misses_file=misses_file)
-        for path, value in values.items():
-            setting = Setting(path, value, "", override_text(path, value))
-            data, _ = set_value(draft.data, path, value)
-            draft = replace(draft, data=data, settings=(*draft.settings, setting))
-    return draft
+    open_csv, files, lines = cache(partial(read_csv_of, draft)), list[Path](), [*draft.lines]
+    for files_of in (csv_files, measurements.csv_files):
+        for file, wanted, form, read in files_of(draft):
+            files.append((draft.folder or Path()) / file)
+            try:
+                values, notes = read(open_csv(file, wanted, **form))
+            except ConfigError as error:
+                lines += error.problems
+                draft = replace(draft, misses_file=draft.misses_file or isinstance(error, MissingFileError))
+            except KeyError:
+                continue  # an unknown key is reported with the others
+            else:
+                draft = replace(draft, notes=(*draft.notes, *notes))
+                for path, value in values.items():
+                    setting = Setting(path, value, "", override_text(path, value))
+                    data, _ = set_value(draft.data, path, value)
+                    draft = replace(draft, data=data, settings=(*draft.settings, setting))
+    # several columns may be of one file, and of one that cannot be read
+    return replace(draft, files=tuple(dict.fromkeys(files)), lines=tuple(dict.fromkeys(lines)))
 
 
 def _validate(draft: Draft) -> tuple[tables.Document | None, list[ConfigProblem]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
@@ -19,6 +20,8 @@ from ..formatting import law_name, number, quantity, safe_text
 from .columns import (
     CSV_KEYS,
     Columns,
+    CsvFile,
+    CsvValues,
     also,
     columns_of_table,
     complete_rows,
@@ -26,7 +29,6 @@ from .columns import (
     csv_form,
     misspelt_column,
     read_cells,
-    read_csv_of,
     split_header,
 )
 from .draft import Draft, Measurements
@@ -364,28 +366,27 @@ def _column_of(header: str, outputs: Sequence[str], models: Mapping[str, ForceMo
     return _Column("input", str(name), replace(quantity, infinite=False))
 
 
-def read_data_file(draft: Draft) -> tuple[dict[KeyPath, object], list[ConfigError], list[str]]:
-    """Read the file of [data], as `columns.read_files` reads others."""
+def csv_files(draft: Draft) -> Iterator[CsvFile]:
+    """Yield the file of [data], as `columns.csv_files` yields others."""
     table = draft.table("data")
-    if not isinstance(table.get("file"), str) or not _are_headers(table.get("columns", {})):
-        return {}, [], []
-    headers = as_table(table.get("columns"))
-    try:
-        wanted = tuple(headers.values()) if headers else None
-        columns = _mapped(read_csv_of(draft, table["file"], wanted, **csv_form(table)), headers)
-    except ConfigError as error:
-        return {}, [error], []
-    points, problems = _read_columns(columns, draft)
+    headers = table.get("columns", {})
+    if isinstance(table.get("file"), str) and _are_headers(headers):
+        wanted = tuple(headers.values()) or None
+        yield table["file"], wanted, csv_form(table), partial(_read_file, draft, headers)
+
+
+def _read_file(draft: Draft, headers: Mapping[str, str], columns: Columns) -> CsvValues:
+    """Read the columns of a file, some of which have other names in [data]."""
+    points, problems = _read_columns(_mapped(columns, headers), draft)
     if problems and not columns.is_known:
         # it may be any file, of which messages contain nothing
         problems = [(header, row, text[max(text.find("expected"), 0) :]) for header, row, text in problems]
     if problems:
         # a row is under the header of the file, which may have another name in [data]
         named = [(name if row is None else headers.get(name, name), row, text) for name, row, text in problems]
-        lines = (columns.problem(text, header, row) for header, row, text in named[:MAX_PROBLEMS])
-        return {}, [ConfigError(*lines)], []
+        raise ConfigError(*(columns.problem(text, header, row) for header, row, text in named[:MAX_PROBLEMS]))
     values = {column.header: list(column.values) for column in points.columns}
-    return {("data", "columns"): values, ("data", "lines"): list(points.lines)}, [], list(points.notes)
+    return {("data", "columns"): values, ("data", "lines"): list(points.lines)}, points.notes
 
 
 def _are_headers(value: object) -> bool:
