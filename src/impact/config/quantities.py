@@ -408,6 +408,7 @@ class Quantity:
     infinite: bool = False  # inf is allowed
     below: bool = False  # the interval excludes `most`
     words: tuple[str, ...] = ()  # it is one of these, and its number the position
+    default: float | None = None  # of a parameter of a law
 
     @property
     def expected(self) -> str:
@@ -459,7 +460,7 @@ class Quantity:
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> Any:
         # quantities with the same unit and interval share a type, whatever their meaning
-        of_any_meaning = replace(self, meaning="")
+        of_any_meaning = replace(self, meaning="", default=None)
         validated = number_type(of_any_meaning) if source is float else Annotated[Any, _any_form(of_any_meaning)]
         return handler.generate_schema(Annotated[validated, Field(description=self.description)])
 

@@ -401,27 +401,17 @@ def law_quantities(law: ForceModel | FrictionLaw) -> dict[str, Quantity]:
     """List the quantities of [model.KEY] or [friction.KEY]: the parameters, and K of a model with its own n."""
     has_own_n = isinstance(law, ForceModel) and law.exponent is not None
     return ({"K": LAW_STIFFNESS} if has_own_n else {}) | {
-        parameter.name: Quantity(
-            parameter.unit, parameter.meaning, parameter.least, parameter.most, words=parameter.choices
-        )
-        for parameter in law.parameters
+        p.name: Quantity(p.unit, p.meaning, p.least, p.most, words=p.choices, default=p.default)
+        for p in law.parameters
     }
 
 
-def _parameter_table(law: ForceModel | FrictionLaw) -> ParameterTable:
-    """List what the table [model.KEY] or [friction.KEY] of a law may contain."""
-    defaults = {parameter.name: parameter.default for parameter in law.parameters}
-    # a contact force and a friction law may have one key
-    name = law.key if isinstance(law, ForceModel) else f"friction_{law.key}"
-    return name, tuple((key, quantity, defaults.get(key)) for key, quantity in law_quantities(law).items())
-
-
-def _table_type(name: str, parameters: Iterable[tuple[str, Quantity, float | None]]) -> type[Table]:
+def _table_type(name: str, parameters: ParameterTable) -> type[Table]:
     """Create the type of [model.KEY] or [friction.KEY]; keys are aliases, as not every name can name a field."""
     fields: dict[str, Any] = {}
-    for index, (key, quantity, default) in enumerate(parameters):
+    for index, (key, quantity) in enumerate(parameters):
         kind = Annotated[Any, _words(quantity)] if quantity.words else Annotated[Numbers | None, quantity]
-        fields[f"field_{index}"] = (Annotated[kind, Field(alias=key)], default)
+        fields[f"field_{index}"] = (Annotated[kind, Field(alias=key)], quantity.default)
     return create_model(name, __base__=Table, **fields)
 
 
@@ -492,8 +482,8 @@ LAW_TABLES = {
     "model": 'models by name, "all", "family:NAME" or a pattern; after "!" those left out',
     "friction": "friction laws, as models: each model is paired with each of them",
 }
-# the name of a table of parameters, and of each parameter the key, quantity and default
-ParameterTable = tuple[str, tuple[tuple[str, Quantity, float | None], ...]]
+# the key and the quantity of each parameter
+ParameterTable = tuple[tuple[str, Quantity], ...]
 
 
 def laws_of(table: str, models: Mapping[str, ForceModel]) -> Mapping[str, ForceModel | FrictionLaw]:
@@ -512,7 +502,7 @@ def document_type(
         families = {f"family:{m.family}" for m in laws.values() if isinstance(m, ForceModel) and not m.same_as}
         # the words that choose laws
         names.append((*laws, "all", *sorted(families)))
-        tables.append(tuple((key, _parameter_table(laws[key])) for key in keys))
+        tables.append(tuple((key, tuple(law_quantities(laws[key]).items())) for key in keys))
     return _document_type(tuple(names), tuple(tables))
 
 
@@ -527,8 +517,10 @@ def _document_type(
         table.model_rebuild()
     fields: dict[str, Any] = {}
     for (name, description), words, parameters_of in zip(LAW_TABLES.items(), names, tables, strict=True):
+        # a contact force and a friction law may have one key
+        prefix = "friction_" if name == "friction" else ""
         columns: dict[str, Any] = {
-            f"field_{index}": (Annotated[_table_type(*parameters), Field(alias=key)], None)
+            f"field_{index}": (Annotated[_table_type(prefix + key, parameters), Field(alias=key)], None)
             for index, (key, parameters) in enumerate(parameters_of)
         }
         meaning = f"Parameters of {'friction laws' if name == 'friction' else 'models'}, by key."
