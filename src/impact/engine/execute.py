@@ -12,7 +12,7 @@ from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from dataclasses import asdict, dataclass
-from functools import lru_cache, partial
+from functools import lru_cache
 
 import numpy as np
 
@@ -59,9 +59,8 @@ def integrate_columns(law: PlanLaw, columns: Columns, solver: Solver) -> Integra
     """Integrate trajectories of a law; see `impact.engine.plan.Plan.columns_of`."""
     errors: dict[str, str] = {}
     values = {name: column for name, column in columns.items() if name not in ("n", "status")}
-    simulate_law: Callable[..., Record]
-    simulate_law = partial(simulate_friction, law) if isinstance(law, Pair) else partial(simulate, law)
-    return simulate_law(columns["n"], values, columns["status"], errors=errors, **asdict(solver)), errors
+    simulate_law: Callable[..., Record] = simulate_friction if isinstance(law, Pair) else simulate
+    return simulate_law(law, columns["n"], values, columns["status"], errors=errors, **asdict(solver)), errors
 
 
 def integrate_remotely(keys: Sequence[str], columns: Columns, context: WorkerContext) -> Integrated:
