@@ -82,6 +82,7 @@ LAWS_EXPECTED = {
     "friction law": 'a friction law, or a list of friction laws; "all" are all but those of one scheme',
 }
 L = TypeVar("L", ForceModel, FrictionLaw)
+Flag = Annotated[bool, Field(strict=True), expected("true or false")]
 
 
 MATERIAL_EXPECTED = "a material of [materials]"
@@ -241,20 +242,16 @@ class Solver:
     """How impacts are integrated."""
 
     rtol: Annotated[float, Quantity("1", "relative tolerance of the integration", 1e-13, 1e-4)] = DEFAULT_RTOL
-    max_steps: Annotated[
-        int, bounded_int(1, MAX_SOLVER_STEPS), Field(description="steps that one impact may take")
-    ] = 10_000
-    collapse: Annotated[
-        bool, Field(strict=True, description="integrate impacts that are the same once"), expected("true or false")
-    ] = True
-    core: Annotated[
-        str, read_as(Literal[CORES]), Field(description="NumPy, numba where it can, or the faster")
-    ] = "auto"
+    max_steps: Annotated[int, bounded_int(1, MAX_SOLVER_STEPS)] = Field(
+        default=10_000, description="steps that one impact may take"
+    )
+    collapse: Flag = Field(default=True, description="integrate impacts that are the same once")
+    core: Annotated[str, read_as(Literal[CORES])] = Field(
+        default="auto", description="NumPy, numba where it can, or the faster"
+    )
     integrator: Annotated[
-        Annotated[str, read_as(Literal[INTEGRATORS])],
-        known_name("an integrator", lambda info: INTEGRATORS),
-        Field(description="the continuous law with error control, or a scheme with a fixed step"),
-    ] = EXACT
+        str, read_as(Literal[INTEGRATORS]), known_name("an integrator", lambda info: INTEGRATORS)
+    ] = Field(default=EXACT, description="the continuous law with error control, or a scheme with a fixed step")
 
 
 OutputVariable = Annotated[Literal[*OUTPUTS], known_name("a variable of the result", lambda info: tuple(OUTPUTS))]  # type: ignore[valid-type]
@@ -276,21 +273,20 @@ class Output:
         BeforeValidator(
             _list_or_none, json_schema_input_type=Annotated[list[OutputVariable], Field(min_length=1)]
         ),
-        Field(description="else all but those stored on request; the status is always among them"),
-    ] = None
-    dtype: Annotated[
-        Literal["float64", "float32"], Field(description="of floating-point variables; coordinates are float64")
-    ] = "float64"
-    compression: Annotated[Literal["none", "gzip"], Field(description="of the variables")] = "none"
+    ] = Field(default=None, description="else all but those stored on request; the status is always among them")
+    dtype: Literal["float64", "float32"] = Field(
+        default="float64", description="of floating-point variables; coordinates are float64"
+    )
+    compression: Literal["none", "gzip"] = Field(default="none", description="of the variables")
     chunks: Annotated[
         Mapping[str, Annotated[int, bounded_int(1, MAX_AXIS_VALUES)]],
         Field(description="lengths along axes, by name, of the chunks in which variables are stored"),
         expected("a table of lengths by axis, such as { e = 50 }"),
     ] = field(default_factory=dict)
-    layout: Annotated[
-        Literal["auto", "full", "factored"],
-        Field(description="all values, or the trajectories from which they are computed when they are read"),
-    ] = "auto"
+    layout: Literal["auto", "full", "factored"] = Field(
+        default="auto",
+        description="all values, or the trajectories from which they are computed when they are read",
+    )
 
     @property
     def is_full(self) -> bool:
@@ -349,11 +345,7 @@ class Data(Table):
         Any, read_as(Literal[MISSING_ROWS]), known_name("what becomes of rows", lambda info: MISSING_ROWS)
     ] = Field(None, description="a row without a value is left out (skip, the default), or an error")
     g: Annotated[float, GRAVITY] = STANDARD_GRAVITY
-    fit: Annotated[
-        bool,
-        Field(strict=True, description="fit all parameters of the laws, and e, that the config does not have"),
-        expected("true or false"),
-    ] = False
+    fit: Flag = Field(False, description="fit all parameters of the laws, and e, that the config does not have")
     lines: Annotated[
         Any, read_as(list[Annotated[int, bounded_int(1)]]), expected("a list of the numbers of lines")
     ] = Field(None, description="the line of each point in the file, if the values are in columns")
@@ -375,13 +367,10 @@ class Design(Table):
     """How many samples of uncertain inputs are drawn, and by which method."""
 
     method: Annotated[
-        str,
-        read_as(Literal[DESIGN_METHODS]),
-        known_name("a method", lambda info: DESIGN_METHODS),
-        Field(description="scrambled Sobol or Halton sequence, Latin hypercube, or independent samples"),
-    ] = "sobol"
-    n: Annotated[int, bounded_int(1, MAX_SAMPLES), Field(description="samples; a power of two for sobol")]
-    seed: Annotated[int, bounded_int(0, 2**63 - 1), Field(description="of the random numbers")] = 0
+        str, read_as(Literal[DESIGN_METHODS]), known_name("a method", lambda info: DESIGN_METHODS)
+    ] = Field("sobol", description="scrambled Sobol or Halton sequence, Latin hypercube, or independent samples")
+    n: Annotated[int, bounded_int(1, MAX_SAMPLES)] = Field(description="samples; a power of two for sobol")
+    seed: Annotated[int, bounded_int(0, 2**63 - 1)] = Field(0, description="of the random numbers")
 
     @model_validator(mode="after")
     def _check_n(self) -> Design:
