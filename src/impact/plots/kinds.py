@@ -40,7 +40,7 @@ KINDS = {
     "psi": "oblique",
     "friction-loop": "oblique",
     "calibration": "studies",
-    "uncertainty": "uncertainty",
+    "uncertainty": "studies",
     "sensitivity": "studies",
 }
 # sources, see `source_of`, that have a picture of their own and no other
