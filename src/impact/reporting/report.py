@@ -200,22 +200,15 @@ def _library_material(change: str) -> str:
 
 def _board_page(dataset: xr.Dataset) -> str:
     """Write a board as one page of HTML."""
-    board = Board(dataset)
-    engines = board.engines
+    engines = Board(dataset).engines
     return template("board.html.j2").render(
         title=page_title(dataset),
-        names=[engine["engine"] for engine in engines],
-        rows=board_rows(engines),
+        engines=engines,
+        board_rows=board_rows(engines),
+        headline=engine_headline,
         headings=list(BOARD_HEADINGS),
-        engines=[
-            {
-                "name": f"{engine['engine']} {engine['version']}",
-                "headline": f"{engine_headline(engine)}.",
-                "rows": check_rows(engine),
-                "lines": failure_lines(engine),
-            }
-            for engine in engines
-        ],
+        check_rows=check_rows,
+        failure_lines=failure_lines,
         facts=_facts(dataset),
         running_title=_css_text(page_title(dataset)),
     )
