@@ -127,6 +127,7 @@ def plot(
     check_choice(choice, [find_kind(kind)])
     plot_data = get_plot_data(dataset, kind, choice, plugins)
     check_log(log, [plot_data])
+    check_labels(look.labels or {}, label_keys(plot_data, look))
     return draw(plot_data, look, None if points is None else read_points(points), ax)
 
 
@@ -166,8 +167,7 @@ def draw(
     points: Points | None = None,
     ax: Axes | Sequence[Axes] | None = None,
 ) -> Figure:
-    """Draw a picture, in a new figure or into the user's axes."""
-    check_labels(look.labels or {}, label_keys(plot_data, look))
+    """Draw a picture, in a new figure or into the user's axes; labels of names that it has not are ignored."""
     all_axes: list[Axes] = [] if ax is None else list(np.ravel(np.asarray(ax, object)))
     if ax is not None and len(all_axes) != plot_data.panel_count:
         raise UsageError(f"ax: got {len(all_axes)} axes, expected {plot_data.panel_count}, one for each panel")
@@ -365,10 +365,8 @@ def plot_to_files(
         check_labels(look.labels or {}, set().union(*(label_keys(shown, look) for shown in plot_data.values())))
     pictures: dict[str, Path] = {}
     for kind, shown in plot_data.items():
-        keys = label_keys(shown, look)
-        own_look = replace(look, labels={key: text for key, text in (labels or {}).items() if key in keys})
         try:
-            figure = draw(shown, own_look, measured)
+            figure = draw(shown, look, measured)
             if table:
                 frame = shown.long_table() if data_form == "long" else shown.wide_table()
                 numbers = encode_frame(frame, table.suffix.lower(), table_form)
