@@ -21,28 +21,15 @@ if TYPE_CHECKING:
 
     from .data import PlotData
 
-# the module of each kind
-KINDS = {
-    "final-velocities": "restitution",
-    "restitution": "restitution",
-    "error": "restitution",
-    "timestep": "restitution",
-    "map": "maps",
-    "validity": "maps",
-    "loop": "motions",
-    "history": "motions",
-    "impulse": "motions",
-    "animation": "motions",
-    "beta": "oblique",
-    "e-t": "oblique",
-    "impulse-ratio": "oblique",
-    "spin": "oblique",
-    "psi": "oblique",
-    "friction-loop": "oblique",
-    "calibration": "studies",
-    "uncertainty": "studies",
-    "sensitivity": "studies",
+# the kinds of each module
+MODULES = {
+    "restitution": ("final-velocities", "restitution", "error", "timestep"),
+    "maps": ("map", "validity"),
+    "motions": ("loop", "history", "impulse", "animation"),
+    "oblique": ("beta", "e-t", "impulse-ratio", "spin", "psi", "friction-loop"),
+    "studies": ("calibration", "uncertainty", "sensitivity"),
 }
+KINDS = {kind: module for module, kinds in MODULES.items() for kind in kinds}
 # sources, see `source_of`, that have a picture of their own and no other
 STUDIES = ("calibration", "sensitivity study")
 # width of one and of two columns of a journal [in]
