@@ -79,14 +79,8 @@ class Verification(Displayed):
     def sections(self, width: int) -> Iterator[Block]:
         """A row for each time step and phase, and whether the code agrees."""
         rows = [
-            (
-                number(row["dt"]),
-                number(row["phase"]),
-                decimals(row["measured"], 12),
-                decimals(row["predicted"], 12),
-                number(row["measured"] - row["predicted"], 2),
-            )
-            for row in self.records()
+            (dt, phase, decimals(measured, 12), decimals(predicted, 12), number(measured - predicted, 2))
+            for dt, phase, measured, predicted, *_ in (row.values() for row in self.records())
         ]
         yield Table(rows, ("dt [s]", "phase", "measured", "predicted", "difference"), text=(0,))
         yield ""
