@@ -170,14 +170,7 @@ def prepare_export(
         notes.append(f"defaults of Table 1 of the paper: {', '.join(defaults)}")
     if fixed.first:
         notes.append(first_values_line(fixed.first))
-    return ExportProblem(
-        code=code,
-        version=version,
-        law=fixed,
-        notes=tuple(notes),
-        better_fit=better_fit,
-        left_out=left_out,
-    )
+    return ExportProblem(code, version, fixed, tuple(notes), better_fit, left_out)
 
 
 def _with_parameters(source: PointSource, key: str) -> PointSource:
