@@ -24,19 +24,10 @@ SETTINGS = {
 }
 # the default of ChContactMaterialSMC, taken where only the stiffness of the contact is known
 POISSON_RATIO = 0.3
-# releases whose sources were read; the material and the namespace of ChCollisionInfo were renamed in the second
-OLDEST, RENAMED_SINCE = (6, 0), (9, 0)
+# major releases: the oldest whose sources were read, and that with new names of the material and ChCollisionInfo
+OLDEST, RENAMED_SINCE = 6, 9
 # mass of a fixed body over the mass of the other one
 FIXED_MASS_RATIO = 1e9
-
-
-def version_numbers(version: str) -> tuple[int, ...]:
-    """Split a release into its numbers.
-
-    >>> version_numbers("9.0.1")
-    (9, 0, 1)
-    """
-    return tuple(map(int, version.split(".")))
 
 
 def read_version(text: str) -> str:
@@ -45,10 +36,10 @@ def read_version(text: str) -> str:
     >>> read_version("v9.0.1")
     '9.0.1'
     """
-    match = re.fullmatch(r"v?(\d+\.\d+(\.\d+)?)", text)
+    match = re.fullmatch(r"v?((\d+)\.\d+(\.\d+)?)", text)
     if match is None:
         raise UsageError(f'got "{text}", expected a release, such as 9.0.1')
-    if version_numbers(match[1]) < OLDEST:
+    if int(match[2]) < OLDEST:
         raise UsageError(f"got {match[1]}, expected 6.0.0 or later: older releases were not read")
     return match[1]
 
@@ -94,7 +85,7 @@ def coefficients(c: Collision) -> dict[str, float | str]:
 
 def lines(collision: Collision, parameters: Parameters) -> Lines:
     system, force, _ = SETTINGS[collision.model.key]
-    new_names = version_numbers(collision.version) >= RENAMED_SINCE
+    new_names = int(collision.version.partition(".")[0]) >= RENAMED_SINCE
     material_class = "ChContactMaterialSMC" if new_names else "ChMaterialSurfaceSMC"
     info = "ChCollisionInfo" if new_names else "collision::ChCollisionInfo"
     names = ["material1", "material2"] if "YoungModulus2" in parameters else ["material"]
