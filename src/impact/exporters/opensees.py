@@ -76,11 +76,9 @@ def lines(collision: Collision, parameters: Parameters) -> Lines:
 
 
 def notes(collision: Collision) -> Lines:
-    yield (
-        "in SI; the order of the arguments is that of the element: "
-        f"{', '.join(name for name in parameters(collision) if name != 'n')}, gap"
-        + (", n" if "n" in parameters(collision) else "")
-    )
+    names = list(parameters(collision))
+    names.insert(-1 if "n" in names else len(names), "gap")
+    yield f"in SI; the order of the arguments is that of the element: {', '.join(names)}"
     yield "compression is negative: the gap, and delta_y, are numbers below 0; set the gap to yours"
     if collision.model.key == "opensees-jankowski-impact":
         yield "Meff is the effective mass m1 m2/(m1 + m2), not the sum"
