@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -32,8 +32,8 @@ from ..formatting import number, safe_text
 
 Kind = Literal["sweep", "history", "calibration", "sensitivity study", "board"]
 
-# kinds of results that are neither a sweep nor a single impact
-STUDIES: tuple[Kind, ...] = ("calibration", "sensitivity study", "board")
+# kinds of results that are neither a sweep nor a single impact, and the dimension that only each of them has
+STUDIES: Mapping[Kind, str] = {"calibration": "parameter", "board": "check", "sensitivity study": "input"}
 
 SCHEMA_VERSION = 2
 # longer lists of models with another exponent are abbreviated
@@ -59,27 +59,25 @@ CALIBRATION = by_name(
     _parameter_variable("estimate", "best value of the parameter; NaN where the law does not have it"),
     _parameter_variable("lower", "lower end of the interval of 95 % by profile likelihood"),
     _parameter_variable("upper", "upper end of the interval of 95 % by profile likelihood"),
-    Variable(
+    _parameter_variable(
         "covariance",
         "covariance in the linear approximation",
-        (*_PARAMETER_DIMS, "other_parameter"),
-        "SI",
-        "deviations",
+        dims=(*_PARAMETER_DIMS, "other_parameter"),
+        scale="deviations",
     ),
-    Variable(
+    _parameter_variable(
         "identifiable",
         "1 if the data determine the parameter, -1 if it is not the law's",
-        _PARAMETER_DIMS,
+        unit="1",
         scale="exact",
         dtype="i1",
     ),
-    Variable(
+    _law_variable(
         "fit_status",
         "outcome of the fit",
-        ("model",),
         scale="exact",
         dtype="i1",
-        flags={name: number for number, name in enumerate(FIT_STATUSES)},
+        flags={name: i for i, name in enumerate(FIT_STATUSES)},
     ),
     _law_variable("chi2_reduced", "squared residuals in variances per degree of freedom"),
     _law_variable("p_value", "probability of a larger chi2 by the noise alone", is_new=True),
@@ -124,17 +122,16 @@ SENSITIVITY = by_name(
 )
 # what became of a check
 CHECK_STATUSES = {"pass": 0, "fail": 1, "not_supported": 2}
-_CHECKS = ("engine", "check")
+_check_variable = partial(Variable, dims=("engine", "check"), scale="exact")
 BOARD = by_name(
-    Variable("asked", "what the check asks for", _CHECKS, scale="reported"),
-    Variable(
+    _check_variable("asked", "what the check asks for", scale="reported"),
+    _check_variable(
         "delivered",
         "what the engine delivered; NaN where it does not support the collision",
-        _CHECKS,
         scale="max(1, itself)",
     ),
-    Variable("tolerance", "tolerance of the check", _CHECKS, scale="exact"),
-    Variable("check_status", "outcome of the check", _CHECKS, scale="exact", dtype="i1", flags=CHECK_STATUSES),
+    _check_variable("tolerance", "tolerance of the check"),
+    _check_variable("check_status", "outcome of the check", dtype="i1", flags=CHECK_STATUSES),
 )
 # the variables of each kind of dataset, by name
 SCHEMA: Mapping[Kind, Mapping[str, Variable]] = {
@@ -144,7 +141,7 @@ SCHEMA: Mapping[Kind, Mapping[str, Variable]] = {
     "sensitivity study": SENSITIVITY,
     "board": BOARD,
 }
-# coordinates of studies besides those of models and inputs, with their dimensions; the first is the study's axis
+# coordinates of studies besides those of models and inputs, with their dimensions
 STUDY_COORDINATES: Mapping[Kind, Mapping[str, str]] = {
     "calibration": {
         **{name: name for name in ("parameter", "other_parameter", "point", "grid", "output_name")},
@@ -173,11 +170,7 @@ def kind_of(dataset: xr.Dataset) -> Kind:
     """Find the kind of a dataset by its dimensions."""
     if "t" in dataset.dims:
         return "history"
-    if "parameter" in dataset.dims:
-        return "calibration"
-    if "check" in dataset.dims:
-        return "board"
-    return "sensitivity study" if "input" in dataset.dims else "sweep"
+    return next((kind for kind, dim in STUDIES.items() if dim in dataset.dims), "sweep")
 
 
 def require_result(dataset: xr.Dataset) -> None:
@@ -218,25 +211,25 @@ def scale_of(variable: Variable, read: Callable[[str], NDArray[Any]], *, has_pea
     def number(name: str) -> NDArray[np.float64]:
         return np.asarray(read(name), float)
 
+    scale: NDArray[np.float64] | float = 1.0
     match variable.scale:
         case "v0":
-            return np.asarray(np.abs(number("v1") - number("v2")))
+            scale = np.abs(number("v1") - number("v2"))
         case "m v0^2/2":
             v0 = number("v1") - number("v2")
-            return np.asarray(0.5 * effective_mass(number("m1"), number("m2")) * v0 * v0)
+            scale = 0.5 * effective_mass(number("m1"), number("m2")) * v0 * v0
         case "the slip":
-            return np.abs(number("v1") - number("v2")) + _slip_before(number)
+            scale = np.abs(number("v1") - number("v2")) + _slip_before(number)
         case "the spin":
             speed = np.abs(number("v1") - number("v2")) + _slip_before(number)
-            return np.asarray(speed / number(f"R{variable.name[len('omega')]}"))
+            scale = speed / number(f"R{variable.name[len('omega')]}")
         case "m (v0^2 + g0^2)/2":
             v0, slip = number("v1") - number("v2"), _slip_before(number)
-            return np.asarray(0.5 * effective_mass(number("m1"), number("m2")) * (v0 * v0 + slip * slip))
-        case "the peak" if has_peak:
-            return np.asarray(np.abs(number("peak_indentation")))
+            scale = 0.5 * effective_mass(number("m1"), number("m2")) * (v0 * v0 + slip * slip)
         case "itself" | "the peak":
-            return np.asarray(np.abs(number(variable.name)))
-    return np.ones(())
+            is_peak = has_peak and variable.scale == "the peak"
+            scale = np.abs(number("peak_indentation" if is_peak else variable.name))
+    return np.asarray(scale)
 
 
 def inputs_of_scale(variable: Variable) -> set[str]:
@@ -245,14 +238,9 @@ def inputs_of_scale(variable: Variable) -> set[str]:
     >>> sorted(inputs_of_scale(OUTPUTS["v1_post"])), inputs_of_scale(OUTPUTS["peak_indentation"])
     (['v1', 'v2'], {'peak_indentation'})
     """
-    names: set[str] = set()
-
-    def read(name: str) -> NDArray[np.float64]:
-        names.add(name)
-        return np.ones(())
-
-    scale_of(variable, read, has_peak=True)
-    return names
+    names = defaultdict[str, NDArray[np.float64]](lambda: np.ones(()))
+    scale_of(variable, names.__getitem__, has_peak=True)
+    return {*names}
 
 
 def _slip_before(read: Callable[[str], NDArray[np.float64]]) -> NDArray[np.float64]:

@@ -19,7 +19,7 @@ from ..contact.variables import AXES, LAW_DIMS, OUTPUTS
 from ..errors import ResultError
 from ..formatting import safe_text
 from .attributes import ATTRIBUTE_TYPES, read_attribute
-from .schema import CALIBRATION_TEXTS, MODEL_METADATA, SCHEMA, STUDY_COORDINATES, Kind, is_case, kind_of
+from .schema import CALIBRATION_TEXTS, MODEL_METADATA, SCHEMA, STUDIES, STUDY_COORDINATES, Kind, is_case, kind_of
 from .slabs import is_computed, slabs
 
 TEXT_COORDINATES = frozenset(
@@ -184,7 +184,7 @@ def _study_violations(dataset: xr.Dataset) -> Iterator[str]:
     for study, coordinates in STUDY_COORDINATES.items():
         names = sorted((SCHEMA[study].keys() | coordinates.keys()) & set(dataset.variables))
         if study != kind and names:
-            yield f"{', '.join(names)}: of a {study}, which has the axis {next(iter(coordinates))}"
+            yield f"{', '.join(names)}: of a {study}, which has the axis {STUDIES[study]}"
     if kind not in STUDY_COORDINATES:
         return
     # what a study may lack
