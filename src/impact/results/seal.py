@@ -14,9 +14,11 @@ relative to the end of the user block.
 from __future__ import annotations
 
 import hashlib
+import io
 import itertools
 import math
 import struct
+from bisect import bisect_right
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -190,11 +192,10 @@ def _messages(read: ReadBytes, address: int) -> Iterator[tuple[int, int, bytes]]
         if start in starts or total > MAX_HEADER_BYTES:
             raise ValueError
         starts.add(start)
-        content, position = read(start, size), 0
-        while position + prefix.size <= size:
-            kind, length, flags = prefix.unpack_from(content, position)
-            position += prefix.size + length
-            body = content[position - length : position]
+        content = io.BytesIO(read(start, size))
+        while len(begin := content.read(prefix.size)) == prefix.size:
+            kind, length, flags = prefix.unpack(begin)
+            body = content.read(length)
             if kind == CONTINUATION:
                 start_of_next, size_of_next = struct.unpack_from("<QQ", body)
                 # a signature and a checksum
@@ -229,21 +230,18 @@ def _check_dense_storage(read: ReadBytes, body: bytes, kind: int) -> None:
     if kind == LINK_INFO:
         return
     offset_bytes = (bits + 7) // 8
-    blocks = [(root, smallest)]
+    addresses: tuple[int, ...] = (root,)
     if rows:
         start, children = root + 13 + offset_bytes, width * rows
         addresses = struct.unpack(f"<{children}Q", read(start, 8 * children))
-        blocks = [(address, smallest << max(n // width - 1, 0)) for n, address in enumerate(addresses)]
+    # blocks of the first two rows have the smallest size, those of each further row twice that of the one before
+    sizes = (smallest << max(n // width - 1, 0) for n in range(len(addresses)))
+    offsets = [0, *itertools.accumulate(sizes)]
     for record in itertools.chain(*indices):
         place, offset = record[0] >> 4, int.from_bytes(record[1 : 1 + offset_bytes], "little")
         if place == IN_BLOCK:
-            for address, size in blocks:
-                if offset < size:
-                    _check_attribute(read(address + offset, 2))
-                    break
-                offset -= size
-            else:
-                raise ValueError
+            block = bisect_right(offsets, offset) - 1
+            _check_attribute(read(addresses[block] + offset - offsets[block], 2))
         elif place != HUGE:
             raise ValueError
     for record in huge:
@@ -267,20 +265,20 @@ def _records(read: ReadBytes, address: int) -> list[bytes]:
     records: list[bytes] = []
 
     def follow(address: int, level: int, n: int) -> None:
-        content = read(address, node_bytes)
-        if content[:4] != (b"BTIN" if level else b"BTLF") or n > limits[level] or address in addresses:
+        content = io.BytesIO(read(address, node_bytes))
+        signature = content.read(6)[:4]
+        if signature != (b"BTIN" if level else b"BTLF") or n > limits[level] or address in addresses:
             raise ValueError
         addresses.add(address)
-        records.extend(content[6 + i * record_bytes : 6 + (i + 1) * record_bytes] for i in range(n))
-        position = 6 + n * record_bytes
+        records.extend(content.read(record_bytes) for _ in range(n))
         for _ in range(n + 1 if level else 0):
-            (child,) = struct.unpack_from("<Q", content, position)
-            middle, end = position + 8 + _width(limits[0]), position + 8 + _width(limits[0]) + widths[level - 1]
+            child, n_child, n_below = (
+                int.from_bytes(content.read(size), "little") for size in (8, _width(limits[0]), widths[level - 1])
+            )
             before = len(records)
-            follow(child, level - 1, int.from_bytes(content[position + 8 : middle], "little"))
-            if level > 1 and len(records) - before != int.from_bytes(content[middle:end], "little"):
+            follow(child, level - 1, n_child)
+            if level > 1 and len(records) - before != n_below:
                 raise ValueError
-            position = end
 
     if root != UNDEFINED:
         follow(root, depth, n_root)
@@ -304,25 +302,19 @@ def _count_stored_chunks(read: ReadBytes, layout: bytes) -> int | None:
     rank, root = struct.unpack_from("<BQ", layout, 2)
     if root == UNDEFINED:
         return 0
-    key_bytes = 8 + 8 * rank
-    chunks, count, addresses, nodes = 0, 1, {root}, [(root, -1)]
+    # a key, and the address of a node or a chunk
+    entry = struct.Struct(f"<{8 + 8 * rank}xQ")
+    chunks, addresses, nodes = 0, set(), [(root, -1)]
     while nodes:
         address, expected_level = nodes.pop()
         signature, kind, level, entries = B_TREE_1.unpack(read(address, B_TREE_1.size))
-        is_expected = expected_level in (-1, level)
-        if (signature, kind) != (b"TREE", 1) or not is_expected or not 0 < entries <= MAX_CHUNK_ENTRIES:
+        is_node = (signature, kind) == (b"TREE", 1) and expected_level in (-1, level)
+        if not is_node or not 0 < entries <= MAX_CHUNK_ENTRIES or address in addresses:
             raise ValueError
+        addresses.add(address)
         if level == 0:
             chunks += entries
-            continue
-        content = read(address + B_TREE_1.size, entries * (key_bytes + 8))
-        children = [
-            int.from_bytes(content[position : position + 8], "little")
-            for position in range(key_bytes, len(content), key_bytes + 8)
-        ]
-        nodes.extend((child, level - 1) for child in children)
-        addresses.update(children)
-        count += len(children)
-        if len(addresses) < count:
-            raise ValueError
+        else:
+            children = entry.iter_unpack(read(address + B_TREE_1.size, entries * entry.size))
+            nodes.extend((child, level - 1) for (child,) in children)
     return chunks
