@@ -27,6 +27,7 @@ from ..errors import ResultError
 from ..formatting import safe_text
 from .schema import SCHEMA_VERSION
 from .seal import USER_BLOCK_BYTES, ReadBytes, check_object
+from .slabs import slabs
 from .trajectory_table import check_memory
 from .validation import TABLE_VARIABLES, is_name
 
@@ -57,10 +58,9 @@ def write_dataset(sink: Sink, template: xr.Dataset, values: Iterable[RegionValue
         h5netcdf.File(plain, "w") as file,
     ):
         texts = {name: encode_text(variable) for name, variable in template.coords.items() if is_text(variable)}
-        widths = dict.fromkeys(sorted(values.shape[-1] for values in texts.values()))
         file.dimensions = {
             **{str(name): size for name, size in template.sizes.items()},
-            **{f"string{width}": width for width in widths},
+            **{f"string{width}": width for width in sorted(text.shape[-1] for text in texts.values())},
         }
         coordinates = {
             str(name): {*variable.dims}
@@ -118,20 +118,12 @@ def _storage_options(variable: xr.DataArray, output: Output) -> dict[str, Any]:
     """Choose the options of a variable: contiguous unless the config sets compression or chunks."""
     if not variable.ndim or (output.compression == "none" and not output.chunks):
         return {}
-    if output.chunks:
-        lengths = {"model": 1, **output.chunks}
-        chunks = tuple(min(lengths.get(str(dim), size), size) for dim, size in variable.sizes.items())
-    else:
-        # whole along the last axes, of length one along the first
-        chunks, values_left = (), CHUNK_VALUES
-        for dim, size in reversed(list(variable.sizes.items())):
-            length = 1 if dim == "model" else max(min(size, values_left), 1)
-            chunks = (length, *chunks)
-            values_left //= size
-    packed = (
-        {"compression": "gzip", "compression_opts": 4, "shuffle": True} if output.compression == "gzip" else {}
-    )
-    return {"chunks": chunks, **packed}
+    lengths = {"model": 1, **output.chunks}
+    sizes = {dim: min(lengths.get(str(dim), size), size) for dim, size in variable.sizes.items()}
+    # by default whole along the last axes, of length one along the first
+    chunk = sizes if output.chunks else {dim: part.stop for dim, part in next(slabs(sizes, CHUNK_VALUES)).items()}
+    packed = {"compression": "gzip", "compression_opts": 4, "shuffle": True}
+    return {"chunks": tuple(chunk.values()), **(packed if output.compression == "gzip" else {})}
 
 
 class StoredArray(BackendArray):
@@ -188,9 +180,9 @@ def read_variables(
 ) -> tuple[dict[str, xr.Variable], dict[str, object], tuple[str, ...]]:
     """Read variables, whose numbers are read when indexed, attributes, and names that are not part of a result."""
     _check_schema_version(file)
-    opened, stored_chunks = _open_datasets(file, read)
-    datasets = {name: h5py.Dataset(dataset) for name, dataset in opened.items()}
-    dims = _check_sizes(file, datasets, stored_chunks)
+    datasets, stored_chunks = _open_datasets(file, read)
+    _check_sizes(file, datasets, stored_chunks)
+    dims = _dims_by_dataset(datasets)
     accepted = {name: dataset for name, dataset in datasets.items() if is_name(name)}
     # a dimension without coordinates is a dataset in the file as well, without values
     unknown = [
@@ -234,13 +226,12 @@ def _check_schema_version(file: h5py.File) -> None:
         raise ResultError(f"has schema version {version}, this program reads {SCHEMA_VERSION}")
 
 
-def _open_datasets(file: h5py.File, read: ReadBytes) -> tuple[dict[str, h5d.DatasetID], dict[str, int | None]]:
+def _open_datasets(file: h5py.File, read: ReadBytes) -> tuple[dict[str, h5py.Dataset], dict[str, int | None]]:
     """Open the datasets, and count their stored chunks; follow only checked hard links to different objects."""
     root = file.id
     if root.get_num_objs() > MAX_DATASETS:
         raise _unreadable(f"more than {MAX_DATASETS:,} datasets")
-    datasets: dict[str, h5d.DatasetID] = {}
-    stored_chunks: dict[str, int | None] = {}
+    datasets, stored_chunks = dict[str, h5py.Dataset](), dict[str, int | None]()
     objects = set()
     for link in root:
         name = link.decode(errors="surrogateescape")
@@ -249,9 +240,10 @@ def _open_datasets(file: h5py.File, read: ReadBytes) -> tuple[dict[str, h5d.Data
             raise _unreadable("not a hard link", name)
         objects.add(info.u)
         stored_chunks[name] = check_object(read, info.u, name)
-        datasets[name] = h5o.open(root, link)
-        if not isinstance(datasets[name], h5d.DatasetID):
+        opened = h5o.open(root, link)
+        if not isinstance(opened, h5d.DatasetID):
             raise _unreadable("not a dataset", name)
+        datasets[name] = h5py.Dataset(opened)
     if len(objects) < len(datasets):
         raise _unreadable("a dataset with two names")
     return datasets, stored_chunks
@@ -259,32 +251,26 @@ def _open_datasets(file: h5py.File, read: ReadBytes) -> tuple[dict[str, h5d.Data
 
 def _check_sizes(
     file: h5py.File, datasets: Mapping[str, h5py.Dataset], stored_chunks: Mapping[str, int | None]
-) -> dict[str, tuple[str, ...]]:
-    """Check that the file itself holds all data; return the dimensions of each dataset."""
-    size = file.id.get_filesize()
-    chunks = compressed = plain = text = 0
-    missing = []
-    for name, dataset in datasets.items():
-        declared = _declared_bytes(name, dataset.id)
-        if dataset.chunks:
-            count = math.prod(-(-n // c) for n, c in zip(dataset.shape, dataset.chunks, strict=True))
-            chunks += count
-            # missing chunks would be read as zeros, at no cost in the file
-            missing += [name] if stored_chunks[name] != count else []
-        if dataset.compression:
-            compressed += declared
-        else:
-            plain += declared
-        text += declared if dataset.dtype.kind == "S" else 0
-    if plain > size or compressed > max(ALWAYS_ALLOWED_BYTES, MAX_COMPRESSION_RATIO * size):
+) -> None:
+    """Check that the file itself holds all data."""
+    size, declared = file.id.get_filesize(), {name: _declared_bytes(name, d.id) for name, d in datasets.items()}
+    compressed = sum(declared[name] for name, dataset in datasets.items() if dataset.compression)
+    chunks = {
+        name: math.prod(-(-n // c) for n, c in zip(dataset.shape, dataset.chunks, strict=True))
+        for name, dataset in datasets.items()
+        if dataset.chunks
+    }
+    is_plain_in_file = sum(declared.values()) - compressed <= size
+    if not is_plain_in_file or compressed > max(ALWAYS_ALLOWED_BYTES, MAX_COMPRESSION_RATIO * size):
         raise _unreadable("declares more data than a file of this size can contain")
-    if chunks > MAX_CHUNKS_OF_FILE:
+    if sum(chunks.values()) > MAX_CHUNKS_OF_FILE:
         raise _unreadable(f"more than {MAX_CHUNKS_OF_FILE:,} chunks")
-    if missing:
-        raise _unreadable("declares data that the file does not contain", missing[0])
-    if text > MAX_LABEL_BYTES:
+    for name, count in chunks.items():
+        # missing chunks would be read as zeros, at no cost in the file
+        if stored_chunks[name] != count:
+            raise _unreadable("declares data that the file does not contain", name)
+    if sum(declared[name] for name, dataset in datasets.items() if dataset.dtype.kind == "S") > MAX_LABEL_BYTES:
         raise _unreadable(f"more than {MAX_LABEL_BYTES:,} bytes of labels")
-    return _dims_by_dataset(datasets)
 
 
 def _is_number_type(kind: h5t.TypeID) -> bool:
