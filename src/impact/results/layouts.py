@@ -331,11 +331,9 @@ def _check_summary(summary: SummaryRecord, dataset: xr.Dataset, shape: tuple[int
 
 def _check_trajectory_statuses(record: type[Record], array: StoredArray) -> None:
     """Refuse unknown statuses, since the computed ones would be unknown as well."""
-    # by the bits of a status
-    is_known = np.isin(np.arange(2**8), [*record.statuses])
     for first in range(0, array.shape[0], SLAB_ROWS):
         values = array.read((slice(first, first + SLAB_ROWS),))
-        if values.dtype != np.int8 or not is_known[values.view(np.uint8)].all():
+        if values.dtype != np.int8 or not np.isin(values, [*record.statuses]).all():
             raise ValueError
 
 
@@ -362,12 +360,13 @@ def read_inputs(dataset: xr.Dataset, axis_names: Sequence[str]) -> Inputs:
         else:
             raise ResultError(f"is not a readable result ({safe_text(name, 40)}: does not lie along one axis)")
     try:
-        stored = read_attribute(dataset.attrs, "materials", required=True)
-        materials = {}
-        for name, properties in stored.items():
+        materials = {
             # properties that are axes have no value
-            fixed = {key: value for key, value in properties.items() if value is not None}
-            materials[name] = Material(**{"E": np.nan, "nu": np.nan, **fixed})
+            name: Material(
+                **{"E": np.nan, "nu": np.nan} | {key: v for key, v in properties.items() if v is not None}
+            )
+            for name, properties in read_attribute(dataset.attrs, "materials", required=True).items()
+        }
     except (TypeError, ValueError):
         raise ResultError("is not a readable result (materials: not JSON of the expected type)") from None
     # an axis that is not numbered has the name of its first column

@@ -221,10 +221,9 @@ def checks_that_may_fail(inputs: Inputs, law: Law) -> frozenset[str]:
         ends[f"{law.key}.K"] = (float(K.min()), float(K.max()))
     if math.prod(map(len, ends.values())) > MAX_STIFFNESS_VALUES:
         return CHECKS
-    scalars = {name: value for name, value in inputs.scalars.items() if name not in OBLIQUE_INPUTS}
-    scalars |= {"v2": 0.0, "e": 1.0}
-    axes = tuple(Axis({name: values}) for name, values in ends.items())
-    corners = Inputs({name: scalars[name] for name in scalars.keys() - ends.keys()}, axes, inputs.materials)
+    scalars = {**inputs.scalars, "v2": 0.0, "e": 1.0}
+    fixed = {name: scalars[name] for name in scalars.keys() - ends.keys() - {*OBLIQUE_INPUTS}}
+    corners = Inputs(fixed, tuple(Axis({name: values}) for name, values in ends.items()), inputs.materials)
     with np.errstate(all="ignore"):
         impacts = build_impacts(corners, law, corners.index())
         sizes = [impacts.m, impacts.K, impacts.length, impacts.energy, impacts.time]
@@ -281,20 +280,19 @@ class ExpandedArray(BackendArray):
 
     def _read(self, key: tuple[Any, ...]) -> NDArray[Any]:
         positions = [np.atleast_1d(np.arange(size)[part]) for size, part in zip(self.shape, key, strict=True)]
-        shape = tuple(part.size for part in positions)
-        check_memory(self.variable.name, shape, self.dtype)
+        shape, name = tuple(part.size for part in positions), self.variable.name
+        check_memory(name, shape, self.dtype)
         values = np.empty(shape, self.dtype)
-        name, numbers = self.variable.name, self.table.numbers(self.variable.of_friction)
         outer, axes = positions[: len(self.outer)], positions[len(self.outer) :]
-        for row in np.ndindex(shape[: len(outer)]):
+        # what does not depend on the law is that of the first
+        laws = self.table.numbers(self.variable.of_friction)[: math.prod(self.outer)]
+        for row, number in np.ndenumerate(np.reshape(laws, self.outer)[np.ix_(*outer)]):
             # a view, also if there is no axis
             out = values[(*row, ...)]
-            place = [int(chosen[position]) for chosen, position in zip(outer, row, strict=True)]
-            number = numbers[int(np.ravel_multi_index(place, self.outer)) if place else 0]
             for slab in slabs(dict(enumerate(out.shape))):
                 region = tuple(slab.values())
                 index = np.ix_(*(axis[part] for axis, part in zip(axes, region, strict=True)))
-                out[region or ...] = expand(self.table, number, index, [name])[name]
+                out[region or ...] = expand(self.table, int(number), index, [name])[name]
         selected = tuple(0 if isinstance(part, int | np.integer) else slice(None) for part in key)
         return np.asarray(values[selected])
 
@@ -331,11 +329,10 @@ def lazy_dataset(template: xr.Dataset, table: TrajectoryTable, variables: Sequen
     """Build a result, from its coordinates and attributes, whose variables are computed when they are read."""
     axes = [axis.name for axis in table.inputs.axes]
     along = defaultdict[tuple[str, str], set[int]](set)
-    for of_friction in (False, True):
-        names = [variable.name for variable in variables if variable.of_friction == of_friction]
-        for number in table.numbers(of_friction) if names else ():
-            for name, varying in varies_along(table, number, names).items():
-                along[name, table.keys(number)[0]].update(varying)
+    for number in range(len(table.maps)):
+        names = [v.name for v in variables if v.of_friction == (number >= len(table.laws))]
+        for name, varying in varies_along(table, number, names).items():
+            along[name, table.keys(number)[0]].update(varying)
     computed = {}
     for variable in variables:
         dims = [*(dim for dim in variable.dims if dim != AXES), *axes]
@@ -395,11 +392,10 @@ def expanded_slabs(
 
 def in_memory(dataset: xr.Dataset) -> xr.Dataset:
     """Compute all values of a result that is computed from a trajectory table."""
-    computed = {str(name): computed_array(variable.variable) for name, variable in dataset.items()}
-    expanded = [array for array in computed.values() if array is not None]
-    values = {array.variable.name: np.empty(array.shape, array.dtype) for array in expanded}
+    computed = [array for v in dataset.values() if (array := computed_array(v.variable)) is not None]
+    values = {array.variable.name: np.empty(array.shape, array.dtype) for array in computed}
     # all variables of a slab together: they share most of the computation
-    for slab in expanded_slabs(expanded[0].table, [array.variable for array in expanded]):
+    for slab in expanded_slabs(computed[0].table, [array.variable for array in computed]):
         for name, part in slab.values.items():
             values[name][slab.region_in(dataset[name].dims) or ...] = part
     return dataset.assign(
