@@ -139,17 +139,11 @@ def _comparable_coordinates(result: xr.Dataset, other: xr.Dataset) -> xr.Dataset
         if axis not in coords.dims and axis in coords and coords[axis].ndim == 0:
             along = [name for name in other.coords if axis in other.variables[name].dims]
             names = MODEL_COORDINATES if axis == "model" else (axis, *along)
-            variables = {name: coords.variables[name] for name in names if name in coords}
-            coords = coords.assign_coords(
-                {n: xr.Variable((axis, *v.dims), v.values[np.newaxis], v.attrs) for n, v in variables.items()}
-            )
+            labels = {name: coords[name].expand_dims(axis).variable for name in names if name in coords}
+            coords = coords.assign_coords(labels)
     # an input that varies with a zip group in the other result only: repeat it along their common axis
     repeated = {
-        name: (
-            other[name].dims,
-            np.repeat(coords[name].values, coords.sizes[other[name].dims[0]]),
-            coords[name].attrs,
-        )
+        name: coords[name].expand_dims({dim: coords.sizes[dim] for dim in other[name].dims}).variable
         for name in coords.coords.keys() & other.coords.keys()
         if coords[name].ndim == 0 and other[name].ndim == 1 and other[name].dims[0] in coords.dims
     }
