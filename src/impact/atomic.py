@@ -188,11 +188,10 @@ def check_outputs(outputs: Iterable[str | Path | None], inputs: Iterable[object]
         raise UsageError(f"{path}: is named for two outputs")
 
 
-def check_result_name(path: str | Path) -> None:
+def check_result_name(path: str | Path | None) -> None:
     """Raise a UsageError, before any work, for a result with a name of another kind of file, such as a table."""
-    path = Path(path)
-    if path.suffix.lower() in FILE_SUFFIXES + PICTURE_SUFFIXES:
-        example = safe_text(path.with_suffix(".h5").name, 60)
+    if path is not None and Path(path).suffix.lower() in FILE_SUFFIXES + PICTURE_SUFFIXES:
+        example = safe_text(Path(path).with_suffix(".h5").name, 60)
         tables = "impact plot --data and to_dataframe make tables"
         raise UsageError(f"{path}: expected the name of a result, such as {example}; {tables}")
 

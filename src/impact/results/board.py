@@ -107,31 +107,29 @@ class Board(Displayed):
     @property
     def engines(self) -> list[dict[str, Any]]:
         """The facts, the checks and the counts of each engine."""
-        return [self._engine(position) for position in range(self.dataset.sizes["engine"])]
+        engines = []
+        for position in range(self.dataset.sizes["engine"]):
+            engine = self.dataset.isel(engine=position)
+            columns = [engine[name].values.tolist() for name in ("collision", "criterion", *NUMBERS)]
+            statuses = [[*COUNTED][status] for status in engine["check_status"].values.tolist()]
+            names = ("id", "check", *NUMBERS, "status")
+            checks = [dict(zip(names, check, strict=True)) for check in zip(*columns, statuses, strict=True)]
+            engines.append(
+                {
+                    "engine": str(engine["engine"].item()),
+                    "version": str(engine["engine_version"].item()),
+                    "set": str(engine.attrs["suite"]),
+                    "kind": str(engine["engine_kind"].item()),
+                    "checks": checks,
+                    "summary": {word: statuses.count(status) for status, word in COUNTED.items()},
+                }
+            )
+        return engines
 
     def as_dict(self) -> dict[str, Any]:
         """The JSON object of the command; of several engines, those of each under "engines"."""
         engines = self.engines
         return engines[0] if len(engines) == 1 else {"engines": engines}
-
-    def _engine(self, position: int) -> dict[str, Any]:
-        """The facts, the checks and the counts of one engine."""
-        engine = self.dataset.isel(engine=position)
-        columns = [engine[name].values.tolist() for name in ("collision", "criterion", *NUMBERS, "check_status")]
-        checks = [
-            dict(zip(("id", "check", *NUMBERS), values, strict=True)) | {"status": [*COUNTED][status]}
-            for *values, status in zip(*columns, strict=True)
-        ]
-        return {
-            "engine": str(engine["engine"].item()),
-            "version": str(engine["engine_version"].item()),
-            "set": str(engine.attrs["suite"]),
-            "kind": str(engine["engine_kind"].item()),
-            "checks": checks,
-            "summary": {
-                word: sum(check["status"] == status for check in checks) for status, word in COUNTED.items()
-            },
-        }
 
     def records(self) -> Sequence[Mapping[str, Any]]:
         """A row for each check of each engine."""

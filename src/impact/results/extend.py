@@ -132,8 +132,7 @@ def extend_to_file(
         backend or SERIAL, resume, overwrite, max_points, on_progress or ignore, should_stop=should_stop or never
     )
     check_outputs([target], plugins, overwrite=True)
-    if output is not None:
-        check_result_name(output)
+    check_result_name(output)
     plugin_set = read_plugins(plugins)
     name, changes = str(source), settings_of(overrides)
     with run.connected() as connected, open_result(source) as before:
@@ -210,9 +209,8 @@ def _extended_config(
 
 def _check_changes(old: Plan, new: Plan, name: str) -> None:
     """Refuse changes of anything but values of axes and models."""
-    old_physics, new_physics = dict(old.physics), dict(new.physics)
     free = ("models", "frictions", "axes", "scalars", "materials", "plugins")
-    changed = [key for key in old_physics if key not in free and old_physics[key] != new_physics[key]]
+    changed = [key for key, value in old.physics.items() if key not in free and value != new.physics[key]]
     used, swept = new.material_record, new.inputs.names()
     changed += [
         f"materials.{key}.{field}"
@@ -314,16 +312,16 @@ class ExtendedPlan(Plan):
         """The positions of the values of each axis in the old result."""
         return tuple(_axis_positions(axis, self.old.inputs, self.name) for axis in self.config.axes)
 
-    def old_law(self, number: int) -> int | None:
-        """Find the number that a model or a pair had in the old plan, or None."""
-        keys = [keys_of(law) for law in self.old.laws]
-        of_law = keys_of(self.laws[number])
-        return keys.index(of_law) if of_law in keys else None
+    @cached_property
+    def old_laws(self) -> tuple[int | None, ...]:
+        """The number that each model and each pair had in the old plan, or None."""
+        numbers = {keys_of(law): number for number, law in enumerate(self.old.laws)}
+        return tuple(numbers.get(keys_of(law)) for law in self.laws)
 
     def reused(self, trajectory_range: TrajectoryRange) -> ReusedPart:
         """Find the trajectories of a range that the old result has, or that only points need which it has."""
         reused = super().reused(trajectory_range)
-        law = self.old_law(trajectory_range.model)
+        law = self.old_laws[trajectory_range.model]
         if self.table is not None and law is not None:
             reused = self._from_table(trajectory_range, self.table, law)
         elif self.table is None and self.layout == "full":
@@ -361,8 +359,9 @@ class ExtendedPlan(Plan):
         is_new_along = [(self.positions[axis].positions < 0).any() for axis in others]
         # a pair needs the trajectories of its model
         law = self.laws[trajectory_range.model]
-        related = [number for number, other in enumerate(self.laws) if law in (other, model_of(other))]
-        if None in map(self.old_law, related) or any(is_new_along):
+        needed = zip(self.laws, self.old_laws, strict=True)
+        is_new = any(number is None and law in (other, model_of(other)) for other, number in needed)
+        if is_new or any(is_new_along):
             return super().reused(trajectory_range)
         of_cell, is_old_cell, _ = self._old_cells(trajectory_range)
         is_old = np.ones(trajectory_range.size, bool)
@@ -388,7 +387,7 @@ class ExtendedPlan(Plan):
         The trajectories of all new points are integrated, also where a point of the old result had the same one.
         """
         names, before = [axis.name for axis in self.old.config.axes], self.before
-        if self.table is not None or self.old_law(slab.number) is None:
+        if self.table is not None or self.old_laws[slab.number] is None:
             return
         of_law = dict(zip(("model", "friction"), keys_of(self.laws[slab.number]), strict=False))
         old_positions = [axis.positions[part] for axis, part in zip(self.positions, slab.region, strict=True)]

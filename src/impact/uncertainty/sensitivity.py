@@ -144,8 +144,7 @@ def sensitivities(
             )
     plan = sensitivity_plan(plan, of, max_points, str(source) if isinstance(source, str | Path) else "config")
     check_outputs([output], [source, *plugins, *plan.config.files], overwrite=overwrite)
-    if output is not None:
-        check_result_name(output)
+    check_result_name(output)
     swept = (execute or sweep_in_memory)(plan)
     results = [sensitivity_of(plan, name, swept) for name in of]
     if output is not None:
