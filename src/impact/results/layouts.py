@@ -37,7 +37,7 @@ from ..errors import ResultError, UsageError
 from ..formatting import number, safe_text
 from .attributes import LawRecord, PairRecord, SummaryRecord, read_attribute
 from .netcdf import RegionValues, StoredArray
-from .schema import SLIP_INPUTS, attributes_of, count_points, derived_names, scale_of, stored_variables
+from .schema import attributes_of, count_points, derived_names, inputs_of_scale, scale_of, stored_variables
 from .trajectory_table import MAX_STIFFNESS_VALUES, TrajectoryTable, expand, lazy_dataset, whole_stiffness
 from .validation import FACTORED_ATTRIBUTES, PREFIXES, TABLE_VARIABLES, WITNESSES, is_quantity
 
@@ -385,9 +385,10 @@ def check_witnesses(table: TrajectoryTable, variables: Sequence[Variable], store
             raise ResultError("is not a readable result (its witnesses are not at the expected positions)")
         expanded = witness_values(table, chosen, indices)
         index = index_of(indices % table.inputs.cells, table.inputs.shape)
-        names = {"v1", "v2", "m1", "m2"}.union({*SLIP_INPUTS}.intersection(table.inputs.names()))
-        names |= {"R1", "R2"} if of_friction else set()
-        inputs = {name: input_at(table.inputs, name, index) for name in names}
+        # those that the scales need, and that are stored or follow from others
+        known = {"v1", "v2", "m1", "m2", "R1", "R2", *table.inputs.names()}
+        needed = known.intersection(name for variable in chosen for name in inputs_of_scale(variable))
+        inputs = {name: input_at(table.inputs, name, index) for name in needed}
         has_peak = "witness_peak_indentation" in stored
         if has_peak:
             inputs["peak_indentation"] = stored["witness_peak_indentation"].values

@@ -27,6 +27,7 @@ from ..contact.materials import effective_mass
 from ..contact.variables import AXES, HISTORY, LAW_DIMS, OUTPUTS, Variable, by_name, default_variables
 from ..engine.inputs import input_at
 from ..engine.plan import Plan
+from ..engine.trajectories import axes_of_arrays
 from ..errors import UsageError
 from ..formatting import number, safe_text
 
@@ -155,9 +156,6 @@ STUDY_COORDINATES: Mapping[Kind, Mapping[str, str]] = {
     },
 }
 CALIBRATION_TEXTS = ("parameter", "other_parameter", "output_name", "output", "determined", "specimen")
-
-# inputs that the slip before an impact follows from, besides v1 and v2
-SLIP_INPUTS = ("u1", "u2", "angle", "omega1", "omega2", "R1", "R2")
 
 RECORDED_PACKAGES = ("numpy", "h5py", "h5netcdf", "xarray")
 
@@ -359,29 +357,25 @@ def plan_coordinates(plan: Plan) -> xr.Coordinates:
     coordinates["exponent"] = (*_exponents(plan), {"units": "1", "long_name": "compliance exponent n"})
     names = plan.inputs.names()
 
-    def derive(name: str, sources: Sequence[str], **attributes: str) -> None:
+    def derive(name: str, **attributes: str) -> None:
         """Add a coordinate that follows from inputs, along their axes."""
-        axes = sorted({axis for source in sources for axis in plan.inputs.axes_of(source)})
-        region = [slice(None) if axis in axes else slice(1) for axis in range(len(plan.inputs.axes))]
-        values = input_at(plan.inputs, name, plan.inputs.index(region))
+        # twice at the first value of each axis: the shape shows along which axes it varies
+        twice = np.ix_(*[[0, 0]] * len(plan.inputs.axes))
+        axes = sorted(axes_of_arrays([input_at(plan.inputs, name, twice)]))
         dims = tuple(plan.config.axes[axis].name for axis in axes)
-        array = values.reshape([plan.inputs.shape[axis] for axis in axes])
+        shape = [plan.inputs.shape[axis] for axis in axes]
+        array = input_at(plan.inputs, name, plan.inputs.index()).reshape(shape)
         coordinates[name] = (dims, array, {**coordinate_attributes(plan, name), **attributes})
 
     if "alpha" in names:
-        sources = ("alpha", *(("speed", "angle") if "speed" in names else ("v1",)), "v2")
-        texts = {"long_name": "requested restitution", "equation": "e = 1 - alpha (v1 - v2)  (24)"}
-        derive("e", sources, **texts)
+        derive("e", long_name="requested restitution", equation="e = 1 - alpha (v1 - v2)  (24)")
     for ball in "12":
-        densities = (f"materials.{name}.rho" for name in plan.inputs.materials_of[ball])
-        material = ("material", f"material{ball}", *densities)
-        equation = "m = (4/3) pi R^3 rho"
         if f"m{ball}" not in names:
-            derive(f"m{ball}", (f"R{ball}", *material), equation=equation)
+            derive(f"m{ball}", equation="m = (4/3) pi R^3 rho")
         elif plan.frictions and f"R{ball}" not in names:
-            derive(f"R{ball}", (f"m{ball}", *material), equation=equation)
+            derive(f"R{ball}", equation="m = (4/3) pi R^3 rho")
     if "speed" in names:
-        derive("v1", ("speed", "angle", "v2"), equation="v1 = v2 + speed cos(angle)")
+        derive("v1", equation="v1 = v2 + speed cos(angle)")
     return xr.Coordinates(coordinates, indexes={})
 
 
