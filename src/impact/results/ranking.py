@@ -27,7 +27,7 @@ from ..formatting import argument, law_name, percentage, prefixed, safe_text
 from .provenance import describe_point
 from .schema import columns_along, parts_of_laws, plain_unit, require_axes, require_sweep
 from .selection import as_keys, require_outputs, select, select_laws
-from .slabs import Slab, distinct_points, is_computed, over_varying_dims, read_slab, slabs, varying_dims
+from .slabs import Slab, distinct_points, is_computed, read_slab, slabs, varying_dims
 from .xarray_backend import result_of
 
 # lazy results with more points are not ranked; this many take some minutes
@@ -425,11 +425,14 @@ def _is_along_one(law_data: xr.Dataset, name: str) -> bool:
 
 def _reduce_dims(law_data: xr.Dataset, criterion: Criterion, *more: Hashable) -> tuple[xr.Dataset, int]:
     """Keep the axes along which ranked variables or e vary, and `more`; return also the weight of each point."""
+    varying = {*more, *(dim for name in criterion.names for dim in varying_dims(law_data, name))}
     if _is_along_one(law_data, criterion.along):
-        dims = law_data.variables[criterion.along].dims
-    else:
-        dims = varying_dims(law_data, "e") if criterion.target is None else ()
-    return over_varying_dims(law_data, criterion.names, *more, *dims)
+        varying |= {*law_data.variables[criterion.along].dims}
+    elif criterion.target is None:
+        varying |= {*varying_dims(law_data, "e")}
+    ranked = law_data[list(criterion.names)]
+    fixed = [dim for dim in ranked.sizes if dim not in varying]
+    return ranked.isel(dict.fromkeys(fixed, 0)), math.prod(ranked.sizes[dim] for dim in fixed)
 
 
 @dataclass(frozen=True)

@@ -80,21 +80,12 @@ def varying_dims(dataset: xr.Dataset, name: str) -> tuple[Hashable, ...]:
     return tuple(dim for dim in variable.dims if dim in along)
 
 
-def distinct_points(dataset: xr.Dataset, name: str) -> tuple[xr.Variable, int]:
-    """Reduce a variable to the points at which it differs; the second result is the weight of each of them."""
-    varying, variable = varying_dims(dataset, name), dataset.variables[name]
+def distinct_points(dataset: xr.Dataset, name: str, *more: Hashable) -> tuple[xr.Variable, int]:
+    """Reduce a variable to the points at which it, or what lies along `more`, differs; with the weight of each."""
+    varying, variable = {*more, *varying_dims(dataset, name)}, dataset.variables[name]
     fixed = [dim for dim in variable.dims if dim not in varying]
     weight = math.prod(variable.sizes[dim] for dim in fixed)
     return variable.isel(dict.fromkeys(fixed, slice(0, 1))), weight
-
-
-def over_varying_dims(dataset: xr.Dataset, names: Sequence[str], *more: Hashable) -> tuple[xr.Dataset, int]:
-    """Reduce variables to the dimensions along which any varies, and `more`; with the weight of each point."""
-    varying = {*more, *(dim for name in names for dim in varying_dims(dataset, name))}
-    dims = dict.fromkeys(dim for name in names for dim in dataset.variables[name].dims)
-    fixed = [dim for dim in dims if dim not in varying]
-    weight = math.prod(dataset.sizes[dim] for dim in fixed)
-    return dataset[list(names)].isel(dict.fromkeys(fixed, 0)), weight
 
 
 def read_slab(dataset: xr.Dataset, name: str, slab: Mapping[Any, slice]) -> NDArray[Any]:

@@ -26,7 +26,7 @@ from .attributes import SummaryRecord
 from .layouts import read_inputs
 from .provenance import command_start, inputs_at, replay_command
 from .schema import parts_of_laws
-from .slabs import MAX_SUMMARY_POINTS, distinct_points, is_computed, over_varying_dims, slabs
+from .slabs import MAX_SUMMARY_POINTS, distinct_points, is_computed, slabs
 from .trajectory_table import ExpandedSlab, TrajectoryTable, computed_array, expand, table_of_result
 
 # variables of which the largest absolute value is reported, with the headings of a table
@@ -492,9 +492,9 @@ def with_depths(summary: Summary, dataset: xr.Dataset) -> Summary:
         return summary
     radius_dims = [axis.name for number, axis in enumerate(inputs.axes) if number in varied]
     for _, part in parts_of_laws(dataset, ["model"]):
-        points, weight = over_varying_dims(part, ["peak_indentation"], *radius_dims)
-        dims = [axis.name for axis in inputs.axes if axis.name in points.dims]
-        depth = points.variables["peak_indentation"].transpose(*dims)
+        depth, weight = distinct_points(part, "peak_indentation", *radius_dims)
+        dims = [axis.name for axis in inputs.axes if axis.name in depth.dims]
+        depth = depth.transpose(*dims)
         if depth.size > MAX_SUMMARY_POINTS and is_computed(depth):
             continue
         for slab in slabs(depth.sizes):
