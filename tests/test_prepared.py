@@ -155,3 +155,22 @@ def test_a_pair_takes_arrays_of_inputs_on_which_its_tangential_problem_does_not_
     source = {"models": "hertz", "frictions": "coulomb-1785", "sweep": {**sweep, "K": 1e6}}
     beta = impact.prepare(source, at={"angle": 0.1}, outputs="beta")(angle=[0.1, 0.9])["beta"]
     np.testing.assert_array_equal(beta, impact.sweep(source)["beta"].values.ravel())
+
+
+@pytest.mark.parametrize("has_parameter", [False, True])
+def test_a_law_with_a_branch_on_an_array_has_no_result_as_in_a_sweep(has_parameter: bool) -> None:
+    def branching(elastic: Any, v: Any) -> Any:
+        return elastic if v > 0.0 else 0.5 * elastic
+
+    def with_parameter(elastic: Any, v: Any, share: Any) -> Any:
+        return elastic if v > 0.0 else share * elastic
+
+    own = (impact.Parameter("share", "1", "kept on restitution", default=0.5),) if has_parameter else ()
+    force = with_parameter if has_parameter else branching
+    law = impact.ForceModel("branching", "Branching", 2026, "F = K δ^(3/2)", "", force=force, parameters=own)
+    config = {"models": "branching", "sweep": BALLS}
+    problem = impact.prepare(config, plugins=[law], outputs="e_out")
+    with pytest.warns(impact.ImpactWarning, match="formulas work on arrays: use np.where instead of if"):
+        assert problem()["status"] == 16
+    with pytest.warns(impact.ImpactWarning, match="formulas work on arrays"):
+        assert impact.sweep(config, plugins=[law])["status"].item() == 16

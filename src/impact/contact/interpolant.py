@@ -328,6 +328,9 @@ class InterpolatedCollisions:
         """Integrate collisions with params of shape (params, k), those with strong damping in their coordinate."""
         count = table.shape[1]
         never = np.zeros(count, bool) if never is None else never
+        if count == 1:
+            # together with a copy, as in a sweep: an `if` of a law raises no error for an array of length 1
+            return self._integrate(table.repeat(2, 1), n, never.repeat(2), **settings).take(np.array([0]))
         law_values = dict(zip(MotionLaw.of(self.model, n, False).names, table, strict=True))
         collisions = CollisionResult.blank(count)
         for problems in distinct_problems(self.model, n, law_values, np.ones(count, bool), collapse=False):
