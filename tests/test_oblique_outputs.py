@@ -163,3 +163,25 @@ def test_works_make_up_the_loss_and_momenta_are_kept() -> None:
     for spin, name, R, inertia in ((omega1, "omega1_post", 0.03, I1), (omega2, "omega2_post", 0.04, I2)):
         change = inertia * (spin - result[name].values)
         assert change == pytest.approx(R * impulse, abs=1e-14 * inertia * 100.0 + 1e-14 * R * m1 * 3.0)
+
+
+@pytest.mark.parametrize("friction", ["lammps-mindlin", "lammps-mindlin-force", "liggghts-history"])
+def test_tiny_slips_and_tiny_frictions_are_their_limits(friction: str) -> None:
+    """The slip after over that before has a limit for g0/mu to 0, and none changes for mu to 0."""
+    law = "liggghts-hertz" if "liggghts" in friction else "lammps-coeff-restitution-hertz"
+    balls = {"R1": 0.01, "R2": 0.01, "v1": 1.0, "e": 0.8, "material": "steel"}
+    laws = {"models": law, "frictions": friction}
+    tiny = impact.sweep({**laws, "sweep": {**balls, "mu": 0.3, "u1": [1e-11, 1e-14, 1e-16, 1e-25]}})
+    np.testing.assert_allclose(tiny["beta"].values.ravel(), tiny["beta"].values.flat[0], rtol=0, atol=1e-9)
+    assert (np.abs(tiny["friction_residual"]) < 1e-9).all()
+    smooth = impact.sweep({**laws, "sweep": {**balls, "mu": [1e-15, 1e-16, 1e-18, 1e-20], "u1": 1.0}})
+    assert (smooth["friction_status"] < 10).all()
+    np.testing.assert_allclose(smooth["beta"].values.ravel(), -1.0, rtol=0, atol=1e-14)
+
+
+@pytest.mark.parametrize("friction", ["lammps-mindlin", "lammps-mindlin-force"])
+def test_the_force_of_a_tiny_friction_is_mu_times_the_contact_force(friction: str) -> None:
+    point = {"R1": 0.01, "R2": 0.01, "v1": 1.0, "u1": 1.0, "mu": 1e-19, "e": 0.8, "material": "steel"}
+    history = impact.run(model="lammps-coeff-restitution-hertz", friction=friction, at=point).history
+    assert history is not None
+    np.testing.assert_allclose(np.abs(history["f"]).max(), 1e-19 * np.abs(history["F"]).max(), rtol=1e-6)

@@ -21,7 +21,7 @@ from .rigid import ObliqueImpacts
 from .simulate import RecordedMotion
 from .slip_motion import LEAST_S, TIME_ROW
 from .status import Status
-from .tangential import RecordedSlip
+from .tangential import SLIP_BOUNDS, RecordedSlip
 
 # points at which a step is sampled, and Gauss points by which it is integrated
 SAMPLES_PER_STEP, GAUSS_POINTS = 4, 5
@@ -150,6 +150,9 @@ def _with_slip(
     slip, force, mode = np.concatenate(rows, axis=1)
     if recorded[0].phase.form.kind == "regularized":
         mode = np.sign(slip)
+    if recorded[0].phase.form.has_modes:
+        # the slip is integrated for a friction that is so small at least
+        force *= min(1.0, SLIP_BOUNDS[1] / abs(oblique.G0.item()))
     f, mode = oblique.m_t.item() * g0 / unit_t * force, (np.sign(g0) * mode).astype(np.int8)
     return replace(history, slip=g0 * slip, f=f, mode=mode)
 

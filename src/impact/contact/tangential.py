@@ -46,6 +46,11 @@ from .slip_motion import (
 )
 from .status import LIMIT, STATUS_OK, FrictionStatus, Status
 
+# G0 below which the slip after is proportional to that before, and above which it is the same, up to rounding
+SLIP_BOUNDS = (1e-12, 1e16)
+# of a result
+WORKS = ("slip_work", "damping_work", "memory_work", "elastic_left")
+
 
 @dataclass(frozen=True)
 class TangentialResult(Record):
@@ -152,7 +157,9 @@ def _simulate_distinct(
         values[SLIP_SCALE] * slip if name == "y" else values[PREFIX + name]
         for name in argument_names(form.coefficient)
     )
-    columns = (slip, stiffness, damping, is_positive, *coefficient)
+    # modes are those of no slip, or of no friction, there; the limit of friction would vanish in rounding errors
+    integrated = np.clip(slip, *SLIP_BOUNDS) if form.has_modes else slip
+    columns = (integrated, stiffness, damping, is_positive, *coefficient)
     chosen = (status == STATUS_OK) & has_friction
     exact = exact_restitution(model, law_values, count)
     parts = []
@@ -161,6 +168,11 @@ def _simulate_distinct(
         distinct = _integrate(form, problems, never_separates, rtol, max_steps, recorded)
         parts.append((problems.rows, distinct.take(problems.row_of_impact)))
     result = TangentialResult.joined(count, status, parts)
+    share = np.where(has_friction, slip / integrated, 1.0)
+    for name in ("slip", "exact"):
+        getattr(result, name)[:] *= share
+    for name in WORKS:
+        getattr(result, name)[:] *= np.where(share > 1.0, share, share * share)
     if form.kind == "coulomb":
         # with infinite damping the balls stop at first contact
         result.sliding_impulse[status == LIMIT] = 1.0
