@@ -969,6 +969,11 @@ def test_a_tolerance_in_percent(cli: Run, stored: Path) -> None:
             "c.toml: is a TOML file, not a result; sweep a config first: impact sweep c.toml -o RESULT.h5",
         ),
         (
+            ("plot", "my folder/c.toml"),
+            "my folder/c.toml: is a TOML file, not a result; sweep a config first: impact sweep 'my folder/c.toml'"
+            " -o RESULT.h5",
+        ),
+        (
             ("plot", "data.csv"),
             "data.csv: is a CSV file, not a result; impact plot RESULT.h5 --points data.csv draws its points",
         ),
@@ -985,6 +990,8 @@ def test_a_tolerance_in_percent(cli: Run, stored: Path) -> None:
 def test_a_file_of_another_kind_is_named(
     cli: Run, small: Path, stored: Path, tmp_path: Path, words: tuple[str, ...], line: str
 ) -> None:
+    (tmp_path / "my folder").mkdir()
+    shutil.copy(small, tmp_path / "my folder" / "c.toml")
     shutil.copy(small, tmp_path / "c.toml")
     shutil.copy(stored, tmp_path / "small.h5")
     (tmp_path / "data.csv").write_text("v1,e\n1,0.5\n", encoding="utf-8")

@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import json
 import re
+import shlex
 import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from decimal import Decimal
@@ -51,10 +52,11 @@ def file_hint(path: Path, content: bytes) -> str:
     """
     if content.startswith(RESULT_MAGIC):
         return "is a result, not a text file; impact info, plot, rerun, extend and expand read results"
+    word = shlex.quote(str(path))
     if path.suffix.lower() == ".toml":
-        return f"is a TOML file, not a result; sweep a config first: impact sweep {path.name} -o RESULT.h5"
+        return f"is a TOML file, not a result; sweep a config first: impact sweep {word} -o RESULT.h5"
     if path.suffix.lower() == ".csv":
-        return f"is a CSV file, not a result; impact plot RESULT.h5 --points {path.name} draws its points"
+        return f"is a CSV file, not a result; impact plot RESULT.h5 --points {word} draws its points"
     return ""
 
 
