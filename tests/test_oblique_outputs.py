@@ -143,6 +143,28 @@ def test_a_contact_of_coulomb_changes_once_and_a_spring_twice() -> None:
     assert values(result, "slip_changes") == [1, 0, 2, 2]
 
 
+@pytest.mark.parametrize("change", [{"mu": 0.0, "u1": 1.0}, {"u1": 1.5, "omega1": -50.0}, {"u1": 1.0, "v1": -2.0}])
+@pytest.mark.parametrize("integrator", ["exact", "kick-drift"])
+def test_where_no_friction_acts_all_works_are_zero_and_psi_is_not_defined(
+    integrator: str, change: dict[str, float]
+) -> None:
+    works = ["slip_work", "tangential_damping_work", "memory_work", "elastic_left"]
+    steps = {} if integrator == "exact" else {"steps_per_contact": 20.0}
+    result = impact.sweep(
+        {
+            "models": "hertz",
+            "frictions": ["coulomb-1785", "lammps-mindlin-force"],
+            "sweep": {**BALL, **change, **steps},
+            "friction": {"lammps-mindlin-force": {"kt_over_kn": 0.8, "xt": 0.0}},
+            "output": {"variables": [*works, "friction_loss", "psi1", "psi2"]},
+            "solver": {"integrator": integrator},
+        }
+    )
+    for name in [*works, "friction_loss"]:
+        assert values(result, name) == [0.0, 0.0]
+    assert np.isnan(values(result, "psi1") + values(result, "psi2")).all()
+
+
 def test_works_make_up_the_loss_and_momenta_are_kept() -> None:
     rng = np.random.default_rng(1)
     u1, omega1, omega2 = rng.uniform(-3.0, 3.0, 20), rng.uniform(-100.0, 100.0, 20), rng.uniform(-100.0, 100.0, 20)

@@ -205,10 +205,12 @@ def _work(name: str) -> Callable[..., Array]:
     def work(
         oblique: ObliqueImpacts, tangential: TangentialResult, kind: str, friction_loss: Array, has_works: Mask
     ) -> Array:
+        # 0 where nothing acts, NaN where the slip is not known
+        without = 0.0 * friction_loss
         if kind == "coulomb":
-            return np.where(has_works, friction_loss if name == "slip_work" else 0.0, np.nan)
+            return friction_loss if name == "slip_work" else without
         unit = np.square(oblique.mu * oblique.impacts.m * oblique.impacts.v0) / oblique.m_t
-        return np.where(has_works, getattr(tangential, name) * unit, np.nan)
+        return np.where(has_works, getattr(tangential, name) * unit, without)
 
     return work
 
@@ -294,8 +296,8 @@ FORMULAS: dict[str, Callable[..., Any]] = {
     "tangential_damping_work": _work("damping_work"),
     "memory_work": _work("memory_work"),
     "elastic_left": _work("elastic_left"),
-    "psi1": lambda tangential, oblique: tangential.stiffness * oblique.G0,
-    "psi2": lambda tangential, oblique, slip_share: tangential.stiffness * oblique.G0 * slip_share,
+    "psi1": lambda tangential, oblique, has_works: np.where(has_works, tangential.stiffness * oblique.G0, np.nan),
+    "psi2": lambda psi1, slip_share: psi1 * slip_share,
     "slip_changes": lambda tangential, kind, contact_regime: (
         (contact_regime == STICKS | SLIDES).astype(np.int32)
         if kind == "coulomb"
