@@ -132,6 +132,12 @@ def test_a_law_with_a_stiffness_of_its_own_is_not_charged_for_that_of_the_sweep(
     assert both["determined"].item() == ""
 
 
+def test_a_parameter_that_no_law_takes_is_noted() -> None:
+    sweep = {"m1": 1.0, "m2": 1.0, "K": {"fit": [1e5, 1e8]}, "e": {"fit": [0.1, 0.9]}}
+    with pytest.warns(impact.ImpactWarning, match=r"config: sweep\.e: no law takes it"):
+        impact.calibrate({"models": "hertz", "sweep": sweep, "data": TIMES, "solver": QUICK})
+
+
 def test_the_natural_range_of_a_stiffness_is_about_that_of_the_materials() -> None:
     config = {
         "models": "anagnostopoulos-1988",

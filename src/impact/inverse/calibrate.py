@@ -125,6 +125,9 @@ def calibrate(
         position_of_law(list(laws_to_fit(config)), model, argument("model"))
     name = str(source) if isinstance(source, str | Path) else "config"
     warn(*config.notes, *Plan(config).pair_notes(f"{name}: frictions"))
+    taken = {parameter for law in laws_to_fit(config).values() for parameter in parameters_of(config, law)}
+    unused = [InputName.parse(parameter).config_key for parameter in config.fits if parameter not in taken]
+    warn(*(f"{name}: {path}: no law takes it, and it is not fitted" for path in unused))
     result = calibrate_config(config, plugin_set.of(config.models), jobs)
     if output is not None and is_table:
         write_table(Fits(result), Path(output), TableForm(), overwrite=overwrite)
