@@ -634,6 +634,20 @@ def test_bless_from_python(folder: Path, tmp_path: Path) -> None:
         impact.bless(folder / "base.h5", baseline, reason="")
 
 
+def test_bless_does_not_copy_another_result_than_it_compared(folder: Path, tmp_path: Path) -> None:
+    new, baseline = tmp_path / "new.h5", tmp_path / "baseline.h5"
+    for path in (new, baseline):
+        shutil.copy(folder / "base.h5", path)
+
+    def replace_new(verdict: impact.Verdict) -> None:
+        shutil.copy(folder / "different.h5", new)
+
+    changed = pytest.raises(impact.ResultError, match=r"new\.h5: was changed while it was read")
+    with pytest.deprecated_call(), changed:
+        impact.bless(new, baseline, reason="numbers changed", show=replace_new)
+    assert baseline.read_bytes() == (folder / "base.h5").read_bytes()
+
+
 # rerun
 
 

@@ -83,8 +83,9 @@ def bless(
         verdict = replace(comparison, new=str(new), baseline=str(baseline), repeats=repeats)
         if show is not None:
             show(verdict)
-    tolerances = effective_tolerances(tol, attributes)
-    save_with_attributes(new, baseline, {"reason": reason, "tolerances": json.dumps(tolerances)})
+    added = {"reason": reason, "tolerances": json.dumps(effective_tolerances(tol, attributes))}
+    # what was compared is copied
+    save_with_attributes(new, baseline, str(result.encoding["seal"]), added)
     return verdict
 
 

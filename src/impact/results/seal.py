@@ -70,7 +70,7 @@ def render_header(seal: str) -> bytes:
 
 def write_seal(file: Any) -> str:
     """Seal a file that is open for reading and writing and has an empty user block; returns the seal."""
-    seal = _digest(file)
+    seal = digest(file)
     file.seek(0)
     file.write(render_header(seal))
     return seal
@@ -99,7 +99,7 @@ def check_seal(path: Path) -> str:
             raise ResultError(
                 f"has schema version {int(version)}, this program reads {SCHEMA_VERSION}; {SWEEP_AGAIN}"
             )
-        seal = _digest(file)
+        seal = digest(file)
     if header != render_header(seal):
         raise ResultError("is damaged: the SHA-256 of its content differs from its seal")
     return seal
@@ -121,7 +121,8 @@ def is_result(path: Path, begins: tuple[bytes, ...] = (RESULT_MAGIC, HDF5_MAGIC)
         return file.read(len(RESULT_MAGIC)).startswith(begins)
 
 
-def _digest(file: Any) -> str:
+def digest(file: Any) -> str:
+    """Compute what the seal of a file has to be."""
     file.seek(USER_BLOCK_BYTES)
     return hashlib.file_digest(file, "sha256").hexdigest()
 

@@ -23,7 +23,7 @@ from ..formatting import argument, safe_text, type_of
 from .layouts import read_layout
 from .netcdf import RegionValues, encode_attribute, read_variables, write_dataset
 from .schema import MODEL_METADATA, kind_of, require_result, require_sweep
-from .seal import byte_reader, check_root, check_seal, is_result, write_seal
+from .seal import byte_reader, check_root, check_seal, digest, is_result, write_seal
 from .selection import select, select_laws
 from .slabs import slabs
 from .trajectory_table import in_memory, table_of_result
@@ -97,11 +97,13 @@ def save(
         write_sealed(sink, path, dataset, parts(), output or Output())
 
 
-def save_with_attributes(source: Path, path: Path, attributes: Mapping[str, str]) -> None:
-    """Copy a result file and set some attributes; its layout stays, an existing file is replaced."""
+def save_with_attributes(source: Path, path: Path, seal: str, attributes: Mapping[str, str]) -> None:
+    """Copy a result file of a seal and set some attributes; its layout stays, an existing file is replaced."""
     with atomic_write(path, overwrite=True) as sink, source.open("rb") as file:
         shutil.copyfileobj(file, sink)
         sink.check()
+        if digest(sink) != seal:
+            raise ResultError(f"{source}: was changed while it was read; {path} is not modified")
         # the bytes of a modified attribute depend on its former value: create it again
         with h5py.File(sink, "r+") as stored:
             for name, text in attributes.items():
