@@ -632,3 +632,16 @@ def test_a_result_with_the_name_of_another_kind_of_file_is_refused(tmp_path: Pat
     with pytest.raises(UsageError, match=re.escape(message)):
         impact.save(impact.load(tmp_path / "r.dat"), tmp_path / name)
     assert {path.name for path in tmp_path.iterdir()} == {"c.json", "r.dat"}
+
+
+def test_a_file_that_is_truncated_while_it_is_open_has_no_values(tmp_path: Path) -> None:
+    """HDF5 itself reads zeros there."""
+    path = tmp_path / "results.h5"
+    sweep = {"e": {"linspace": [0.1, 0.9, 2000]}, "v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 1e9}
+    impact.sweep_to_file({"models": "exact-hysteresis", "sweep": sweep}, path)
+    with open_result(path) as opened:
+        assert opened["peak_force"].min() > 0.0
+        os.truncate(path, path.stat().st_size // 10)
+        for part in (slice(None), slice(5), np.array([3, 5])):
+            with pytest.raises(ResultError, match=r"results\.h5: .*the file was truncated since it was opened"):
+                _ = opened["peak_force"][0, part].values

@@ -7,6 +7,7 @@ result does none of that: it has datasets of numbers and bytes in one group, and
 from __future__ import annotations
 
 import math
+import os
 import zlib
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import product
@@ -129,8 +130,10 @@ def _storage_options(variable: xr.DataArray, output: Output) -> dict[str, Any]:
 class StoredArray(BackendArray):
     """A variable of a file, read when it is indexed."""
 
-    def __init__(self, name: str, dataset: h5py.Dataset) -> None:
+    def __init__(self, name: str, dataset: h5py.Dataset, file: h5py.File) -> None:
         self.name, self.dataset = name, dataset
+        # of a Python stream, which only a file that is being written has, there is no descriptor
+        self.file = file.id if file.driver == "sec2" else None
         self.shape, self.dtype = dataset.shape, dataset.dtype
         self._checked: set[tuple[int, ...]] = set()
 
@@ -148,12 +151,16 @@ class StoredArray(BackendArray):
         check_memory(self.name, [*map(len, positions)], self.dtype)
         try:
             self._check_chunks(positions)
-            if not (len(key) == 1 and isinstance(key[0], np.ndarray) and key[0].size):
-                return np.asarray(self.dataset[key])
-            # a list of positions as a key of h5py takes ten times as long
-            values, space = np.empty(key[0].size, self.dtype), self.dataset.id.get_space()
-            space.select_elements(key[0][:, np.newaxis].astype(np.uint64))
-            self.dataset.id.read(h5s.create_simple(values.shape), space, values)
+            if len(key) == 1 and isinstance(key[0], np.ndarray) and key[0].size:
+                # a list of positions as a key of h5py takes ten times as long
+                values, space = np.empty(key[0].size, self.dtype), self.dataset.id.get_space()
+                space.select_elements(key[0][:, np.newaxis].astype(np.uint64))
+                self.dataset.id.read(h5s.create_simple(values.shape), space, values)
+            else:
+                values = np.asarray(self.dataset[key])
+            # HDF5 reads zeros beyond the end
+            if self.file and os.fstat(self.file.get_vfd_handle()).st_size < self.file.get_filesize():
+                raise ValueError("the file was truncated since it was opened")
             return values
         except (OSError, RuntimeError, ValueError, zlib.error) as error:
             path = safe_text(str(self.dataset.file.filename)) if self.dataset else "the result"
@@ -201,11 +208,11 @@ def read_variables(
             raise _unreadable("declares data that the file does not contain", name)
         attributes = _read_attributes(dataset)
         if dataset.dtype.kind == "S":
-            values = StoredArray(name, dataset).read((slice(None),) * dataset.ndim)
+            values = StoredArray(name, dataset, file).read((slice(None),) * dataset.ndim)
             texts = values.view(f"S{values.shape[-1]}")[..., 0]
             variables[name] = xr.Variable(dims[name][:-1], np.char.decode(texts, "utf-8"), attributes)
         else:
-            array = indexing.LazilyIndexedArray(StoredArray(name, dataset))
+            array = indexing.LazilyIndexedArray(StoredArray(name, dataset, file))
             chunks = {"chunksizes": dataset.chunks} if dataset.chunks else None
             variables[name] = xr.Variable(dims[name], array, attributes, chunks)
     return variables, _read_attributes(file), tuple(sorted(unknown))
