@@ -86,6 +86,12 @@ def test_a_page_has_no_law_no_network_and_texts_that_do_not_end_its_script(
     assert len(text) < 100_000
 
 
+def test_a_title_of_several_lines_is_one_comment_of_the_csv() -> None:
+    sweep = {"e": [0.5, 0.6], "m1": 1.0, "m2": 1.0, "K": 1e9, "v1": 1.0}
+    result = impact.sweep({"title": "Drops\nof a ball", "models": "hertz", "sweep": sweep})
+    assert content_of(impact.page(result))["title"] == "Drops of a ball"
+
+
 def test_the_script_and_the_template_are_short() -> None:
     lines = [
         len((REPORTING / name).read_text(encoding="utf-8").splitlines()) for name in ("page.js", "page.html.j2")

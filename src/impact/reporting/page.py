@@ -108,7 +108,8 @@ def _page_of(dataset: xr.Dataset, models: Sequence[str] | None) -> str:
     laws = [{**law, **columns} for law, columns in zip(_laws(dataset), arrays, strict=True)]
     axes = [_axis(dataset, axis) for axis in inputs.axes]
     content = {
-        "title": page_title(dataset),
+        # one line, which is a comment of the CSV
+        "title": " ".join(page_title(dataset).split()),
         "reference": "Impulse-momentum",
         "first_failure": FIRST_FAILURE,
         "first_axis": _first_axis(axes),
