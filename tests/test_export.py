@@ -779,6 +779,13 @@ def test_verify_runs_the_script_that_is_exported(tmp_path: Path) -> None:
     assert export.verification.measured == (lines,) * 4
 
 
+def test_a_program_with_open_mpi_starts_no_daemon_which_would_outlive_it(tmp_path: Path) -> None:
+    program = write_program(tmp_path / "lmp", RELEASE + 'echo "e_out = 0.$OMPI_MCA_ess_singleton_isolated"')
+    verification = impact.export("lammps", at={"e": 0.6}, verify=True, program=str(program)).verification
+    assert verification is not None
+    assert verification.measured == (0.1,) * 4
+
+
 def test_verify_allows_for_the_rounding_of_coordinates_where_the_indentation_is_small(tmp_path: Path) -> None:
     """LAMMPS of 22 July 2025 differs by 6e-9 at this speed, with the balls of Table 1 of the paper."""
     program, at = lammps_that_prints(tmp_path, [0.5] * 4), {"e": 0.6, "v1": 1e-6, "R1": 0.05, "R2": 0.04}

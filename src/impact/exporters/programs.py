@@ -21,6 +21,8 @@ from ..formatting import number
 
 # time that a program has to report its version
 VERSION_TIMEOUT_S = 60
+# LAMMPS and LIGGGHTS with Open MPI would start a daemon, in a session of its own that `kill` does not reach
+WITHOUT_DAEMON = {"OMPI_MCA_ess_singleton_isolated": "1"}
 # a program that prints more than the first is stopped; of its output, the end is kept
 MAX_OUTPUT_BYTES, KEPT_OUTPUT_BYTES = 2**26, 2**20
 POLL_INTERVAL_S = 0.05
@@ -107,7 +109,13 @@ def run_program(command: Sequence[str], folder: str, timeout_s: float) -> subpro
     deadline = time.monotonic() + timeout_s
     with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
         process = subprocess.Popen(
-            command, cwd=folder, stdin=subprocess.DEVNULL, stdout=out, stderr=err, start_new_session=True
+            command,
+            cwd=folder,
+            env=os.environ | WITHOUT_DAEMON,
+            stdin=subprocess.DEVNULL,
+            stdout=out,
+            stderr=err,
+            start_new_session=True,
         )
         try:
             while process.poll() is None:
