@@ -507,8 +507,10 @@ class Quantity:
             raise mismatch_error(text, f"at most {MAX_UNIT_LENGTH} characters")
         parts = NUMBER_SYNTAX.fullmatch(text)
         if parts is None or not parts[2]:
-            with_unit = "" if self.unit == "1" else f", bare or with a unit{self._example}"
-            raise mismatch_error(text, f"{self.expected}{with_unit}")
+            # a number as a text needs a unit, or to be no text
+            bare = "without quotes" if parts else "bare"
+            forms = f", {bare} or with a unit{self._example}" if self.unit != "1" else f", {bare}" if parts else ""
+            raise mismatch_error(text, self.expected + forms)
         try:
             factor = self.factor(parts[2], n)
         except UnitError as error:
