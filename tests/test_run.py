@@ -533,3 +533,9 @@ def test_a_part_of_a_result_runs_a_law_without_the_parameters_of_the_others(tmp_
     impact.expand(tmp_path / "whole.h5", tmp_path / "part.h5", sel={"kuwabara-kono-1987.A": 1e-4})
     process = cli("run", "part.h5", "--model", "tsuji-1992", "--friction", "coulomb-1785", cwd=tmp_path)
     assert process.returncode == 0
+
+
+def test_what_the_starter_config_lacks_is_named_without_a_line() -> None:
+    message = "^the starter config: sweep.mu: missing, expected a number >= 0: coefficient of friction$"
+    with pytest.raises(impact.ConfigError, match=message):
+        impact.run(model="hertz", friction="coulomb-1785")

@@ -46,6 +46,9 @@ EXCLUDED_BY = {
     "material2": ("material",),
 }
 
+# the name of the starter config in messages
+STARTER = "the starter config"
+
 
 @dataclass(frozen=True)
 class Setting:
@@ -255,7 +258,9 @@ class Draft:
                 break
             is_replaced = any(path[:start] in self.origins for start in range(end))
             if path[:end] in key_line and not is_replaced:
-                return (0, key_line[path[:end]]), f"{self.name}:{key_line[path[:end]]}"
+                # nobody has the lines of the starter config before them
+                place = self.name if self.name == STARTER else f"{self.name}:{key_line[path[:end]]}"
+                return (0, key_line[path[:end]]), place
         # a parameter of a law without a table is required by the key `models` or `frictions`, and a property of a
         # material of the library by the key that names it
         required_by = {"model": "models", "friction": "frictions"}.get(str(path[0])) if path else None
@@ -279,7 +284,7 @@ def open_config(source: str | Path | Mapping[str, object] | None, plugins: Seque
     None is the starter config, for which they are relative to the working directory.
     """
     if source is None:
-        return replace(open_text(STARTER_CONFIG.read_text(encoding="utf-8"), "starter", plugins), folder=Path())
+        return replace(open_text(STARTER_CONFIG.read_text(encoding="utf-8"), STARTER, plugins), folder=Path())
     # a dataset is a mapping, too
     if not isinstance(source, Mapping) or hasattr(source, "data_vars"):
         if not isinstance(source, str | Path):
