@@ -227,7 +227,7 @@ def inline_files(draft: Draft) -> Draft:
     """Replace the names of CSV files by the values in them."""
     if draft.files is not None:
         return draft
-    open_csv, files, lines = cache(partial(read_csv_of, draft)), list[Path](), [*draft.lines]
+    open_csv, files, lines = cache(partial(read_csv_of, draft)), list[Path](), list[str]()
     for files_of in (csv_files, measurements.csv_files):
         for file, wanted, form, read in files_of(draft):
             files.append((draft.folder or Path()) / file)
@@ -245,7 +245,7 @@ def inline_files(draft: Draft) -> Draft:
                     data, _ = set_value(draft.data, path, value)
                     draft = replace(draft, data=data, settings=(*draft.settings, setting))
     # several columns may be of one file, and of one that cannot be read
-    return replace(draft, files=tuple(dict.fromkeys(files)), lines=tuple(dict.fromkeys(lines)))
+    return replace(draft, files=tuple(dict.fromkeys(files)), lines=(*draft.lines, *dict.fromkeys(lines)))
 
 
 def _validate(draft: Draft) -> tuple[tables.Document | None, list[ConfigProblem]]:
