@@ -422,6 +422,16 @@ def test_failed_points_are_listed() -> None:
     assert len(few) == int((failures["status"].isel(model=1, v1=1, e=1) >= 10).sum())
 
 
+def test_failed_points_of_pairs_are_listed() -> None:
+    sweep = {"v1": 1.0, "u1": 0.5, "m1": 1.0, "m2": 1.0, "R1": 0.01, "R2": 0.01, "K": 1e8, "mu": [0.1, 0.3]}
+    law = "simbody-hunt-crossley"
+    config = {"models": "hertz", "frictions": [law], "sweep": sweep, "friction": {law: {"mu_d": 0.2}}}
+    text = build(impact.sweep(config))
+    meaning = impact.contact.status.FrictionStatus.INVALID_PARAMETER.meaning
+    assert table(text, "Failed points") == [[f"hertz with {law}", "mu\xa0=\xa00.1", meaning]]
+    assert "more</p>" not in text
+
+
 def test_a_page_without_failed_points_states_it(pages: dict[str, str]) -> None:
     assert "<p>No point failed.</p>" in pages["figure 6"]
 

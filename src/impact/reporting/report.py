@@ -28,10 +28,12 @@ from ..contact.evidence import Evidence
 from ..contact.frictions import frictions
 from ..contact.model import ForceModel
 from ..contact.models import catalogue
+from ..contact.status import FrictionStatus, Status
+from ..contact.variables import LAW_DIMS
 from ..engine.plan import Plan
 from ..engine.plugins import read_plugins
 from ..errors import ImpactError, UsageError, require_known
-from ..formatting import argument, number, prefixed, safe_text, scaled_unit, with_year
+from ..formatting import argument, law_name, number, prefixed, safe_text, scaled_unit, with_year
 from ..plots.slices import varying_inputs
 from ..results.attributes import read_attribute
 from ..results.board import BOARD_HEADINGS, Board, board_rows, check_rows, engine_headline, failure_lines
@@ -389,13 +391,16 @@ def _failures_section(dataset: xr.Dataset, summary: Summary) -> dict[str, Any]:
     sentences = [f"The status of {summary.not_counted:,} points was not evaluated."] if summary.not_counted else []
     if not summary.failed:
         sentences.append("No other point failed." if summary.not_counted else "No point failed.")
-    axes = [dim for dim in dataset["status"].dims if dim != "model"]
+    # as the summary of a sweep: those of models, else of pairs
+    failed_at: Sequence[tuple[Status | FrictionStatus, tuple[int, ...], tuple[int, ...]]] = summary.failed_at
+    failed_at, variable = (failed_at, "status") if failed_at else (summary.friction_failed_at, "friction_status")
     points = []
-    for status, (model,), index in summary.failed_at:
-        point = dataset.isel({"model": model, **dict(zip(axes, index, strict=True))})
-        key = str(point["model"].item())
-        inputs = [name for name in varying_inputs(dataset) if InputName.parse(name).applies_to(key)]
-        points.append((key, at_text(point, inputs) or "–", status.meaning))
+    for status, place, index in failed_at:
+        axes = [dim for dim in dataset[variable].dims if dim not in LAW_DIMS]
+        point = dataset.isel(dict(zip((*LAW_DIMS[: len(place)], *axes), (*place, *index), strict=True)))
+        keys = [str(point[dim].item()) for dim in LAW_DIMS[: len(place)]]
+        inputs = [name for name in varying_inputs(dataset) if InputName.parse(name).applies_to(*keys)]
+        points.append((law_name(*keys), at_text(point, inputs) or "–", status.meaning))
     more = summary.failed - len(points)
     return {"sentences": sentences, "points": points, "more": f"{more:,}" if more > 0 else ""}
 
