@@ -265,6 +265,20 @@ def test_a_failed_point_is_reported_with_the_command_that_repeats_it(cli: Run, t
     assert summary["trajectories"] == 1 + values_of_e.size + 2
 
 
+def test_a_repeated_sweep_names_the_same_failed_points(cli: Run, tmp_path: Path) -> None:
+    # the three masses of ball 2 share a trajectory that fails
+    text = """models = "tsuji-1992"
+sweep = { e = [0.1, 0.6], v1 = 1.0, m1 = 1.0, m2 = [1.0, 2.0, 3.0], K = 1e6 }
+solver = { max_steps = 46, rtol = 1e-8 }
+output.layout = "factored"
+"""
+    (tmp_path / "c.toml").write_text(text, encoding="utf-8")
+    first, again = (json.loads(cli("sweep", "c.toml", "--json", cwd=tmp_path).stdout) for _ in range(2))
+    assert first == again
+    assert first["failed"] == 3
+    assert [failure["at"]["e"] for failure in first["first_failed"]] == [0.1]
+
+
 @pytest.mark.slow
 def test_only_the_undamaged_result_of_the_same_sweep_is_recognized_as_finished(blocks: Path) -> None:
     output = blocks.parent / "results.h5"

@@ -157,7 +157,8 @@ class ImpactRegression:
         from .results.schema import kind_of
         from .results.xarray_backend import save_with_attributes
 
-        verdict, is_study = None, kind_of(impact.load(new)) in ("calibration", "board")
+        result, verdict = impact.load(new), None
+        is_study = kind_of(result) in ("calibration", "board")
         try:
             if baseline.exists():
                 verdict = impact.compare(new, baseline, tol=tol, subset=subset)
@@ -169,7 +170,7 @@ class ImpactRegression:
             return verdict
         baseline.parent.mkdir(parents=True, exist_ok=True)
         if is_study:
-            save_with_attributes(new, baseline, {"reason": reason})
+            save_with_attributes(new, baseline, str(result.encoding["seal"]), {"reason": reason})
         else:
             verdict = impact.bless(new, baseline, reason=reason, tol=tol, allow_failed=allow_failed)
         self.request.node.user_properties.append((WRITTEN, str(baseline)))

@@ -407,13 +407,10 @@ def store_result(
     template, variables = file_template(result, plan, table), stored_variables(plan)
     if plan.layout == "factored":
         result = lazy_dataset(result, table, variables)
+        summary, record = summarize_table(result, table)
+        summary = with_depths(summary, result)
         if plan.stored_points > NO_SUMMARY_POINTS:
-            summary, record = summarize_table(result, table)
-            summary = with_depths(summary, result)
             template = template.assign_attrs(summary=record.model_dump_json(exclude_defaults=True))
-        else:
-            for slab in expanded_slabs(table, variables):
-                summary.add_slab(table, slab)
 
     def report(points: int) -> None:
         run.on_progress(replace(progress, points=points, failed=max(summary.failed, progress.failed)))
