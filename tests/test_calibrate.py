@@ -122,13 +122,13 @@ def test_a_law_is_not_charged_for_parameters_that_it_does_not_have() -> None:
     assert both["aicc"].item() == alone["aicc"].item() == pytest.approx(-44.557, abs=1e-3)
 
 
-@pytest.mark.parametrize("own", [1e6, {"fit": [1e5, 1e8]}])
-def test_a_law_with_a_stiffness_of_its_own_is_not_charged_for_that_of_the_sweep(own: object) -> None:
+@pytest.mark.parametrize("stiffness", [1e6, {"fit": [1e5, 1e8]}])
+def test_a_law_with_a_stiffness_of_its_own_is_not_charged_for_that_of_the_sweep(stiffness: object) -> None:
     sweep = {"m1": 1.0, "m2": 1.0, "K": {"fit": [1e5, 1e8]}, "e": 0.5}
-    model = {"anagnostopoulos-1988": {"K": own}}
+    model = {"anagnostopoulos-1988": {"K": stiffness}}
     config = {"models": ["hertz", "anagnostopoulos-1988"], "sweep": sweep, "model": model, "data": TIMES}
     both = impact.calibrate({**config, "solver": QUICK}).sel(model="anagnostopoulos-1988")
-    assert both["identifiable"].values.tolist() == [-1, *[1] * isinstance(own, dict)]
+    assert both["identifiable"].values.tolist() == [-1, *[1] * isinstance(stiffness, dict)]
     assert both["determined"].item() == ""
 
 
@@ -145,15 +145,15 @@ def test_the_natural_range_of_a_stiffness_is_about_that_of_the_materials() -> No
         "materials": {"rubber": {"E": 5e6, "nu": 0.49}},
     }
     size = float(impact.run(config).values["stiffness"])
-    own = {"model": {"anagnostopoulos-1988": {"K": {"fit": True}}}, "solver": QUICK}
+    fitted = {"model": {"anagnostopoulos-1988": {"K": {"fit": True}}}, "solver": QUICK}
     data = {"data": {"columns": {"contact_time": [0.09, 0.091, 0.092]}}}
-    fit = impact.calibrate({**config, **own, **data})
+    fit = impact.calibrate({**config, **fitted, **data})
     bounds = json.loads(fit.attrs["fit_bounds"])["anagnostopoulos-1988.K"]
     assert bounds == pytest.approx([size / 1e4, size * 1e4])
     assert fit_status(fit.isel(model=0)) == "ok"
     del config["sweep"]["material"]  # type: ignore[attr-defined]
     with pytest.raises(ConfigError, match=r"anagnostopoulos-1988\.K: got fit = true, .* without a material"):
-        impact.calibrate({**config, **own, **data})
+        impact.calibrate({**config, **fitted, **data})
 
 
 def test_a_profile_with_several_minima_ends_in_an_interval() -> None:

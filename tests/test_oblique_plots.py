@@ -323,7 +323,7 @@ def test_pairs_of_two_codes_are_the_first_that_are_left_out() -> None:
     data = curves_of(sweep(models=models, frictions=frictions, friction={}), "beta")
     drawn = [curve.law for curve in of_pairs(data)]
     pairs = zip(models, frictions, strict=False)
-    assert drawn[:6] == [f"{model} with {friction}" for model, own in pairs for friction in (own, COULOMB)]
+    assert drawn[:6] == [f"{model} with {key}" for model, friction in pairs for key in (friction, COULOMB)]
     assert drawn[6:] == ["lammps-tsuji with liggghts-history", "lammps-tsuji with yade-mindlin"]
 
 

@@ -480,13 +480,13 @@ def _read_column(draft: Draft, name: InputName, column: str | None, columns: Col
     """Convert a column, or without a name that of the input or the only one, which gives its distribution."""
     # the single column of a file that names none may have any name
     is_single = column is None and len(columns.units) == 1
-    found, unit = columns.find(next(iter(columns.units)) if is_single else column or str(name))
+    header, unit = columns.find(next(iter(columns.units)) if is_single else column or str(name))
     # the values of axes that vary together stand in the same rows
     is_zipped = any(str(name) in group for group in draft.zip_groups)
-    rows, count, gaps = complete_rows(columns, [found], refuse=is_zipped)
+    rows, count, gaps = complete_rows(columns, [header], refuse=is_zipped)
     if gaps:
         raise ConfigError(*(columns.problem(message, header, row) for header, row, message in gaps))
-    values = columns.take(rows).values(found, name.quantity(draft.known_models), draft.exponent, unit)
+    values = columns.take(rows).values(header, name.quantity(draft.known_models), draft.exponent, unit)
     return {name.path: {"empirical": values} if column is None else values}, columns.notes(count)
 
 

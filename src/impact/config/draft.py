@@ -259,8 +259,8 @@ class Draft:
             is_replaced = any(path[:start] in self.origins for start in range(end))
             if path[:end] in key_line and not is_replaced:
                 # nobody has the lines of the starter config before them
-                place = self.name if self.name == STARTER else f"{self.name}:{key_line[path[:end]]}"
-                return (0, key_line[path[:end]]), place
+                line = key_line[path[:end]]
+                return (0, line), self.name if self.name == STARTER else f"{self.name}:{line}"
         # a parameter of a law without a table is required by the key `models` or `frictions`, and a property of a
         # material of the library by the key that names it
         required_by = {"model": "models", "friction": "frictions"}.get(str(path[0])) if path else None

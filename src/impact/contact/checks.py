@@ -209,16 +209,16 @@ def _deviation_in_si(model: ForceModel, impacts: Impacts) -> Array:
     x, v = np.linspace(0.1, 1.0, len(impacts)), np.linspace(0.9, 0.1, len(impacts))
     n, length = float(impacts.n[0]), impacts.length
     in_si = {name: impacts.quantity(name) for name in (*required_quantities(model), "K", "m", "v0")}
-    own = with_units(dimensionless_values(model, impacts), n)
+    in_contact_units = with_units(dimensionless_values(model, impacts), n)
     try:
         with np.errstate(all="ignore"):
             forces = _forces(model, {**in_si, "n": n}, x * length, v * impacts.v0) / (impacts.K * length**n)
-            own_forces = _forces(model, own, x, v)
-            differences = np.abs(forces - own_forces) / (1.0 + np.abs(own_forces))
+            expected = _forces(model, in_contact_units, x, v)
+            differences = np.abs(forces - expected) / (1.0 + np.abs(expected))
     except ModelError:
         # the collisions have reported it
         return np.full(len(impacts), np.inf)
-    return np.asarray(np.where(np.isnan(forces) & np.isnan(own_forces), 0.0, differences).max(axis=0))
+    return np.asarray(np.where(np.isnan(forces) & np.isnan(expected), 0.0, differences).max(axis=0))
 
 
 def _forces(model: ForceModel, values: LawValues, x: Array, v: Array) -> Array:

@@ -119,18 +119,18 @@ def cite(*laws: str | Path | xr.Dataset | ForceModel | FrictionLaw, plugins: Seq
     chosen: dict[str, Citation] = {}
     for item in laws:
         if isinstance(item, ForceModel | FrictionLaw):
-            found = [item]
+            cited = [item]
         elif isinstance(item, str) and item == "impact":
             chosen[item] = Citation(item, PROGRAM, {})
             continue
         elif isinstance(item, str) and not Path(item).suffix:
-            found = [look_up(known, item, "law")]
+            cited = [look_up(known, item, "law")]
         else:
             result = item if isinstance(item, xr.Dataset) else load(item)
             names = [*chosen_laws(None, result), *chosen_laws(None, result, "friction")]
             # the laws of a calibration with friction are pairs
-            found = [look_up(known, key, "law") for name in names for key in law_keys(name)]
-        chosen |= {law.key: Citation(law.key, bibtex(law), dict(vars(law.evidence))) for law in found}
+            cited = [look_up(known, key, "law") for name in names for key in law_keys(name)]
+        chosen |= {law.key: Citation(law.key, bibtex(law), dict(vars(law.evidence))) for law in cited}
     return Citations(chosen.values())
 
 
