@@ -11,6 +11,7 @@ import pytest
 import xarray as xr
 
 import impact
+from impact.contact.status import FrictionStatus
 
 BALL = {"e": 0.8, "m1": 0.2, "m2": 0.5, "R1": 0.03, "R2": 0.04, "K": 1e6, "v1": 2.0, "v2": -1.0, "mu": 0.3}
 SPRING = "cundall-strack-1979"
@@ -198,7 +199,18 @@ def test_tiny_slips_and_tiny_frictions_are_their_limits(friction: str) -> None:
     assert (np.abs(tiny["friction_residual"]) < 1e-9).all()
     smooth = impact.sweep({**laws, "sweep": {**balls, "mu": [1e-15, 1e-16, 1e-18, 1e-20], "u1": 1.0}})
     assert (smooth["friction_status"] < 10).all()
-    np.testing.assert_allclose(smooth["beta"].values.ravel(), -1.0, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(smooth["beta"].values.ravel(), -1.0, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("friction", ["lammps-mindlin", "lammps-mindlin-rescale-force"])
+def test_a_tiny_friction_is_integrated_with_other_contact_forces(friction: str) -> None:
+    balls = {"m1": 1.0, "m2": [1.0, np.inf], "R1": 0.05, "R2": 0.05, "v1": 1.0, "material": "steel"}
+    sweep = {**balls, "e": [0.1, 0.6, 0.95], "angle": [0.1, 0.7, 1.4], "mu": [1e-14, 1e-15, 1e-16, 1e-17]}
+    result = impact.sweep(
+        {"models": ["lammps-tsuji", "gharib-hurmuzlu-2012"], "frictions": friction, "sweep": sweep}
+    )
+    assert set(np.unique(result["friction_status"])) <= {FrictionStatus.OK, FrictionStatus.SLOW_LIMIT}
+    np.testing.assert_allclose(result["beta"].values, -1.0, rtol=0, atol=1e-11)
 
 
 @pytest.mark.parametrize("friction", ["lammps-mindlin", "lammps-mindlin-force"])

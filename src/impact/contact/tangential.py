@@ -47,7 +47,7 @@ from .slip_motion import (
 from .status import LIMIT, STATUS_OK, FrictionStatus, Status
 
 # G0 below which the slip after is proportional to that before, and above which it is the same, up to rounding
-SLIP_BOUNDS = (1e-12, 1e16)
+SLIP_BOUNDS = (1e-12, 1e14)
 # of a result
 WORKS = ("slip_work", "damping_work", "memory_work", "elastic_left")
 
