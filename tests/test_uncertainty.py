@@ -147,6 +147,24 @@ def test_a_law_without_the_output_has_not_failed(cli: Run, tmp_path: Path) -> No
     assert "damping_ratio: the law has none" in done.stdout
 
 
+@pytest.mark.parametrize(("of", "angle"), [("psi1", 0.1), ("beta", 0.0)])
+def test_a_friction_law_without_the_output_has_not_failed(of: str, angle: float) -> None:
+    """Coulomb's friction has no spring, and beta needs a slip."""
+    balls = {"m1": 1.0, "m2": 1.0, "R1": 0.1, "R2": 0.1, "K": 1e6, "n": 1.5}
+    sweep = {"v1": {"uniform": [0.8, 1.2]}, **balls, "angle": angle, "mu": 0.3}
+    config = {"models": "hertz", "frictions": ["coulomb-1785"], "design": {"n": 16}, "sweep": sweep}
+    study = impact.sensitivity(config, of=of)
+    assert study["failed"].item() == 0
+    assert f"{of}: the law has none" in str(impact.describe(study))
+
+
+def test_samples_without_the_output_beside_others_are_counted() -> None:
+    balls = {"m1": 1.0, "m2": 1.0, "R1": 0.1, "R2": 0.1, "K": 1e6, "n": 1.5}
+    sweep = {"v1": 1.0, **balls, "u1": {"empirical": [0.0, 1.0]}, "mu": 0.3}
+    config = {"models": "hertz", "frictions": ["coulomb-1785"], "design": {"n": 16}, "sweep": sweep}
+    assert 0 < impact.sensitivity(config, of="beta")["failed"].item() < 48
+
+
 SIMBODY_ENDS = {"c": (0.01, 3.0), "v1": (0.05, 3.0)}
 
 

@@ -105,8 +105,9 @@ def _describe_study(study: Mapping[str, Any]) -> str:
     if failed:
         return f"{of}: {failed:,} points have no result, so there are no indices; narrow the distributions"
     if math.isnan(mean):
-        is_pair = OUTPUTS[of].of_friction
-        return f"{of}: {'the friction law is not combinable with the model' if is_pair else 'the law has none'}"
+        # a study has no status of its points
+        or_pair = ", or the friction law is not combinable with the model" if OUTPUTS[of].of_friction else ""
+        return f"{of}: the law has none{or_pair}"
     mean_text, totals = quantity(mean, OUTPUTS[of].unit), {row["input"]: row["total"] for row in study["indices"]}
     if not any(map(math.isfinite, totals.values())):
         return f"{of}: {mean_text}; it does not depend on the uncertain inputs"

@@ -22,7 +22,7 @@ from ..config.input_names import InputName
 from ..config.load import Config
 from ..config.tables import power_of_two_problem
 from ..contact.model import ForceModel
-from ..contact.status import FrictionStatus, Status
+from ..contact.status import FrictionStatus
 from ..contact.variables import OUTPUTS
 from ..engine.plan import Plan
 from ..engine.run import Run
@@ -202,9 +202,9 @@ def sensitivity_of(plan: Plan, of: str, swept: xr.Dataset) -> xr.Dataset:
     scale = scale_of(OUTPUTS[of], read, has_peak="peak_indentation" in swept)
     statistics = _statistics(values, np.broadcast_to(scale, outputs.shape).reshape(shape), config)
     # a pair that has no meaning has not failed, nor has a law without the output
-    lacking = FrictionStatus.NOT_COMBINABLE if OUTPUTS[of].of_friction else Status.OK
-    is_lacking = np.isnan(values) & (read(OUTPUTS[of].status).reshape(shape) == lacking)
-    statistics["failed"] -= is_lacking.sum(axis=(1, 2))
+    complete = (FrictionStatus.OK, FrictionStatus.SLOW_LIMIT, FrictionStatus.NOT_COMBINABLE)
+    is_lacking = np.isnan(values) & np.isin(read(OUTPUTS[of].status).reshape(shape), complete)
+    statistics["failed"][is_lacking.all(axis=(1, 2))] = 0
     of_plan, paths = plan_coordinates(plan).variables, [InputName.parse(name).config_key for name in inputs]
     studied = {
         "input": ("input", paths, {"long_name": "uncertain input, by its path in the config"}),
