@@ -366,6 +366,16 @@ def test_a_target_that_is_crossed_between_values_of_the_grid_is_named() -> None:
     assert not best.within
 
 
+def test_no_crossing_is_between_points_of_one_value() -> None:
+    """Of the points at e = 0.2 the slow one rebounds more than asked for, and the fast one less."""
+    sweep = {"e": [0.2, 0.2, 0.9], "v1": [1.0, 60.0, 1.0], "zip": [["v1", "e"]], "m1": 1.0, "m2": 1.0, "K": 1e9}
+    law = "kuwabara-kono-1987"
+    result = impact.sweep({"models": law, "sweep": sweep, "model": {law: {"A": 4e-5}}})
+    assert result["e_out"].values.ravel() == pytest.approx([0.711, 0.493, 0.711], abs=1e-3)
+    (best,) = impact.recommend(result, tol=1e-3, target={"e_out": 0.6})
+    assert (best.crossings, best.row[-1]) == ((), "nowhere")
+
+
 def test_a_point_is_shown_in_degrees_and_words_and_selected_by_them() -> None:
     words = {"coulomb-1785": {"limit": ["abs", "positive"]}}
     of_friction = {"R1": 0.1, "R2": 0.1, "mu": 0.1, "angle": {"linspace": ["10 deg", "80 deg", 8]}}

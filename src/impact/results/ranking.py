@@ -90,7 +90,7 @@ class Ranked:
     served : the ranges of e, or with a target of the angle if there is one, in which all points are within the
         tolerance; None unless it varies along one axis
     crossings : pairs of neighbouring values of that input, neither of which is in `served`, between which the
-        output crosses its target; empty if it also varies along other axes
+        output crosses its target; empty if it also varies along other axes, or values of the input repeat
     friction : key of the friction law; "" for a model alone
     criterion : the output that is ranked, and the input that `served` has ranges of
     units : those of the parameters, by path, where they are known
@@ -622,5 +622,8 @@ def _crossings(values: NDArray[Any], side: NDArray[np.float64], within: Mask) ->
     """Find the neighbouring values, neither within the tolerance, between which the side of the target changes."""
     order = np.argsort(values)
     values, side, within = values[order], side[order], within[order]
+    # values repeat where other inputs vary along the same axis: no curve goes through their points
+    if (values[:-1] == values[1:]).any():
+        return ()
     crosses = (side[:-1] * side[1:] < 0.0) & ~within[:-1] & ~within[1:]
     return tuple(zip(values[:-1][crosses].tolist(), values[1:][crosses].tolist(), strict=True))
