@@ -161,7 +161,7 @@ def test_two_models_of_one_key_are_refused() -> None:
         impact.models([twin])
 
 
-def test_a_law_in_place_of_its_key_is_told_where_it_belongs() -> None:
+def test_the_message_for_a_law_instead_of_its_key_names_the_plugins() -> None:
     with pytest.raises(
         impact.ImpactError, match='expected its key, "mine-2026", and the law itself among the plug'
     ):

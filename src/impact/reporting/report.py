@@ -395,10 +395,10 @@ def _failures_section(dataset: xr.Dataset, summary: Summary) -> dict[str, Any]:
     failed_at: Sequence[tuple[Status | FrictionStatus, tuple[int, ...], tuple[int, ...]]] = summary.failed_at
     failed_at, variable = (failed_at, "status") if failed_at else (summary.friction_failed_at, "friction_status")
     points = []
-    for status, place, index in failed_at:
+    for status, laws, index in failed_at:
         axes = [dim for dim in dataset[variable].dims if dim not in LAW_DIMS]
-        point = dataset.isel(dict(zip((*LAW_DIMS[: len(place)], *axes), (*place, *index), strict=True)))
-        keys = [str(point[dim].item()) for dim in LAW_DIMS[: len(place)]]
+        point = dataset.isel(dict(zip((*LAW_DIMS[: len(laws)], *axes), (*laws, *index), strict=True)))
+        keys = [str(point[dim].item()) for dim in LAW_DIMS[: len(laws)]]
         inputs = [name for name in varying_inputs(dataset) if InputName.parse(name).applies_to(*keys)]
         points.append((law_name(*keys), at_text(point, inputs) or "–", status.meaning))
     more = summary.failed - len(points)
