@@ -51,6 +51,20 @@ def source(*materials: str, **values: float) -> dict[str, object]:
     }
 
 
+def test_a_result_with_a_law_of_the_user_is_exported_with_the_file_of_that_law(tmp_path: Path, cli: Run) -> None:
+    fields = 'title="Mine", year=2026, equation="", reference="", chi=lambda e: 1 - e'
+    law = f'from impact import hysteresis\nMINE = hysteresis("mine", {fields})\n'
+    (tmp_path / "law.py").write_text(law, encoding="utf-8")
+    config = source(K=1e6) | {"models": ["mine", "lammps-coeff-restitution-hertz"]}
+    impact.save(impact.sweep(config, plugins=[tmp_path / "law.py"]), tmp_path / "r.h5")
+    words = ("export", "r.h5", "--to", "lammps", "--code-version", "22Jul2025")
+    assert_refused(cli(*words, cwd=tmp_path), "made with mine of law.py; give it again with --plugin FILE")
+    done = cli(*words, "--plugin", "law.py", cwd=tmp_path)
+    assert (done.returncode, "damping coeff_restitution" in done.stdout) == (0, True)
+    done = cli(*words, "--plugin", "law.py", "-o", "law.py", "--overwrite", cwd=tmp_path)
+    assert (done.returncode, (tmp_path / "law.py").read_text(encoding="utf-8")) == (2, law)
+
+
 @pytest.mark.slow
 def test_materials_of_the_user_replace_that_of_table_1() -> None:
     """Each ball keeps the default until it has its own; a material of both replaces those of each."""

@@ -53,6 +53,7 @@ def export(
     overwrite: options.Overwrite = False,
     show_codes: Annotated[bool, typer.Option("--list", help="List the codes and their laws.")] = False,
     overrides: options.Set = None,
+    plugins: options.Plugins = None,
     as_json: options.Json = False,
 ) -> int:
     """Write the input lines of a simulation code for a law, and what the code delivers at its time step.

@@ -14,7 +14,9 @@ from .._version import __version__
 from ..atomic import check_outputs, write_file
 from ..config.files import read_number
 from ..config.tables import SWEEP_QUANTITIES
+from ..contact.model import ForceModel
 from ..display import Block, Displayed
+from ..engine.plugins import read_plugins
 from ..errors import UsageError
 from ..formatting import argument, decimals, number, quantity, rounded, safe_text
 from ..inverse import timestep
@@ -155,6 +157,7 @@ def export(
     output: str | Path | None = None,
     overwrite: bool = False,
     overrides: Sequence[str] | Mapping[str, object] = (),
+    plugins: Sequence[ForceModel | str | Path] = (),
 ) -> Export:
     """Write the input lines of a simulation code for a law, and what the code delivers at its time step.
 
@@ -164,7 +167,7 @@ def export(
     model : a law that the code has, by its key; by default the first one of the source, or without a source the
         first one of `export_codes`, that the release of the code has. The laws of a calibration, with their fitted
         parameters, begin with the best one
-    source, overrides : see `solve`
+    source, overrides, plugins : see `solve`; a law of `plugins` may be beside those of the code in the source
     at : values of inputs by config name; an e for a law that takes none is reached by its damping parameter
     dt : time step [s], or a text such as "2 us"; by default the contact time of the continuous law over 50
     parameter : see `timestep`; by default what sets the time scale of the law, where a given `dt` is too large
@@ -199,11 +202,11 @@ def export(
     0.5985
     """
     # before a program is run
-    check_outputs([output], [source], overwrite=overwrite)
+    check_outputs([output], [source, *plugins], overwrite=overwrite)
     code = find_code(to)
     program_path, version = choose_version(code, program, code_version, verify=verify)
-    problem = prepare_export(code, model, version, source, at or {}, overrides, friction)
-    check_outputs([output], [source, *problem.law.config.files], overwrite=overwrite)
+    problem = prepare_export(code, model, version, source, at or {}, overrides, friction, read_plugins(plugins))
+    check_outputs([output], [source, *plugins, *problem.law.config.files], overwrite=overwrite)
     if script and not code.template:
         raise UsageError(f"{argument('script')}: there is none for {code.title}: {code.tested}")
     contact_time = problem.law.contact_time

@@ -130,9 +130,10 @@ def prepare_export(
     at: Mapping[str, object],
     overrides: Overrides,
     friction: str | None = None,
+    plugins: Plugins | None = None,
 ) -> ExportProblem:
     """Choose the law, and reduce the source to one impact; the damping of a law without e is solved for."""
-    opened = open_source(source, overrides, Plugins(()))
+    opened = open_source(source, overrides, plugins or Plugins(()))
     point_source = replace(opened, config_draft=replace(opened.config_draft, has_own_scheme=True))
     notes = []
     if model is not None:
