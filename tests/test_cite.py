@@ -87,6 +87,18 @@ def test_a_result_cites_all_of_its_laws(tmp_path: Path, cli: Run) -> None:
     assert impact.cite(result).as_dict()["hertz"]["evidence"]["state"] == "seen"
 
 
+def test_a_result_asks_for_the_file_of_a_law_of_the_user(tmp_path: Path, cli: Run) -> None:
+    fields = 'title="Mine", year=2026, equation="", reference="a report", chi=lambda e: 1 - e'
+    law = f'from impact import hysteresis\nMINE = hysteresis("mine", {fields})\n'
+    (tmp_path / "law.py").write_text(law, encoding="utf-8")
+    config = {"models": ["mine"], "sweep": {"e": 0.5, "v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 1e6}}
+    impact.save(impact.sweep(config, plugins=[tmp_path / "law.py"]), tmp_path / "r.h5")
+    done = cli("cite", "r.h5", cwd=tmp_path)
+    expected = "r.h5: made with mine of law.py; give it again with --plugin FILE\n"
+    assert (done.returncode, done.stderr) == (2, expected)
+    assert "@misc{mine," in cli("cite", "r.h5", "--plugin", "law.py", cwd=tmp_path).stdout
+
+
 def test_an_unknown_law_is_named(cli: Run) -> None:
     done = cli("cite", "hertx")
     assert done.returncode == 2

@@ -18,8 +18,10 @@ from ..contact.frictions import frictions
 from ..contact.model import ForceModel
 from ..display import LATEX_CHARACTERS, Block, Displayed
 from ..engine.law_catalogue import models
+from ..engine.plugins import read_plugins
 from ..errors import UsageError
 from ..formatting import law_keys
+from .provenance import check_plugins
 from .selection import chosen_laws
 from .xarray_backend import load
 
@@ -98,7 +100,7 @@ def cite(*laws: str | Path | xr.Dataset | ForceModel | FrictionLaw, plugins: Seq
     Raises
     ------
     ModelError : a law is not in the catalogue; the message names the nearest key
-    UsageError : no law is given
+    UsageError : no law is given, or a result has a law of a file or a package that is not given
 
     >>> import impact
     >>> print(impact.cite("hertz"))  # doctest: +ELLIPSIS
@@ -129,7 +131,11 @@ def cite(*laws: str | Path | xr.Dataset | ForceModel | FrictionLaw, plugins: Seq
             result = item if isinstance(item, xr.Dataset) else load(item)
             names = [*chosen_laws(None, result), *chosen_laws(None, result, "friction")]
             # the laws of a calibration with friction are pairs
-            cited = [look_up(known, key, "law") for name in names for key in law_keys(name)]
+            keys = [key for name in names for key in law_keys(name)]
+            if not known.keys() >= {*keys}:
+                name = "the result" if isinstance(item, xr.Dataset) else str(item)
+                check_plugins(result.attrs, read_plugins(plugins), name)
+            cited = [look_up(known, key, "law") for key in keys]
         chosen |= {law.key: Citation(law.key, bibtex(law), dict(vars(law.evidence))) for law in cited}
     return Citations(chosen.values())
 
