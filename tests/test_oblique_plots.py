@@ -126,6 +126,14 @@ def test_a_pair_that_cannot_be_combined_is_named_with_the_reason(beads: xr.Datas
         curves_of(beads, "e-t", models=[HOOKE], frictions=[FORCE])
 
 
+def test_a_pair_that_cannot_be_combined_has_no_curve_of_the_spin_at_a_wall() -> None:
+    balls = BALLS | {"angle": [0.5, 1.0], "mu": 0.1, "R2": math.inf, "m2": math.inf}
+    data = curves_of(sweep(frictions=[COULOMB, FORCE], sweep=balls, friction={}), "spin")
+    reason = "the contact force lacks what the friction law needs"
+    assert data.not_drawn == (f"{HOOKE} with {FORCE}: {reason}",)
+    assert len(of_pairs(data)) == 3
+
+
 @pytest.mark.slow
 def test_the_guides_are_where_physics_has_them(beads: xr.Dataset) -> None:
     def guides(kind: str, dataset: xr.Dataset = beads, **choice: Any) -> dict[str, float]:

@@ -122,10 +122,12 @@ def _pairs_along(dataset: xr.Dataset, choice: Choice, *names: str) -> tuple[Line
     # of the variables that are looked at alone: a part is made for each of hundreds of pairs
     needed = [name for name in (*names, "friction_status") if name in line.data]
     for pair in split_by_law(line.data[needed], numbered=choice.equations):
-        if any(np.isfinite(pair.data.variables[name].values).any() for name in names):
+        statuses = np.unique(pair.data["friction_status"]) if "friction_status" in pair.data else np.zeros(0)
+        # the spin of a wall is a number whatever becomes of the ball
+        has_failed = statuses.size > 0 and (statuses >= FIRST_FAILURE).all()
+        if not has_failed and any(np.isfinite(pair.data.variables[name].values).any() for name in names):
             pairs.append(pair)
         else:
-            statuses = np.unique(pair.data["friction_status"]) if "friction_status" in pair.data else ()
             failures = [FrictionStatus(int(status)).meaning for status in statuses if status >= FIRST_FAILURE]
             not_drawn.append(f"{pair.law}: {'; '.join(failures) or 'not defined'}")
     if not pairs:
