@@ -541,6 +541,16 @@ def test_a_rerun_repeats_a_calibration_and_names_what_changed(cli: Run, tmp_path
         impact.compare(stored, ROOT / "tests" / "data" / "figure6.h5")
 
 
+def test_a_changed_plug_in_is_a_note_beside_calibrations_that_differ() -> None:
+    stored = impact.load(ROOT / "tests" / "data" / "release_1_0_0" / "calibration.h5")
+    new, old = (
+        stored.assign_attrs(plugins=json.dumps({"mine": {"file": "my.py", "sha256": digit * 64}}))
+        for digit in "ab"
+    )
+    assert "the code of mine changed" in impact.compare(new, old).notes
+    assert impact.compare(new, new).notes == ()
+
+
 def test_inputs_of_calibrations_that_differ_are_named_in_one_order() -> None:
     stored = impact.load(ROOT / "tests" / "data" / "release_1_0_0" / "calibration.h5")
     changed = stored.assign_coords({name: stored[name] + 1.0 for name in ("v2", "m2", "K", "v1", "m1")})

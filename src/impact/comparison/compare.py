@@ -97,7 +97,8 @@ def compare(
         align = align_calibrations if kind == "calibration" else align_boards
         aligned = align(a, b, subset=subset)
         faults = [*aligned.faults]
-        notes = [*_attribute_notes(a.attrs, b.attrs, {"rtol": None, "impact_version": None}), *aligned.notes]
+        notes = [*_attribute_notes(a.attrs, b.attrs, {"rtol": None, "impact_version": None})]
+        notes += [*_changed_code(a, b), *aligned.notes]
     else:
         for dataset, name in zip((a, b), names, strict=True):
             check_comparable(dataset, name)
@@ -206,10 +207,8 @@ def _sweep_notes(new: xr.Dataset, baseline: xr.Dataset, aligned: Alignment) -> I
     yield from _attribute_notes(new.attrs, baseline.attrs, defaults)
     a, b = (read_attribute(dataset.attrs, "packages") for dataset in (new, baseline))
     yield from _attribute_notes(a, b, dict.fromkeys(sorted({*a, *b})))
+    yield from _changed_code(new, baseline)
     a, b = (read_attribute(dataset.attrs, "plugins") for dataset in (new, baseline))
-    # records of files and hashes say nothing to a reader
-    changed = (key for key in sorted(a.keys() & b.keys()) if a[key] != b[key])
-    yield from (f"the code of {safe_text(key, 60)} changed" for key in changed)
     yield from _attribute_notes(a, b, dict.fromkeys(sorted(a.keys() ^ b.keys())))
     for name in MODEL_METADATA:
         if name in aligned.new.coords and name in aligned.baseline.coords:
@@ -217,6 +216,13 @@ def _sweep_notes(new: xr.Dataset, baseline: xr.Dataset, aligned: Alignment) -> I
             for key, x, y in zip(*map(np.ravel, of_models), strict=True):
                 if x != y:
                     yield safe_text(f"the {name} of {key} reads {x}, in BASELINE {y}", 600)
+
+
+def _changed_code(new: xr.Dataset, baseline: xr.Dataset) -> Iterator[str]:
+    """Name the laws of the user whose code differs; records of files and hashes say nothing to a reader."""
+    a, b = (read_attribute(dataset.attrs, "plugins") for dataset in (new, baseline))
+    changed = (key for key in sorted(a.keys() & b.keys()) if a[key] != b[key])
+    yield from (f"the code of {safe_text(key, 60)} changed" for key in changed)
 
 
 def _attribute_notes(
