@@ -206,6 +206,22 @@ def test_every_test_has_a_baseline_of_its_own(project: Path, entry_points: Path)
         assert f"/test_same-{name}.h5 may be that of another test" in old_names
 
 
+def test_a_baseline_that_this_run_wrote_is_not_replaced_by_that_of_another_result(
+    project: Path, entry_points: Path
+) -> None:
+    code = """
+def test_speeds(impact_regression):
+    for v1 in (1.0, 1.0, 2.0):
+        impact_regression({"models": ["hertz"], "sweep": {"e": 0.5, "v1": v1, "m1": 1.0, "m2": 1.0, "K": 1e6}})
+"""
+    (project / "tests" / "test_speeds.py").write_text(code, encoding="utf-8")
+    done = run_pytest(project, entry_points, "tests/test_speeds.py", "--impact-bless=first")
+    assert done.returncode == 1
+    assert (
+        "test_speeds-test_speeds.h5: was written from another result in this run; name a baseline" in done.stdout
+    )
+
+
 @pytest.mark.slow
 def test_a_baseline_is_rewritten_only_if_it_differs(project: Path, entry_points: Path) -> None:
     baseline = project / "baselines" / "contact.h5"

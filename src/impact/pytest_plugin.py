@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 # the properties of a test that bring its baselines to the summary, also from workers of pytest-xdist
 WRITTEN, OLD_NAME = "impact baseline", "impact baseline with an old name"
 COLLECTED = pytest.StashKey[list[pytest.Item]]()
+# the baselines that this run wrote
+BLESSED = pytest.StashKey[set[Path]]()
 MAX_NAME_LENGTH = 150  # of a default baseline without .h5; file systems allow 255 bytes
 
 
@@ -168,11 +170,17 @@ class ImpactRegression:
                 raise
         if verdict is not None and verdict.equal:
             return verdict
+        written = self.request.config.stash.setdefault(BLESSED, set())
+        if baseline in written:
+            raise impact.UsageError(
+                f"{baseline}: was written from another result in this run; name a baseline for each result"
+            )
         baseline.parent.mkdir(parents=True, exist_ok=True)
         if is_study:
             save_with_attributes(new, baseline, str(result.encoding["seal"]), {"reason": reason})
         else:
             verdict = impact.bless(new, baseline, reason=reason, tol=tol, allow_failed=allow_failed)
+        written.add(baseline)
         self.request.node.user_properties.append((WRITTEN, str(baseline)))
         return verdict
 
