@@ -165,7 +165,7 @@ def test_the_message_for_a_law_instead_of_its_key_names_the_plugins() -> None:
     with pytest.raises(
         impact.ImpactError, match='expected its key, "mine-2026", and the law itself among the plug'
     ):
-        impact.sweep(models=[_mine()], e=0.5)  # type: ignore[list-item]
+        impact.sweep({"models": [_mine()], "sweep": SWEEP})
 
 
 def test_a_stiffness_may_be_a_parameter_of_a_law() -> None:

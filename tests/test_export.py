@@ -818,24 +818,22 @@ def test_the_tolerance_on_beta_is_four_indentations_over_the_effective_radius_an
     """
     program = write_program(tmp_path / "lmp", RELEASE + 'echo "beta = 0.5"; echo "e_out = 0.6"')
 
-    def verify(angle: float, **inputs: float) -> tuple[Verification, float, float]:
+    def verify(angle: float, **inputs: float) -> tuple[Verification, float]:
         laws = {"models": default_law("lammps"), "frictions": "lammps-mindlin"}
         config = source("soft", "soft", v1=0.5, mu=0.3, angle=angle, **inputs) | laws
         verification = impact.export("lammps", source=config, verify=True, program=str(program)).verification
         assert verification is not None
         result = impact.sweep(config)
         turn = 0.5 * math.tan(angle) * result["contact_time"].item() / (BALLS["R1"] + BALLS["R2"])
-        indentation = result["peak_indentation"].item() / 0.03
-        # that of beta has the change of a friction of mu times the force, too, over m_t/m = 2/7
-        return verification, max(4.0 * indentation, turn), max(4.0 * indentation, turn * (1.0 + 3.5 * 0.3))
+        return verification, max(result["peak_indentation"].item() / 0.03, turn / 4.0)
 
     for angle in (0.1, 0.8, 1.5):
-        balls, turning, beta_turning = verify(angle)
+        balls, indentation = verify(angle)
         assert balls.beta_measured == (0.5,) * 4
-        assert balls.uncertainty == pytest.approx(turning / math.cos(angle), rel=1e-9)
+        assert balls.uncertainty == pytest.approx(4.0 * indentation / math.cos(angle), rel=1e-9)
         # beta is a ratio of slips: the smaller the slip, the larger the tolerance
-        assert balls.beta_uncertainty == pytest.approx(beta_turning / math.sin(angle), rel=1e-9)
-    wall, *_ = verify(0.1, R2=math.inf, m2=math.inf)
+        assert balls.beta_uncertainty == pytest.approx(4.0 * indentation / math.sin(angle), rel=1e-9)
+    wall, _ = verify(0.1, R2=math.inf, m2=math.inf)
     assert wall.beta_uncertainty == wall.uncertainty == 1e-9
 
 
@@ -853,23 +851,6 @@ def test_the_normal_of_a_wall_of_yade_does_not_turn(tmp_path: Path, release: str
     overrides = {"materials.soft": SOFT, "sweep.material": "soft"}
     peak = impact.run(model="yade-betan", at=at, overrides=overrides).values["peak_indentation"]
     assert verification.beta_uncertainty == pytest.approx(4.0 * peak / radius / math.sin(1.5), rel=1e-6)
-
-
-@pytest.mark.slow
-def test_lammps_agrees_at_a_grazing_impact_with_much_friction(tmp_path: Path) -> None:
-    """What LAMMPS of 29 September 2021 prints: its normal turns by 0.0011 rad, and 0.0026 of beta with it."""
-    measured = (0.9564011, 0.9563275, 0.9562544, 0.9561820), (-0.1553312, -0.1553630, -0.1550527, -0.1542641)
-    (tmp_path / "values").write_text("".join(f"{e} {beta}\n" for e, beta in zip(*measured, strict=True)))
-    run = 'cd "${0%/*}"; read e beta < values; echo "beta = $beta"; echo "e_out = $e"; sed -i 1d values'
-    program = write_program(tmp_path / "lmp", RELEASE + run)
-    law, friction = "lammps-tsuji-hooke-without-root", "lammps-linear-history"
-    at = {"K": 1e7, "R1": 1e-3, "R2": 1e-3, "m1": 1e-5, "m2": 1e-5, "speed": 1.0, "angle": "80 deg", "e": 0.95}
-    at |= {"mu": 0.7, f"friction.{friction}.kt_over_kn": 0.2857}
-    export = impact.export("lammps", law, friction=friction, at=at, verify=True, program=str(program))
-    verification = export.verification
-    assert verification is not None
-    assert verification.beta_difference == pytest.approx(0.00255, abs=1e-5)
-    assert verification.agrees
 
 
 @pytest.mark.slow

@@ -449,8 +449,7 @@ PLANTED_FRICTION = (
     ("kelvin-voigt-no-tension", "coulomb-1785", ", 0.5)", ", -0.5)", "ball"),
     ("kelvin-voigt-no-tension", "coulomb-1785", "lateralFriction=0.547", "lateralFriction=0.5", "ball"),
     ("kelvin-voigt-no-tension", "coulomb-1785", "angularDamping=0", "angularDamping=0.04", "wall"),
-    # the sign alone is within the uncertainty of two balls whose normal turns
-    ("kelvin-voigt-no-tension", "coulomb-1785", "+ 0.08 * omega2", "+ 0.8 * omega2", "ball"),
+    ("kelvin-voigt-no-tension", "coulomb-1785", "+ 0.08 * omega2", "- 0.08 * omega2", "ball"),
     ("newton-semi-implicit", "coulomb-1785", "0, 0, 0, -0.3", "0, 0, 0, 0.3", "wall"),
     ("newton-semi-implicit", "coulomb-1785", "0, 0, 0, 0.5", "0, 0, 0, -0.5", "ball"),
     ("newton-semi-implicit", "coulomb-1785", "mu=0.3", "mu=0.25", "wall"),

@@ -207,18 +207,15 @@ def _with_friction(
     (predicted,) = problem.law.outputs(steps, "beta")
     exact, impact = verification.uncertainty, problem.law.impact
     v0, slip = float(impact.v0[0]), float(oblique.slip.item())
-    before, mass_ratio = float((oblique.u1 - oblique.u2).item()), float(oblique.mass_ratio.item())
-    tangential = max(abs(before), float(np.abs(before - mass_ratio * slip * (1.0 + predicted)).max()))
+    tangential = float((oblique.u1 - oblique.u2).item())
     speed = math.hypot(v0, tangential)
     # a law that needs no radius may have none in its impact
     collision = problem.collision(float(steps[0]), 0.5)
-    turning = beta_turning = TURNING * problem.law.continuous["peak_indentation"] / collision.effective_radius
+    turning = TURNING * problem.law.continuous["peak_indentation"] / collision.effective_radius
     if not problem.has_wall:
         # at a grazing impact the centres move far along the tangent while the balls touch
-        turn = tangential * problem.law.contact_time / (collision["R1"] + collision["R2"])
-        # which changes the normal impulse, too, and with it the impulse of a friction of mu times the force
-        beta_turn = turn * (1.0 + float(oblique.mu.item()) / mass_ratio)
-        turning, beta_turning = max(turning, turn), max(turning, beta_turn)
+        turn = abs(tangential) * problem.law.contact_time / (collision["R1"] + collision["R2"])
+        turning = max(turning, turn)
     is_turning = problem.code.shortens_arms or not problem.has_wall
     reason = verification.reason
     if exact <= MAX_UNCERTAINTY:
@@ -231,7 +228,7 @@ def _with_friction(
         uncertainty=exact if problem.has_wall and not problem.law.is_coupled else max(exact, turning * speed / v0),
         beta_measured=tuple(run.get("beta", math.nan) for row in runs for run in row),
         beta_predicted=tuple(predicted.ravel().tolist()),
-        beta_uncertainty=max(exact, beta_turning * max(1.0, speed / abs(slip))) if is_turning else exact,
+        beta_uncertainty=max(exact, turning * max(1.0, speed / abs(slip))) if is_turning else exact,
         reason=reason,
     )
 
