@@ -854,6 +854,30 @@ def test_the_normal_of_a_wall_of_yade_does_not_turn(tmp_path: Path, release: str
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("error", "verdict"), [(0.0, "UNDECIDED"), (-0.002, "agrees"), (0.002, "DIFFERS")])
+def test_what_the_turn_of_the_normal_explains_at_a_grazing_impact_is_undecided(
+    tmp_path: Path, error: float, verdict: str
+) -> None:
+    """What LAMMPS of 29 September 2021 prints: its normal turns by 0.0011 rad, and 0.0026 of beta with it."""
+    measured = (0.9564011, 0.9563275, 0.9562544, 0.9561820), (-0.1553312, -0.1553630, -0.1550527, -0.1542641)
+    rows = (f"{e} {beta - error}\n" for e, beta in zip(*measured, strict=True))
+    (tmp_path / "values").write_text("".join(rows))
+    run = 'cd "${0%/*}"; read e beta < values; echo "beta = $beta"; echo "e_out = $e"; sed -i 1d values'
+    program = write_program(tmp_path / "lmp", RELEASE + run)
+    law, friction = "lammps-tsuji-hooke-without-root", "lammps-linear-history"
+    at = {"K": 1e7, "R1": 1e-3, "R2": 1e-3, "m1": 1e-5, "m2": 1e-5, "speed": 1.0, "angle": "80 deg", "e": 0.95}
+    at |= {"mu": 0.7, f"friction.{friction}.kt_over_kn": 0.2857}
+    export = impact.export("lammps", law, friction=friction, at=at, verify=True, program=str(program))
+    verification = export.verification
+    assert verification is not None
+    assert verification.beta_difference == pytest.approx(0.00255 + error, abs=1e-5)
+    text = "\n".join(str(verification).split("\n")[-2:])
+    assert f"{verdict}: " in text
+    assert ("the normal of two balls turns" in text) == (verdict == "UNDECIDED")
+    assert (verification.agrees, verification.differs) == (verdict == "agrees", verdict == "DIFFERS")
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("modulus", "measured", "verdict", "exit_code"),
     [

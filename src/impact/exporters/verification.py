@@ -46,6 +46,7 @@ class Verification(Displayed):
     uncertainty : tolerance on the restitution
     beta_measured, beta_predicted : the tangential restitution likewise; empty without friction
     beta_uncertainty : tolerance on it
+    beta_turning : up to where a difference of it may be the friction that changes with the turn of the normal
     reason : where most of the uncertainty comes from, and what makes it smaller
     """
 
@@ -58,6 +59,7 @@ class Verification(Displayed):
     beta_measured: tuple[float, ...] = ()
     beta_predicted: tuple[float, ...] = ()
     beta_uncertainty: float = 0.0
+    beta_turning: float = 0.0
     reason: str = ""
 
     def as_dict(self) -> dict[str, Any]:
@@ -91,7 +93,10 @@ class Verification(Displayed):
             beta = f"; of beta {number(self.beta_difference, 2)}, uncertainty {number(self.beta_uncertainty, 2)}"
         yield f"{word}: {largest}, uncertainty {number(self.uncertainty, 2)}{beta}"
         if not (self.differs or self.agrees):
-            yield f"an uncertainty above {MAX_UNCERTAINTY} shows nothing: {self.reason}"
+            limit = f"an uncertainty above {MAX_UNCERTAINTY}"
+            if self.beta_difference > self.beta_uncertainty:
+                limit = f"a difference of beta up to {number(self.beta_turning, 2)}"
+            yield f"{limit} shows nothing: {self.reason}"
 
     @property
     def difference(self) -> float:
@@ -107,13 +112,15 @@ class Verification(Displayed):
 
     @property
     def differs(self) -> bool:
-        """Whether a difference is larger than its uncertainty, or no number."""
-        return not (self.difference <= self.uncertainty and self.beta_difference <= self.beta_uncertainty)
+        """Whether a difference is larger than its uncertainty and than what a turn explains, or no number."""
+        beta_limit = max(self.beta_uncertainty, self.beta_turning)
+        return not (self.difference <= self.uncertainty and self.beta_difference <= beta_limit)
 
     @property
     def agrees(self) -> bool:
         """Whether no difference is larger than its uncertainty, and both uncertainties are at most 0.05."""
-        return not self.differs and max(self.uncertainty, self.beta_uncertainty) <= MAX_UNCERTAINTY
+        is_within = not self.differs and self.beta_difference <= self.beta_uncertainty
+        return is_within and max(self.uncertainty, self.beta_uncertainty) <= MAX_UNCERTAINTY
 
     @property
     def not_numbers(self) -> str:
@@ -200,7 +207,8 @@ def _with_friction(
     """Add the tangential restitution.
 
     The normal of two balls turns, and some codes shorten the arm of friction: both change velocities by a part of
-    the speed before the impact, of the order of the indentation over R* and of the angle of the turn.
+    the speed before the impact, of the order of the indentation over R* and of the angle of the turn. The turn
+    also changes the normal impulse, and with it that of friction which slides.
     """
     oblique = problem.law.oblique
     assert oblique is not None
@@ -211,11 +219,17 @@ def _with_friction(
     speed = math.hypot(v0, tangential)
     # a law that needs no radius may have none in its impact
     collision = problem.collision(float(steps[0]), 0.5)
+    beta_turning = 0.0
     turning = TURNING * problem.law.continuous["peak_indentation"] / collision.effective_radius
     if not problem.has_wall:
         # at a grazing impact the centres move far along the tangent while the balls touch
-        turn = abs(tangential) * problem.law.contact_time / (collision["R1"] + collision["R2"])
-        turning = max(turning, turn)
+        turn_of_speed = problem.law.contact_time / (collision["R1"] + collision["R2"])
+        turning = max(turning, abs(tangential) * turn_of_speed)
+        # a spin may drive them
+        mass_ratio, mu = float(oblique.mass_ratio.item()), float(oblique.mu.item())
+        fastest = max(abs(tangential), float(np.abs(tangential - mass_ratio * slip * (1.0 + predicted)).max()))
+        turn = fastest * turn_of_speed * (1.0 + mu / mass_ratio)
+        beta_turning = turn * max(1.0, math.hypot(v0, fastest) / abs(slip))
     is_turning = problem.code.shortens_arms or not problem.has_wall
     reason = verification.reason
     if exact <= MAX_UNCERTAINTY:
@@ -229,6 +243,7 @@ def _with_friction(
         beta_measured=tuple(run.get("beta", math.nan) for row in runs for run in row),
         beta_predicted=tuple(predicted.ravel().tolist()),
         beta_uncertainty=max(exact, turning * max(1.0, speed / abs(slip))) if is_turning else exact,
+        beta_turning=beta_turning,
         reason=reason,
     )
 
