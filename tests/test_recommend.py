@@ -164,6 +164,11 @@ def test_a_model_is_named_with_its_best_parameters_and_their_units() -> None:
     (row,) = impact.recommend(impact.sweep(config)).models
     assert row.row[0] == "kuwabara-kono-1987 with A = 10 µs"
     assert "units" not in row.record
+    # a unit with the exponent of the law
+    config["model"] = {"kuwabara-kono-1987": {"A": 1e-5, "K": [6e9, 7e9]}}
+    (row,) = impact.recommend(impact.sweep(config)).models
+    assert row.row[0] == "kuwabara-kono-1987 with K = 7 GN/m^1.5"
+    assert row.row[5].startswith("e=0.5, kuwabara-kono-1987.K=7 GN/m^1.5: ")
 
 
 def test_with_a_target_of_e_out_the_table_lists_the_e_to_ask_for(figure6: xr.Dataset) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -163,8 +164,10 @@ def inputs_at(values: xr.DataArray, position: Iterable[int]) -> dict[str, Any]:
     return inputs_of_model({str(dim): point[dim].values.item() for dim in values.dims})
 
 
-def describe_point(at: Mapping[str, float | str], digits: int = 12) -> str:
-    """List the inputs of a point for a message, with their units and words.
+def describe_point(
+    at: Mapping[str, float | str], digits: int = 12, units: Mapping[str, str] = MappingProxyType({})
+) -> str:
+    """List the inputs of a point for a message, with words and their units, of which some may be given by path.
 
     >>> describe_point({"model": "hertz", "e": 0.1 + 0.2, "v1": 0.005, "friction.coulomb-1785.limit": 1.0})
     'model=hertz, e=0.3, v1=5 mm/s, friction.coulomb-1785.limit=positive'
@@ -173,7 +176,7 @@ def describe_point(at: Mapping[str, float | str], digits: int = 12) -> str:
     for text, value in at.items():
         name = InputName.parse(text)
         # an exponent n has a value for each law
-        unit = "1" if names_in(name.unit) else name.unit
+        unit = units.get(name.config_key, "1" if names_in(name.unit) else name.unit)
         texts.append(f"{safe_text(text)}={safe_text(prefixed(name.word(value), unit, digits), 60)}")
     return ", ".join(texts)
 

@@ -19,7 +19,7 @@ from ..config.input_names import InputName, with_words
 from ..config.quantities import Quantity
 from ..config.tables import TOLERANCE
 from ..contact.status import FIRST_FAILURE, FrictionStatus, Status
-from ..contact.units import names_in
+from ..contact.units import names_in, with_numbers
 from ..contact.variables import OUTPUTS
 from ..display import Block, Displayed, Table, html_of
 from ..errors import UsageError, did_you_mean
@@ -93,7 +93,7 @@ class Ranked:
         output crosses its target; empty if it also varies along other axes, or values of the input repeat
     friction : key of the friction law; "" for a model alone
     criterion : the output that is ranked, and the input that `served` has ranges of
-    units : those of the parameters, by path, where they are known
+    units : those of the parameters and of `at`, by path, where they are known
     """
 
     model: str
@@ -156,7 +156,7 @@ class Ranked:
             for error in (self.max_error, self.mean_error)
         )
         has_worst = self.at and self.max_error > MIN_ERROR_FLOOR
-        worst = f"{describe_point(self.at, 6)}: {output} {shown(self.e_out, 4)}" if has_worst else "–"
+        worst = f"{describe_point(self.at, 6, self.units)}: {output} {shown(self.e_out, 4)}" if has_worst else "–"
         return (self.name, percentage(self.share), *errors, f"{self.failed:,}", worst, self._served_text)
 
     @property
@@ -563,8 +563,14 @@ def _rank_law(law_data: xr.Dataset, tol: float, criterion: Criterion) -> Ranked:
     }
     units = {
         InputName.parse(name).config_key: plain_unit(str(law_data.variables[name].attrs.get("units", "1")))
-        for name in chosen
+        for name in {**chosen, **at}
     }
+    exponent = law_data.variables.get("exponent")
+    if exponent is not None and exponent.ndim == 0:
+        numbers = {"n": float(exponent.values)}
+        units = {
+            path: with_numbers(unit, numbers) if names_in(unit) == {"n"} else unit for path, unit in units.items()
+        }
     served = _served_ranges(served_input.values, judged > 0, within < judged) if along_one else None
     crossings = _crossings(served_input.values, side, within > 0) if along_one else ()
     model, friction = _keys(law_data)
