@@ -214,6 +214,18 @@ def with_package(forked: ForkServer) -> Callable[..., CompletedCommand]:
     return run
 
 
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--check", "hertzz"], 'no model "hertzz"; did you mean "hertz"?'),
+        (["flores-2011", "--check", "hertz"], "--check: got hertz with flores-2011, expected one of the two"),
+    ],
+)
+def test_a_check_of_a_law_of_the_catalogue_names_one(cli: Run, words: list[str], message: str) -> None:
+    done = cli("models", *words)
+    assert (done.returncode, done.stderr.strip()) == (2, message)
+
+
 @pytest.mark.slow
 def test_the_laws_of_an_installed_package_are_in_the_catalogue(
     cli: Run, with_package: Callable[..., CompletedCommand], tmp_path: Path
@@ -223,6 +235,8 @@ def test_the_laws_of_an_installed_package_are_in_the_catalogue(
     listed = json.loads(with_package("models", "--json", site=site).stdout)
     # a law that the package imports is not one of its laws
     assert [model["key"] for model in listed if model["key"] not in impact.models()] == ["ours-2026", "stiff-2026"]
+    checked = with_package("models", "--check", "ours-2026", "--json", site=site)
+    assert (checked.returncode, json.loads(checked.stdout)[0]["model"]) == (0, "ours-2026"), checked.stderr
 
     done = with_package("sweep", "config.toml", "--jobs", "2", cwd=tmp_path, site=site)
     assert done.returncode == 0, done.stderr

@@ -42,7 +42,8 @@ def models(
         ),
     ] = None,
     check: Annotated[
-        Path | None, options.value("FILE", "Check the models of a Python file against the contract.")
+        Path | None,
+        options.value("FILE|KEY", "Check the models of a Python file, or a model, against the contract."),
     ] = None,
     frictions: Annotated[bool, typer.Option("--frictions", help="List friction laws, not models.")] = False,
     plugins: options.Plugins = None,
@@ -60,7 +61,13 @@ def models(
             if is_set and value is not None:
                 raise UsageError(f"{name}: got it with {other}, expected one of the two")
     if check is not None:
-        with_file, others = impact.models([check]), impact.models()
+        others = impact.models()
+        if not check.suffix:
+            if key is not None:
+                raise UsageError(f"--check: got {check} with {key}, expected one of the two")
+            _check_contract([others.find(str(check))], as_json=as_json)
+            return
+        with_file = impact.models([check])
         of_file = [model for name, model in with_file.items() if name not in others and key in (None, name)]
         _check_contract(of_file or [with_file.find(str(key))], as_json=as_json)
         return
