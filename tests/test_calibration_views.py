@@ -110,6 +110,14 @@ def test_the_table_of_a_picture_has_curves_residuals_and_measured_values(
     assert len(rows) == sum(table[name].count() for name in table if not name.startswith("v1 "))
 
 
+def test_the_differences_of_two_calibrations_are_drawn(cli: Run, drops: xr.Dataset, tmp_path: Path) -> None:
+    for name, factor in (("old.h5", 1.0), ("new.h5", 1.01)):
+        impact.save(drops.assign(estimate=factor * drops["estimate"]), tmp_path / name)
+    done = cli("compare", "new.h5", "old.h5", "--plot", "differences.png", cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (1, "differences.png: where the differences lie\n")
+    assert (tmp_path / "differences.png").exists()
+
+
 def test_models_chooses_the_laws(drops: xr.Dataset) -> None:
     figure = impact.plot(drops, models=["hunt-crossley-1975"])
     names = [text.get_text() for text in figure.legends[0].get_texts()]

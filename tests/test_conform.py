@@ -501,7 +501,9 @@ def test_a_board_is_stored_and_compared(cli: Run, tmp_path: Path) -> None:
     assert {variable.name for variable in verdict.differing} == {"check_status", "delivered"}
     assert {variable.at["engine"] for variable in verdict.differing} == {"mine"}
     assert "the version of mine is 1.1, in BASELINE 1.0" in verdict.notes
-    assert cli("compare", str(newer), str(older)).returncode == 1
+    drawn = cli("compare", str(newer), str(older), "--plot", str(tmp_path / "differences.png"))
+    assert (drawn.returncode, drawn.stderr) == (1, f"{tmp_path / 'differences.png'}: where the differences lie\n")
+    assert set(verdict.worst_along) == {"engine", "check"}
     assert cli("info", str(older)).returncode == 0
     for words in (("plot", str(older), "-o", str(tmp_path / "p.png")), ("recommend", str(older))):
         assert "this is a board" in cli(*words).stderr

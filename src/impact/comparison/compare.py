@@ -136,9 +136,7 @@ def compare(
         variables=tuple(comparison for comparison, _ in compared.values()),
         notes=tuple(notes),
         repeats=repeats,
-        worst_along={}
-        if is_study
-        else _along_axes({name: ratios for name, (_, ratios) in compared.items()}, aligned.baseline),
+        worst_along=_along_axes({name: ratios for name, (_, ratios) in compared.items()}, aligned.baseline),
     )
 
 
