@@ -2,6 +2,7 @@
 
 import json
 import re
+from collections.abc import Mapping
 
 import numpy as np
 import pytest
@@ -154,14 +155,14 @@ def test_exclusions_depend_on_the_order():
     assert expanded_keys(["flores-2011", "ye-2009-hertz", "!flores-2011"]) == ["ye-2009-hertz"]
 
 
-def config_of(choice: object, **parameters: object) -> Config:
+def config_of(choice: object, inputs: Mapping[str, object] = {}, **parameters: object) -> Config:
     steel = {"E": 210e9, "nu": 0.3, "rho": 7850.0, "yield_strength": 3e8}
-    tables = {"sweep": {**BALLS, "e": 0.5, "material": "steel"}, "materials": {"steel": steel}}
+    tables = {"sweep": {**BALLS, "e": 0.5, "material": "steel", **inputs}, "materials": {"steel": steel}}
     return read_config({"models": choice, **tables, **({"model": parameters} if parameters else {})}, (), ())
 
 
-def problems_of_choice(choice: object) -> list[str]:
-    return problems_of(config_of, choice)
+def problems_of_choice(choice: object, inputs: Mapping[str, object] = {}) -> list[str]:
+    return problems_of(config_of, choice, inputs)
 
 
 NOTHING_BEFORE = "expected models to exclude from those before it"
@@ -196,17 +197,14 @@ def test_an_empty_exclusion_is_reported_with_the_known_models():
     assert line.startswith('config: models[1]: after !: got "", expected a model; known: ')
 
 
-def test_a_missing_parameter_of_a_law_of_all_is_reported_with_the_exclusion_of_the_law():
+def test_missing_parameters_of_many_laws_of_all_are_one_line_with_their_exclusion():
     without_default = [key for key in LAWS if any(parameter.default is None for parameter in find(key).parameters)]
-    lines = problems_of_choice("all")
-    assert list(dict.fromkeys(line.split(".")[1] for line in lines)) == without_default
-    assert (
-        "config: model.kuwabara-kono-1987.A: missing, expected a number >= 0 s: dissipative constant of the "
-        'material; or models = [..., "!kuwabara-kono-1987"]'
-    ) in lines
-    # excluding all laws that the messages name works, and so does setting what is missing
-    advice = [re.search(r'; or models = \[\.\.\., "(!.*)"\]$', line) for line in lines]
-    remaining = config_of(["all", *dict.fromkeys(match[1] for match in advice if match)]).models
+    (line,) = problems_of_choice("all")
+    first = "kelvin-voigt (C), kelvin-voigt-no-tension (C), kuwabara-kono-1987 (A)"
+    more = len(without_default) - 3
+    assert line.startswith(f"config: models: a parameter is missing, of {first} and {more} more; ")
+    # the list that the message has works, and so does setting what is missing
+    remaining = config_of(json.loads(line.rpartition("models = ")[2])).models
     assert [model.key for model in remaining] == [key for key in LAWS if key not in without_default]
     parameters = {
         key: {
@@ -217,6 +215,21 @@ def test_a_missing_parameter_of_a_law_of_all_is_reported_with_the_exclusion_of_t
         for key in without_default
     }
     assert [model.key for model in config_of("all", **parameters).models] == LAWS
+
+
+def test_a_missing_parameter_of_a_law_of_a_pattern_is_reported_with_the_exclusion_of_the_law():
+    missing = "missing, expected a number >= 0 s: dissipative constant of the material"
+    line = f'config: model.kuwabara-kono-1987.A: {missing}; or models = [..., "!kuwabara-kono-1987"]'
+    assert problems_of_choice(["hertz", "kuwabara-kono-1*"]) == [line]
+
+
+def test_a_stiffness_that_many_laws_of_a_family_do_not_take_is_one_line():
+    choice = ["family:hysteresis", "family:dashpot", "!kelvin-voigt*"]
+    (line,) = problems_of_choice(choice, {"K": 1e9})
+    keys = "ye-2009-kelvin, anagnostopoulos-1988, anagnostopoulos-1988-no-tension"
+    assert line.startswith(f"config: sweep.K: got a stiffness for n = 1.5, but {keys} and 1 more have another n; ")
+    remaining = config_of(json.loads(line.rpartition("models = ")[2]), {"K": 1e9}).models
+    assert {model.exponent for model in remaining} == {None, 1.5}
 
 
 @pytest.mark.parametrize("choice", ["kelvin-voigt", ["hertz", "kelvin-voigt"]])

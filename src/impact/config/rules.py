@@ -19,6 +19,9 @@ from .input_names import InputName
 from .quantities import ConfigProblem, KeyPath, Quantity
 from .tables import FIXED_STEP_INPUTS, MATERIAL_QUANTITIES, OBLIQUE_INPUTS, SWEEP_DEFAULTS, SWEEP_QUANTITIES
 
+# laws that a message names; more that a pattern selected share one line
+MAX_LAWS = 3
+
 
 def _sets_stiffness(draft: Draft, model: ForceModel) -> bool:
     """Whether [model.KEY] has a K."""
@@ -44,17 +47,33 @@ def _materials_without(draft: Draft, ball: str, key: str) -> Iterator[str]:
             yield name
 
 
+def _first(keys: Sequence[str]) -> str:
+    """Name the first of some laws, and count the others."""
+    more = f" and {len(keys) - MAX_LAWS} more" if len(keys) > MAX_LAWS else ""
+    return ", ".join(keys[:MAX_LAWS]) + more
+
+
 def _models_using(draft: Draft, *quantities: str) -> str:
     """Name the models that depend on any of the quantities; empty if none does."""
-    keys = [m.key for m in draft.models if not with_base_quantities(m.quantities).isdisjoint(quantities)]
-    more = f" and {len(keys) - 3} more" if len(keys) > 3 else ""
-    return ", ".join(keys[:3]) + more
+    return _first([m.key for m in draft.models if not with_base_quantities(m.quantities).isdisjoint(quantities)])
+
+
+def _without_named(draft: Draft, keys: Iterable[str]) -> list[str]:
+    """Keep the models that "all", a family or a pattern selected."""
+    named = listed_names(draft.data.get("models"))
+    return [key for key in keys if key not in named]
 
 
 def _exclusion_hint(draft: Draft, model: ForceModel) -> str:
     """Describe how to exclude a model that "all", a family or a pattern selected; empty for a named model."""
-    is_named = model.key in listed_names(draft.data.get("models"))
-    return "" if is_named or len(draft.models) == 1 else f'; or models = [..., "!{model.key}"]'
+    is_selected = _without_named(draft, [model.key]) and len(draft.models) > 1
+    return f'; or models = [..., "!{model.key}"]' if is_selected else ""
+
+
+def _models_without(draft: Draft, keys: Sequence[str]) -> str:
+    """Write the models of the config without some that "all", a family or a pattern selected."""
+    names = [*listed_names(draft.data.get("models")), *(f"!{key}" for key in keys)]
+    return "models = [" + ", ".join(f'"{name}"' for name in names) + "]"
 
 
 def _vary_together(draft: Draft, *names: str) -> bool:
@@ -114,15 +133,18 @@ def _stiffness_problems(draft: Draft) -> Iterable[ConfigProblem]:
     if is_axis and not _vary_together(draft, "K", "n"):
         expected = "expected one K for each n, zipped with it"
         yield ("sweep", "K"), f"its unit N/m^n depends on n, which is an axis; {expected}"
-    for model in draft.models:
-        if has_other_stiffness(draft, model):
-            exponent = "an axis n" if n is None else f"n = {n:g}"
-            # setting n of the sweep helps unless two models have different fixed exponents
-            serves = n is not None and {other.exponent for other in draft.models} <= {None, model.exponent}
-            remedy = f"n = {model.exponent:g} under [sweep], " if serves else ""
-            expected = f"{remedy}K under [model.{model.key}], or no K{_exclusion_hint(draft, model)}"
-            got = f"got a stiffness for {exponent}, but {model.key} has n = {model.exponent:g}"
-            yield ("sweep", "K"), f"{got}; expected {expected}"
+    got = f"got a stiffness for {'an axis n' if n is None else f'n = {n:g}'}, but"
+    # setting n of the sweep helps unless two models have different fixed exponents
+    fixed = {model.exponent for model in draft.models} - {None}
+    remedy = f"n = {fixed.pop():g} under [sweep], " if n is not None and len(fixed) == 1 else ""
+    others = {model.key: model for model in draft.models if has_other_stiffness(draft, model)}
+    if len(keys := _without_named(draft, others)) > MAX_LAWS:
+        expected = f"{remedy}K under [model.KEY] of each, or no K; or {_models_without(draft, keys)}"
+        yield ("sweep", "K"), f"{got} {_first(keys)} have another n; expected {expected}"
+        others = {key: model for key, model in others.items() if key not in keys}
+    for key, model in others.items():
+        expected = f"{remedy}K under [model.{key}], or no K{_exclusion_hint(draft, model)}"
+        yield ("sweep", "K"), f"{got} {key} has n = {model.exponent:g}; expected {expected}"
 
 
 def _material_problems(draft: Draft) -> Iterable[ConfigProblem]:
@@ -191,8 +213,15 @@ def _radius_problems(draft: Draft) -> Iterable[ConfigProblem]:
 
 
 def _parameter_problems(draft: Draft) -> Iterable[ConfigProblem]:
-    """Check that parameters without a default are set."""
-    for name in draft.missing_parameters:
+    """Check that parameters without a default are set; of many laws that a name selected in one line."""
+    missing = [*draft.missing_parameters]
+    of_models = {name.model: name.key for name in missing if name.model}
+    if len(selected := _without_named(draft, of_models)) > MAX_LAWS:
+        laws = _first([f"{key} ({of_models[key]})" for key in selected])
+        expected = f"it under [model.KEY] of each; or {_models_without(draft, selected)}"
+        yield ("models",), f"a parameter is missing, of {laws}; expected {expected}"
+        missing = [name for name in missing if name.model not in selected]
+    for name in missing:
         quantity, model = name.quantity(draft.known_models), draft.known_models.get(name.model)
         assert quantity is not None
         yield name.path, _missing(quantity) + ("" if model is None else _exclusion_hint(draft, model))
