@@ -260,6 +260,13 @@ def test_board(impact_regression):
 def test_a_board_has_a_baseline(project: Path, entry_points: Path) -> None:
     test, baseline = project / "tests" / "test_engine.py", project / "tests/baselines/test_engine-test_board.h5"
     test.write_text(BOARD, encoding="utf-8")
+    # a tolerance that later runs refuse
+    named = BOARD.replace('slow-wall")', 'slow-wall"), tol={"delivered": 1e-3}')
+    test.write_text(named, encoding="utf-8")
+    refused = run_pytest(project, entry_points, str(test), "--impact-bless=first")
+    assert 'tol["delivered"]: got a tolerance for one variable, expected one for all' in refused.stdout
+    assert not baseline.exists()
+    test.write_text(BOARD, encoding="utf-8")
     assert run_pytest(project, entry_points, str(test), "--impact-bless=first").returncode == 0
     before = baseline.read_bytes()
     assert b"first" in before

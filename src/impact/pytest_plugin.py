@@ -116,7 +116,7 @@ class ImpactRegression:
         baseline : the file of the baseline; by default baselines/FILE-TEST.h5, see `baseline_name`
         tol, subset : see `impact.compare`
         overrides, plugins : of the sweep, see `impact.sweep`
-        allow_failed : write a baseline even if some of its points failed
+        allow_failed : write a baseline even if some of its points failed; a calibration and a board have none
 
         Returns
         -------
@@ -156,11 +156,15 @@ class ImpactRegression:
         self, new: Path, baseline: Path, reason: str, *, tol: Any, subset: bool, allow_failed: bool
     ) -> Verdict | None:
         """Write a baseline unless it is equal to the result, so that version control shows real changes only."""
+        from .comparison.compare import calibration_tolerances
         from .results.schema import kind_of
         from .results.xarray_backend import save_with_attributes
 
         result, verdict = impact.load(new), None
         is_study = kind_of(result) in ("calibration", "board")
+        if is_study:
+            # the next run would refuse it
+            calibration_tolerances(tol)
         try:
             if baseline.exists():
                 verdict = impact.compare(new, baseline, tol=tol, subset=subset)
