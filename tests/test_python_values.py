@@ -6,6 +6,7 @@ import pickle
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future
 from contextlib import contextmanager
+from dataclasses import replace
 from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
@@ -614,10 +615,20 @@ def test_cases_of_a_file_replace_inputs_of_the_starter_config(tmp_path: Path) ->
         ({"overide": ["a"]}, "overide: sweep.overide: unknown key; known: K, "),
         ({"model": "hertz"}, 'model: sweep.model: unknown key; did you mean "models", before all tables?'),
         ({"e": 2}, "e: sweep.e: got 2, expected a number from 0 to 1"),
-        ({"models": "hert"}, 'models: models: got "hert", expected a model; did you mean "hertz"?'),
+        ({"models": "hert"}, 'models: got "hert", expected a model; did you mean "hertz"?'),
     ],
 )
 def test_an_input_that_is_none_is_refused(inputs: dict[str, Any], message: str) -> None:
     with pytest.raises(impact.ConfigError) as refusal:
         impact.sweep(**inputs)
-    assert message in str(refusal.value)
+    assert str(refusal.value).startswith(message)
+
+
+def test_a_law_in_place_of_its_key_is_asked_for_among_the_plugins() -> None:
+    hertz, expected = impact.models()["hertz"], 'got a ForceModel, expected its key, "hertz"'
+    mine, more = replace(hertz, title="mine"), ", and the law itself among the plugins"
+    choices = {"models": (mine, more), "models[0]": ([mine], more), "models[1]": (["flores-2011", hertz], "")}
+    for place, (models, end) in choices.items():
+        with pytest.raises(impact.ConfigError) as refusal:
+            impact.sweep(models=models, e=0.5)
+        assert str(refusal.value) == f"{place}: {expected}{end}"

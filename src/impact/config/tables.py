@@ -577,12 +577,12 @@ def expand_laws(
     selection: object, laws: Mapping[str, L], what: str = "model"
 ) -> tuple[list[L], list[ConfigProblem]]:
     """Find the laws of a key, "all", "family:NAME", a pattern, or a list of those, some excluded by "!"."""
-    if not isinstance(selection, str | list) or not selection:
+    if not isinstance(selection, str | list | ForceModel) or not selection:
         return [], [((), mismatch_error(selection, LAWS_EXPECTED[what]).message())]
     selected: dict[str, L] = {}
     problems: list[ConfigProblem] = []
-    for index, word in enumerate([selection] if isinstance(selection, str) else selection):
-        path = () if isinstance(selection, str) else (index,)
+    for index, word in enumerate(selection if isinstance(selection, list) else [selection]):
+        path = (index,) if isinstance(selection, list) else ()
         is_exclusion = isinstance(word, str) and word.startswith("!")
         try:
             matching = _laws_matching(str(word)[1:] if is_exclusion else word, laws, what)
@@ -603,7 +603,8 @@ def expand_laws(
 def _laws_matching(word: object, laws: Mapping[str, L], what: str) -> dict[str, L]:
     """Find the laws of a key, "all", "family:NAME" or a pattern, by key."""
     if isinstance(word, ForceModel):
-        raise mismatch_error(word, f'its key, "{word.key}", and the law itself among the plugins')
+        more = "" if word in laws.values() else ", and the law itself among the plugins"
+        raise mismatch_error(word, f'its key, "{word.key}"{more}')
     if not isinstance(word, str):
         raise mismatch_error(word, f"the name of a {what}")
     # a law with two names is not run twice

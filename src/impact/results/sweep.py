@@ -116,12 +116,13 @@ def sweep(
     [[0.665265, 0.913177]]
     """
     laws = {key: value for key, value in (("models", models), ("frictions", frictions)) if value is not None}
-    changes = [Setting((key,), value, key) for key, value in laws.items()]
+    # the path of laws is the name of the argument
+    changes = [Setting((key,), value, "") for key, value in laws.items()]
     changes += [Setting(("sweep", name), value, name) for name, value in inputs.items()]
     settings = settings_of(overrides)
     for setting, change in itertools.product(settings, changes):
         if setting.path[: len(change.path)] == change.path:
-            raise UsageError(f"{change.shown}: set together with {setting.shown}, expected one of the two")
+            raise UsageError(f"{change.path[-1]}: set together with {setting.shown}, expected one of the two")
     settings += changes
     if output is None and (resume or overwrite):
         raise UsageError("resume and overwrite: got no output, expected one as well")
