@@ -149,6 +149,12 @@ def test_a_dry_run_reports_where_trajectories_are_not_deduplicated(cli: Run, blo
     assert "too many cells to compare all, equal points are searched for within a block" in printed
 
 
+def test_a_dry_run_refuses_what_the_sweep_refuses(forked: ForkServer, blocks: Path) -> None:
+    name = ("--set", 'materials={"a b"={E=[1e9, 2e9], nu=0.3, rho=2712}}', "--set", 'sweep.material="a b"')
+    messages = {forked("sweep", blocks, *name, *dry, cwd=blocks.parent).stderr for dry in ((), ("--dry-run",))}
+    assert messages == {"materials.a b.E: expected a material name without spaces and slashes, to be an axis\n"}
+
+
 def test_too_many_points_are_refused_before_memory_or_a_file_is_used(forked: ForkServer, blocks: Path) -> None:
     grid = [f"sweep.{name}.geomspace=[1,2,10000]" for name in ("v1", "m1", "m2")]
     sets = [word for override in grid for word in ("--set", override)]

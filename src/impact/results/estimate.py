@@ -27,7 +27,7 @@ from ..errors import warn
 from ..formatting import law_name
 from .layouts import file_template
 from .schema import dataset_template, stored_variables
-from .sweep import read_plan
+from .sweep import check_storable, read_plan
 from .trajectory_table import expanded_slabs, table_of_ranges
 
 # numbers of workers for which the time is estimated
@@ -165,6 +165,7 @@ def estimate(
     """
     require_counts(jobs=jobs)
     plan = read_plan(source, overrides, plugins, Run(max_points=max_points, on_note=on_note or warn))
+    check_storable(plan)
     # one of the largest ranges, as a few trajectories take as long as many; the middle one avoids extreme values
     largest = max(block.size for block in plan.ranges)
     whole = [block for block in plan.ranges if block.size == largest]
