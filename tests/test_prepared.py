@@ -63,6 +63,24 @@ def test_a_parameter_that_the_config_does_not_have_is_an_input_by_its_name_alone
     assert chosen != pytest.approx(problem()["beta"], abs=1e-3)
 
 
+def test_a_call_may_not_set_what_a_config_may_not_set_together() -> None:
+    at = {"R1": 0.01, "R2": 0.02, "u1": 0.3, "mu": 0.2}
+    law = "lammps-mindlin"
+    chosen = impact.prepare(model="hertz", friction=law, at={**at, "kt_over_kn": 0.5})
+    with pytest.raises(impact.UsageError, match="k_t: set together with kt_over_kn"):
+        chosen(k_t=[1e6, 1e9])
+    assert chosen(K=1e6)["friction_status"] == 1
+    with pytest.raises(impact.UsageError, match="K is set, so that 8 G"):
+        impact.prepare(model="hertz", friction=law, at=at)(K=1e6)
+
+
+def test_a_pair_that_cannot_be_combined_is_refused() -> None:
+    at = {"R1": 0.01, "R2": 0.02, "u1": 0.3, "mu": 0.2, "C": 10.0}
+    for function in (impact.run, impact.prepare):
+        with pytest.raises(impact.ConfigError, match="needs a contact force of n = 1"):
+            function(model="kelvin-voigt", friction="lammps-mindlin", at=at)
+
+
 @pytest.mark.parametrize(
     "half", ["50 %", np.float32(0.5), 0.5 * unit.dimensionless, pd.Series([0.5]), np.array([[0.5]]), [0.5]]
 )

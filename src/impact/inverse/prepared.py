@@ -22,7 +22,7 @@ from ..config.load import Config
 from ..config.quantities import Quantity
 from ..config.tables import MATERIAL_QUANTITIES, law_quantities
 from ..contact.fixed_step import EXACT
-from ..contact.friction import FrictionLaw, Pair
+from ..contact.friction import FrictionLaw, Pair, parameter_problem
 from ..contact.interpolant import InterpolatedCollisions
 from ..contact.model import ForceModel
 from ..contact.output_formulas import Outputs, collide
@@ -121,6 +121,8 @@ class PreparedProblem:
             if full_name in read:
                 raise UsageError(f"{name}: got {full_name} twice, expected it once")
             read[full_name] = column
+        if problem := self._stiffness_problem(read):
+            raise UsageError(problem)
         try:
             shape = np.broadcast_shapes(*(column.shape for column in read.values()))
         except ValueError:
@@ -132,6 +134,16 @@ class PreparedProblem:
         collisions = outputs_at(self.config, self.law, columns, names, self._collisions)
         arrays = {name: collisions[name].reshape(shape) for name in names}
         return {name: array.copy() if shape else array.item() for name, array in arrays.items()}
+
+    def _stiffness_problem(self, read: Mapping[str, Array]) -> str:
+        """Name what a config with these inputs would have wrong in the tangential stiffness, or return ""."""
+        if not isinstance(self.law, Pair):
+            return ""
+        names = [InputName.parse(name) for name in (*self.config.scalars, *read)]
+        given = {name.key for name in names if name.friction}
+        n = self.law.model.exponent or (None if "n" in read else float(self.config.scalars["n"]))
+        has_stiffness = any(name.key == "K" for name in names)
+        return parameter_problem(self.law.friction, given, n=n, has_stiffness=has_stiffness)
 
     @cached_property
     def _collisions(self) -> InterpolatedCollisions | None:
@@ -214,7 +226,9 @@ def prepare(
     config, _ = single_point(open_source(source, overrides, plugin_set), model, at, friction=friction)
     if config.solver.integrator != EXACT:
         raise UsageError(f'prepare: got the integrator "{config.solver.integrator}", expected "{EXACT}"')
-    law = Plan(config, plugin_set.of(config.models)).laws[-1]
+    plan = Plan(config, plugin_set.of(config.models))
+    plan.pair_notes("frictions")
+    law = plan.laws[-1]
     known = [*CENTRAL_OUTPUTS] if isinstance(law, ForceModel) else [*OUTPUTS]
     known = [name for name in known if OUTPUTS[name].dtype == "f8" and OUTPUTS[name].per_model]
     names = known if outputs is None else as_keys(outputs, "outputs")
