@@ -344,6 +344,21 @@ def test_results_can_be_pickled(make: Callable[[], object]) -> None:
     assert str(after) == str(before)
 
 
+def test_results_with_other_values_are_not_equal() -> None:
+    adapters = (lambda collision: collision), str(ROOT / "docs/conform/rigid.py:collide")
+    boards = [impact.conform(adapter=adapter, only="normal-e50-middle-equal") for adapter in adapters]
+    assert boards[0] != boards[1]
+    sweep = {"v1": {"uniform": [0.8, 1.2]}, "m1": 1.0, "m2": 1.0, "K": 1e6}
+    uncertain = {"models": "hertz", "sweep": sweep, "design": {"n": 2}}
+    studies = [impact.sensitivity(uncertain, of=name) for name in ("peak_force", "contact_time")]
+    laws = {"models": "anagnostopoulos-1988", "sweep": {**sweep, "v1": 1.0, "n": 1.0, "e": {"fit": [0.1, 1.0]}}}
+    data = [{"columns": {"e_out": [e, e + 0.1], "sigma": [0.01, 0.01]}} for e in (0.4, 0.6)]
+    fits = [impact.calibrate({**laws, "data": columns}) for columns in data]
+    for first, second in (studies, fits):
+        assert impact.describe(first) != impact.describe(second)
+        assert impact.describe(first) == impact.describe(first.copy(deep=True))
+
+
 @pytest.mark.parametrize("kind", ["restitution", "animation"])
 def test_figures_can_be_pickled(result: xr.Dataset, kind: str) -> None:
     figure = impact.plot(result, kind=kind)

@@ -137,6 +137,10 @@ class Studies(Displayed):
 
     dataset: xr.Dataset
 
+    def __eq__(self, other: object) -> bool:
+        # datasets that are compared by == are a dataset, which is true
+        return isinstance(other, Studies) and self.dataset.identical(other.dataset)
+
     def as_dict(self) -> dict[str, Any]:
         """The studies with the distribution of the output and the indices of each uncertain input."""
         return {"studies": list(_iterate_studies(self.dataset))}
