@@ -58,7 +58,7 @@ def name_wrong_types(function: Callable[P, T]) -> Callable[P, T]:
 
 def prepare_for_users(member: Any) -> Any:
     """Make a public name of what a module defines: a function names arguments of wrong types."""
-    if is_dataclass(member) and isinstance(member, type):
+    if isinstance(member, type) and is_dataclass(member) and "__init__" in vars(member):
         _show_defaults(member)
     # formulas of laws call `power`, also with symbols
     if not isinstance(member, FunctionType) or member.__name__ == "power":

@@ -25,6 +25,7 @@ from .formatting import argument, number, safe_text
 
 if TYPE_CHECKING:
     import pandas as pd
+    import xarray as xr
     from rich.console import Console
 
 # width of a table of a command that is not printed on a terminal, and of a result as text
@@ -330,6 +331,17 @@ class Displayed:
 
     def _repr_html_(self) -> str:
         return html_of(self.sections(PIPE_WIDTH))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class DisplayedDataset(Displayed):
+    """A result that is kept as a dataset; two are equal if these are identical."""
+
+    dataset: xr.Dataset
+
+    def __eq__(self, other: object) -> bool:
+        # == of datasets is a dataset, and that is true
+        return type(other) is type(self) and self.dataset.identical(other.dataset)
 
 
 def show(value: Displayed, *, as_json: bool = False, stream: TextIO | None = None) -> None:

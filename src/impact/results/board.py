@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from importlib.metadata import version
 from typing import Any, Literal, NamedTuple
 
@@ -12,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from .._version import __version__
-from ..display import Block, Displayed, Table
+from ..display import Block, DisplayedDataset, Table
 from ..formatting import number
 from . import schema
 
@@ -83,20 +82,13 @@ def board_dataset(suite: str, labels: Sequence[tuple[str, str]], engines: Sequen
     return xr.Dataset(arrays, coords, attributes)
 
 
-@dataclass(frozen=True)
-class Board(Displayed):
+class Board(DisplayedDataset):
     """The checks of one engine or several.
 
     Parameters
     ----------
     dataset : with the dimensions engine and check, see docs/schema.md
     """
-
-    dataset: xr.Dataset
-
-    def __eq__(self, other: object) -> bool:
-        # datasets that are compared by == are a dataset, which is true
-        return isinstance(other, Board) and self.dataset.identical(other.dataset)
 
     @property
     def failed(self) -> int:

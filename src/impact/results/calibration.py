@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -19,7 +19,7 @@ from ..config.quantities import KeyPath
 from ..config.tables import DEFAULT_TITLE, Solver
 from ..contact.models import original_key
 from ..contact.variables import OUTPUTS
-from ..display import Block, Displayed, Table
+from ..display import Block, DisplayedDataset, Table
 from ..engine.plan import Plan
 from ..engine.plugins import Plugins
 from ..engine.trajectories import PlanLaw, keys_of, model_of
@@ -204,15 +204,8 @@ def describe_data(dataset: xr.Dataset) -> str:
     return f"{laws} law{plural}, {points} measured values, noise {dataset.attrs['noise']}; the best law first"
 
 
-@dataclass(frozen=True)
-class Fits(Displayed):
+class Fits(DisplayedDataset):
     """The fits of a calibration, the best law first."""
-
-    dataset: xr.Dataset
-
-    def __eq__(self, other: object) -> bool:
-        # datasets that are compared by == are a dataset, which is true
-        return isinstance(other, Fits) and self.dataset.identical(other.dataset)
 
     def as_dict(self) -> dict[str, Any]:
         """The laws with their parameters by config path, and the largest residuals."""

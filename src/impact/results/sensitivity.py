@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,7 @@ import xarray as xr
 from ..config.input_names import InputName
 from ..contact.units import names_in, with_numbers
 from ..contact.variables import LAW_DIMS, OUTPUTS
-from ..display import Block, Displayed, Table
+from ..display import Block, DisplayedDataset, Table
 from ..formatting import NO_BREAK, decimals, number, quantity, safe_text, scaled_unit
 from .attributes import read_attribute
 from .provenance import describe_point
@@ -131,15 +130,8 @@ def study_texts(dataset: xr.Dataset) -> Iterator[tuple[str, str, list[tuple[str,
         yield describe_point(laws | study["at"]), _describe_study(study), _index_rows(study)
 
 
-@dataclass(frozen=True)
-class Studies(Displayed):
+class Studies(DisplayedDataset):
     """The sensitivity of an output: a study for each model and each point of the other axes."""
-
-    dataset: xr.Dataset
-
-    def __eq__(self, other: object) -> bool:
-        # datasets that are compared by == are a dataset, which is true
-        return isinstance(other, Studies) and self.dataset.identical(other.dataset)
 
     def as_dict(self) -> dict[str, Any]:
         """The studies with the distribution of the output and the indices of each uncertain input."""
