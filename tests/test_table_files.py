@@ -134,6 +134,26 @@ def test_rows_of_a_picture_without_numbers_are_refused(stored: Path, tmp_path: P
     assert impact.plot_to_files(stored, output=tmp_path / "a.png", decimal="comma").pictures
 
 
+def test_an_angle_of_a_latex_table_is_in_degrees() -> None:
+    frame = pd.DataFrame({"angle [rad]": [math.pi / 6.0, math.pi / 3.0], "omega [rad/s]": [1.0, 2.0]})
+    lines = encode_frame(frame, ".tex").decode().splitlines()
+    assert lines[2] == r"{angle [\unit{\degree}]} & {omega [\unit{rad/s}]} \\"
+    assert lines[4:6] == [r"30 & 1 \\", r"60 & 2 \\"]
+    assert encode_frame(frame, ".csv").decode().splitlines()[1].startswith("0.523598")
+
+
+def test_a_latex_table_of_a_picture_has_the_labels(stored: Path, cli: Run, tmp_path: Path) -> None:
+    words = ["--label", "e=Stoßzahl $e$", "--label", "v1_post=$v_1$", "--label", "gharib-hurmuzlu-2012=G & H"]
+    for suffix, headings in (
+        ("tex", [r"{Stoßzahl $e$} &", r"& {$v_1$ G \& H [\unit{m/s}]} &"]),
+        ("csv", ["e,", ",v1_post gharib-hurmuzlu-2012 [m/s],"]),
+    ):
+        done = cli("plot", stored, "-o", f"{suffix}.png", "--data", f"numbers.{suffix}", *words, cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
+        text = (tmp_path / f"numbers.{suffix}").read_text(encoding="utf-8")
+        assert all(heading in text for heading in headings)
+
+
 def test_a_column_without_numbers_is_text() -> None:
     frame = pd.DataFrame({"p": [math.nan, math.inf], "x": [-1.0, math.nan]})
     assert encode_frame(frame, ".tex").decode().startswith("\\begin{tabular}{lS[table-format=-1.0]}\n")

@@ -9,6 +9,7 @@ import io
 import itertools
 import json
 import locale
+import math
 import re
 import sys
 from abc import abstractmethod
@@ -253,22 +254,29 @@ def _flat_cell(cell: object, decimal: str) -> object:
 
 
 def _latex(frame: pd.DataFrame, form: TableForm) -> str:
-    """Write a tabular of booktabs, with an S column of siunitx for each column of numbers."""
+    """Write a tabular of booktabs, with an S column of siunitx for each column of numbers; angles in degrees."""
+    frame, names = frame.copy(), [*map(str, frame.columns)]
+    for place, name in enumerate(names):
+        if name.endswith(" [rad]") and frame.dtypes.iloc[place].kind == "f":
+            frame.isetitem(place, frame.iloc[:, place] * math.degrees(1.0))
+            names[place] = name.removesuffix("rad]") + r"\degree]"
     texts, formats = frame.map(lambda cell: _latex_cell(cell, form.digits or 6)), ""
     for (_, column), (_, shown) in zip(frame.items(), texts.items(), strict=True):
         is_numeric = all(isinstance(cell, int | float) and not isinstance(cell, bool) for cell in column.tolist())
         formats += _siunitx_column(shown.tolist(), form.decimal) if is_numeric else "l"
-    texts.columns = [_latex_heading(str(name)) for name in frame.columns]
+    texts.columns = [*map(_latex_heading, names)]
     return str(texts.to_latex(index=False, column_format=formats, escape=False))
 
 
 def _latex_heading(name: str) -> str:
-    """Write a heading in braces, so that siunitx does not read it as a number."""
+    """Write a heading in braces, so that siunitx does not read it as a number; formulas in $ are kept."""
     words, bracket, unit = name.rpartition(" [")
+    parts = re.split(r"(\$[^$]+\$)", words if bracket else name)
+    text = "".join(part if part[:1] == "$" and part[1:] else part.translate(LATEX_CHARACTERS) for part in parts)
     if not bracket:
-        return f"{{{name.translate(LATEX_CHARACTERS)}}}"
+        return f"{{{text}}}"
     unit = re.sub(r"\^(-?[\d.]+|\([^)]*\))", r"^{\1}", unit.removesuffix("]"))
-    return f"{{{words.translate(LATEX_CHARACTERS)} [\\unit{{{unit}}}]}}"
+    return f"{{{text} [\\unit{{{unit}}}]}}"
 
 
 def _latex_cell(cell: object, digits: int) -> str:

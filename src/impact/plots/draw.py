@@ -308,7 +308,7 @@ def plot_to_files(
     output : the picture, with the ending of its format; by default the result's name with .png. The name of each
         of several kinds has the kind in it
     kinds : see `impact.plots.kinds.KINDS`
-    data : file for the numbers behind the picture: .csv, .tex or .parquet
+    data : file for the numbers behind the picture: .csv or .parquet, or .tex, with `labels` and angles in degrees
     data_form : "wide", a column for each curve, or "long", a row for each point
     rows, digits : of the numbers: at most so many rows, evenly spread, and significant digits; by default all
     decimal : "point" or "comma", of the picture and of the numbers, whose columns semicolons then separate, or
@@ -369,6 +369,8 @@ def plot_to_files(
             figure = draw(shown, look, measured)
             if table:
                 frame = shown.long_table() if data_form == "long" else shown.wide_table()
+                if labels and table.suffix.lower() == ".tex":
+                    frame.columns = [_labelled(name, labels) for name in map(str, frame.columns)]
                 numbers = encode_frame(frame, table.suffix.lower(), table_form)
         except UsageError as error:
             left_out[kind] = str(error)
@@ -380,6 +382,16 @@ def plot_to_files(
     if not pictures:
         raise UsageError(*dict.fromkeys(left_out.values()))
     return PlotFiles(pictures, {kind: plot_data[kind] for kind in pictures}, left_out)
+
+
+def _labelled(heading: str, labels: Mapping[str, str]) -> str:
+    """Put the texts of the user into a heading, see `formatting.heading`.
+
+    >>> _labelled("v1_post hertz [m/s]", {"v1_post": "$v_1$", "hertz": "Hertz"})
+    '$v_1$ Hertz [m/s]'
+    """
+    words, bracket, unit = heading.partition(" [")
+    return " ".join(labels.get(part, part) for part in words.split(" ", 1)) + bracket + unit
 
 
 def _with_kind(path: Path, kind: str, kinds: Sequence[str]) -> Path:
