@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import math
 import re
@@ -84,6 +85,15 @@ def test_a_page_has_no_law_no_network_and_texts_that_do_not_end_its_script(
     assert len(content["laws"][0]["columns"]["e_out"]["base64"]) < 200
     assert results["table"]["e_out"].size > 10_000
     assert len(text) < 100_000
+
+
+def test_errors_of_a_result_of_32_bits_are_those_that_it_stores() -> None:
+    sweep = {"e": np.linspace(0.1, 0.9, 5), "v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 6e9}
+    result = impact.sweep({"models": "exact-hysteresis", "sweep": sweep, "output": {"dtype": "float32"}})
+    column = content_of(impact.page(result))["laws"][0]["columns"]["e_out"]
+    e_out = np.frombuffer(base64.b64decode(column["base64"]), column["type"])
+    np.testing.assert_allclose(e_out - sweep["e"], result["e_error"].values[0], atol=1e-15)
+    np.testing.assert_allclose(e_out, result["e_out"].values[0], rtol=1e-7)
 
 
 def test_a_title_of_several_lines_is_one_comment_of_the_csv() -> None:

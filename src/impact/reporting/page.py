@@ -187,6 +187,10 @@ def _stored_values(dataset: xr.Dataset, inputs: Inputs) -> Iterator[dict[str, An
     if others:
         raise UsageError(f"e_out depends on {', '.join(map(str, others))} in this result; select one value of it")
     _check_size(dataset["e_out"].size * len(names) * VALUE_BYTES)
+    if dataset["e_out"].dtype == np.float32 and {"e", "e_error"} <= {*dataset.variables}:
+        # errors follow from e_out, whose last digits are lost
+        exact = (dataset["e"] + dataset["e_error"].astype(float)).fillna(dataset["e_out"])
+        dataset = dataset.assign(e_out=exact)
     for position in range(dataset.sizes["model"]):
         columns = {}
         for name in names:
