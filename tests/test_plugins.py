@@ -467,7 +467,9 @@ def test_a_value_without_a_file_never_counts_as_the_same_model(folder: Path) -> 
             impact.run(path, plugins=[value])
         with pytest.raises(UsageError, match="mine-2026 is a Python value that no file defines"):
             impact.extend(path, ["sweep.e=[0.2, 0.5, 0.8]"], plugins=[value])
-    assert impact.rerun(path, plugins=[same]).equal
+    again = impact.rerun(path, plugins=[same])
+    assert again.equal
+    assert any("cannot be known to be the one that the result was made with" in note for note in again.notes)
     assert not impact.rerun(path, plugins=[law(2.0)]).equal
 
 

@@ -14,7 +14,7 @@ from ..contact.model import ForceModel
 from ..engine.plan import Plan
 from ..engine.plugins import read_plugins
 from ..formatting import law_keys
-from ..results.provenance import command_start, config_of_part, stored_config
+from ..results.provenance import command_start, config_of_part, stored_config, unknown_plugins
 from ..results.schema import kind_of, require_sweep
 from ..results.sweep import sweep_in_memory
 from ..results.xarray_backend import load
@@ -38,7 +38,8 @@ def rerun(
     Parameters
     ----------
     result : the file
-    plugins : the plug-in models that it was computed with; a note of the verdict names a changed one
+    plugins : the plug-in models that it was computed with; a note of the verdict names a changed one, and one
+        that no file defines
     tol, subset : see `compare`
     max_points : the largest number of points
     execute : deprecated; function that runs a plan, by default it is run in this process
@@ -61,6 +62,7 @@ def rerun(
     """
     stored, name = load(result), str(result)
     plugin_set = read_plugins(plugins)
+    unknown = unknown_plugins(stored.attrs, plugin_set, name)
     # laws by key, because "all" may include new ones; a calibration has pairs, MODEL with FRICTION, along `model`
     keys = [law_keys(key) for key in stored["model"].values.tolist()] if "model" in stored.dims else [[]]
     laws = zip(("models", "frictions"), map(dict.fromkeys, zip(*keys, strict=True)), strict=False)
@@ -75,7 +77,7 @@ def rerun(
         )
         # the file may have a part of the laws, and of the curves
         verdict = compare(calibrate_config(config, plugin_set.of(config.models)), stored, tol=tol, subset=True)
-        return replace(verdict, new="the rerun", baseline=name)
+        return replace(verdict, new="the rerun", baseline=name, notes=(*verdict.notes, *unknown))
     require_sweep(stored, "rerun")
     if "friction" in stored.coords:
         changes.append(f"frictions={json.dumps(stored['friction'].values.ravel().tolist())}")
@@ -91,4 +93,4 @@ def rerun(
         verdict = replace(verdict, notes=(part, *verdict.notes))
     files = [word for path in plugins if isinstance(path, str | Path) for word in ("--plugin", str(path))]
     command = ("impact", "run", name, *files) if command_start(name, stored) else ()
-    return replace(verdict, new="the rerun", baseline=name, repeats=command)
+    return replace(verdict, new="the rerun", baseline=name, repeats=command, notes=(*verdict.notes, *unknown))
