@@ -153,6 +153,16 @@ def test_the_natural_range_of_a_stiffness_is_about_that_of_the_materials() -> No
         impact.calibrate({**bare, "sweep": sweep, **fitted, **data})
 
 
+def test_a_law_with_a_stiffness_of_its_own_is_not_charged_for_that_of_its_materials() -> None:
+    sweep = {"m1": 1.0, "m2": 1.0, "R1": 0.02, "R2": 0.02, "material": "ball", "e": 0.5}
+    materials = {"ball": {"E": {"fit": [1e8, 1e10]}, "nu": 0.3}}
+    model = {"anagnostopoulos-1988": {"K": {"fit": [1e5, 1e8]}}}
+    config = {"models": ["hertz", "anagnostopoulos-1988"], "sweep": sweep, "model": model, "data": TIMES}
+    both = impact.calibrate({**config, "materials": materials, "solver": QUICK})
+    identifiable = both["identifiable"].sel(parameter="materials.ball.E")
+    assert identifiable.sel(model=["hertz", "anagnostopoulos-1988"]).values.tolist() == [1, -1]
+
+
 def test_a_profile_with_several_minima_ends_in_an_interval() -> None:
     """The chi2 of this fit has two valleys, and a search for its end falls from one into the other."""
     sweep = {"m1": 1.0, "m2": 1.0, "K": {"fit": [1e5, 1e7]}, "alpha": {"fit": [0.01, 0.3]}}

@@ -566,7 +566,7 @@ def fitted_parameters(
 ) -> tuple[str, ...]:
     """List the names of the fitted parameters that a law has, or its pair with a friction law.
 
-    A law whose table has a K of its own does not take that of the sweep.
+    A law whose table has a K of its own takes neither that of the sweep nor that of its materials.
     """
     used = with_base_quantities(model.quantities)
 
@@ -580,6 +580,14 @@ def fitted_parameters(
         input_name = InputName.parse(name)
         if input_name.key == "yield_strength":
             return bool(used & {"yield_strength1", "yield_strength2"})
+        # a friction law with a spring may take its stiffness from the materials
+        if (
+            input_name.material
+            and input_name.key in ("E", "nu")
+            and has_own_K
+            and not (friction and friction.stiffness)
+        ):
+            return bool(used & {f"{input_name.key}1", f"{input_name.key}2"})
         return input_name.applies_to(model.key, friction.key if friction else "")
 
     return tuple(filter(is_used, fits))
