@@ -23,6 +23,7 @@ import impact
 from impact import formatting
 from impact.conformance.engines.liggghts import ALONE
 from impact.errors import ConfigError
+from impact.exporters.programs import WITHOUT_DAEMON
 
 from .clusters import ClusterServer, start_cluster_server
 from .fork_server import CompletedCommand, ForkServer, end_servers_of_scripts, start_fork_server
@@ -238,7 +239,7 @@ def no_installed_codes(
     if request.node.get_closest_marker("peers") is None:
         monkeypatch.setenv("PATH", str(silent_programs), prepend=os.pathsep)
         return
-    for name, value in ALONE.items():
+    for name, value in (ALONE | WITHOUT_DAEMON).items():
         monkeypatch.setenv(name, value)
     # Open MPI removes its folder when a process ends, also from under one that another worker starts
     monkeypatch.setenv("OMPI_MCA_orte_tmpdir_base", str(silent_programs.parent))

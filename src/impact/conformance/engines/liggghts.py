@@ -53,9 +53,8 @@ FACTS: dict[str, Any] = {
     "parameters": {"tangential_damping": "off", "tangential_reduce": "on"},
 }
 NU = 0.3
-# one process needs neither the network for which MPI would look each time, nor the daemon that it would start
-ALONE = {"OMPI_MCA_pml": "ob1", "OMPI_MCA_btl": "self", "OMPI_MCA_ess_singleton_isolated": "1"}
-ENVIRONMENT = os.environ | ALONE
+# one process needs no network, for which Open MPI would look each time
+ALONE = {"OMPI_MCA_pml": "ob1", "OMPI_MCA_btl": "self"}
 
 
 def collide(c: dict[str, Any]) -> dict[str, Any]:
@@ -85,7 +84,12 @@ def collide(c: dict[str, Any]) -> dict[str, Any]:
     )
     Path("velocities").unlink(missing_ok=True)
     process = subprocess.run(
-        [sys.argv[-1], "-log", "none"], input=script, capture_output=True, text=True, check=False, env=ENVIRONMENT
+        [sys.argv[-1], "-log", "none"],
+        input=script,
+        capture_output=True,
+        text=True,
+        check=False,
+        env=os.environ | ALONE,
     )
     if process.returncode or "ERROR" in process.stdout:
         raise RuntimeError((process.stdout + process.stderr)[-2000:])
