@@ -429,6 +429,8 @@ def test_failed_points_of_pairs_are_listed() -> None:
     text = build(impact.sweep(config))
     meaning = impact.contact.status.FrictionStatus.INVALID_PARAMETER.meaning
     assert table(text, "Failed points") == [[f"hertz with {law}", "mu\xa0=\xa00.1", meaning]]
+    (heads,) = re.findall(r'aria-label="Failed points">\s*<table>\s*<thead>(.*?)</thead>', text, re.DOTALL)
+    assert re.findall(r"<th[^>]*>(.*?)</th>", heads) == ["law", "where", "why"]
     assert "more</p>" not in text
 
 
