@@ -69,6 +69,14 @@ def validator_of_configs() -> jsonschema.Draft202012Validator:
     return jsonschema.Draft202012Validator(schema_of_configs())
 
 
+def test_bounds_of_numbers_are_written_alike() -> None:
+    """Types are cached, and 0 = 0.0: the text would depend on which was asked for first."""
+    objects = re.findall(r'{[^{}]*"type": "number"[^{}]*}', json.dumps(schema_of_configs()))
+    bounds = {bound for text in objects for bound in re.findall(r'[mM](?:in|ax)imum": ([^,}]+)', text)}
+    assert "0.0" in bounds
+    assert not [bound for bound in bounds if re.fullmatch(r"-?[0-9]+", bound)]
+
+
 def values(schema: dict[str, Any], definitions: dict[str, Any]) -> st.SearchStrategy[Any]:
     """Values that a schema of the kinds used here accepts."""
     if "$ref" in schema:

@@ -587,9 +587,10 @@ def number_type(quantity: Quantity) -> Any:
     """Build the type of a number, bare or with a unit."""
     bounds: dict[str, Any] = {}
     if math.isfinite(quantity.least):
-        bounds["gt" if quantity.above else "ge"] = quantity.least
+        # a cached type does not tell 0 from 0.0, which the schema would write
+        bounds["gt" if quantity.above else "ge"] = float(quantity.least)
     if math.isfinite(quantity.most):
-        bounds["lt" if quantity.below else "le"] = quantity.most
+        bounds["lt" if quantity.below else "le"] = float(quantity.most)
     bare: Any = Annotated[float, Field(**bounds)]
     if quantity.exponents <= {"n"}:
         infinity = r"|inf\b" if quantity.infinite else ""
