@@ -117,6 +117,23 @@ def test_an_implausible_modulus_of_an_axis_gives_a_note(tmp_path: Path) -> None:
     assert f"<p>Note: {note}</p>" in page
 
 
+def test_a_calibration_gives_the_notes_of_what_is_not_fitted() -> None:
+    sweep = {"m1": 2.0, "R1": 0.01, "m2": 2.0, "R2": 0.01, "material1": "soft", "material2": "steel", "v1": 1.0}
+    steel = {"E": 210e9, "nu": 0.3, "rho": 7850.0}
+    config = {
+        "models": "hertz",
+        "sweep": {**sweep, "m1": {"fit": [1.0, 3.0]}},
+        "materials": {"steel": steel, "soft": {**steel, "E": 210.0}},
+        "data": {"columns": {"contact_time": [1e-4, 1.1e-4, 1.2e-4]}},
+    }
+    with pytest.warns(impact.ImpactWarning) as caught:
+        impact.calibrate(config)
+    notes = [str(warning.message) for warning in caught]
+    assert notes[0] == "materials.soft.E: got 210 Pa; did you mean 210 GPa?"
+    assert notes[1].startswith("m2: got 2 kg, but a sphere of R2 = 0.01 m and 7850 kg/m^3 has 0.03288 kg")
+    assert not any(note.startswith("m1: ") for note in notes)
+
+
 @pytest.mark.slow
 def test_the_configs_of_the_project_give_no_note(tmp_path: Path) -> None:
     configs = sorted((ROOT / "configs").glob("*.toml"))

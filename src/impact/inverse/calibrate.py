@@ -38,6 +38,7 @@ from ..errors import ConfigError, UsageError, warn
 from ..formatting import argument, law_keys
 from ..results.calibration import Fits, calibration_template, fitted_config, position_of_law
 from ..results.schema import FIT_STATUSES
+from ..results.summary import input_notes
 from ..results.xarray_backend import save
 from .batched_solvers import VectorFunction
 from .fit import Bounds, DataPoints, Fit, FitProblem, fit_all
@@ -124,7 +125,10 @@ def calibrate(
             raise UsageError(f"{argument('model')}: set without {best_file}, which is written for that law")
         position_of_law(list(laws_to_fit(config)), model, argument("model"))
     name = str(source) if isinstance(source, str | Path) else "config"
-    warn(*config.notes, *Plan(config).pair_notes(f"{name}: frictions"))
+    plan = Plan(config)
+    known = {key: value for key, value in config.scalars.items() if key not in config.fits}
+    implausible = input_notes(replace(plan.inputs, scalars=known))
+    warn(*config.notes, *implausible, *plan.pair_notes(f"{name}: frictions"))
     taken = {parameter for law in laws_to_fit(config).values() for parameter in parameters_of(config, law)}
     unused = [InputName.parse(parameter).config_key for parameter in config.fits if parameter not in taken]
     warn(*(f"{name}: {path}: no law takes it, and it is not fitted" for path in unused))
