@@ -122,6 +122,20 @@ def test_a_request_to_stop_that_comes_late_ends_a_complete_shard_and_a_merge(fol
     assert impact.merge([shard], output).summary.points == 2
 
 
+def test_a_folder_of_unfinished_work_in_place_of_a_result_says_how_to_go_on(cli: Run, folder: Path) -> None:
+    (shard,) = run_shards(folder, "1/2", overrides=['models="hertz"', "sweep.e=1.0"])
+    shutil.copytree(shard, folder / "whole.h5.work")
+    resumed = "which impact sweep continues with --resume"
+    for name, message in {
+        shard.name: "is a part of a sweep, which impact merge joins with the others",
+        "whole.h5.work": f"is the unfinished work of whole.h5, {resumed}",
+        "whole.h5": f"does not exist; whole.h5.work has its unfinished work, {resumed}",
+        "other.h5": "does not exist",
+    }.items():
+        done = cli("info", name, cwd=folder)
+        assert (done.returncode, done.stderr) == (2, f"{name}: {message}\n")
+
+
 @pytest.mark.slow
 def test_a_missing_shard_is_reported_with_the_command_that_integrates_it(cli: Run, folder: Path) -> None:
     folders = run_shards(folder, "1/3", "3/3", overrides=["sweep.v1=2.0"])

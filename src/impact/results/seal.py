@@ -17,6 +17,7 @@ import hashlib
 import io
 import itertools
 import math
+import re
 import struct
 from bisect import bisect_right
 from collections.abc import Callable, Iterator
@@ -25,7 +26,7 @@ from typing import Any
 
 from ..config.files import RESULT_MAGIC, file_hint
 from ..errors import MissingFileError, ResultError
-from ..formatting import safe_text
+from ..formatting import argument, safe_text
 from .schema import SCHEMA_VERSION
 
 # bytes at the start of an HDF5 file that the format leaves to applications: its "user block"
@@ -78,10 +79,8 @@ def write_seal(file: Any) -> str:
 
 def check_seal(path: Path) -> str:
     """Return the seal of a file; raise a ResultError for one that is damaged or not a result of this schema."""
-    if not path.exists():
-        raise MissingFileError("does not exist")
     if not path.is_file():
-        raise ResultError("is not a regular file")
+        raise _error_without_file(path)
     # also a file of the system such as /proc/kmsg, of which reading might never end
     if not path.stat().st_size:
         raise ResultError("is not a readable result (empty: it does not begin with the header of a sealed file)")
@@ -103,6 +102,23 @@ def check_seal(path: Path) -> str:
     if header != render_header(seal):
         raise ResultError("is damaged: the SHA-256 of its content differs from its seal")
     return seal
+
+
+def _error_without_file(path: Path) -> ResultError:
+    """Make the error of a path that is no file; a sweep may have left work there, or beside it."""
+    # few readers of a result need a lock
+    from ..engine.checkpoint import PLAN_FILE, work_folder_of
+
+    resumed = f"which impact sweep continues with {argument('resume', True)}"
+    if not path.exists():
+        work = work_folder_of(path)
+        hint = f"; {work.name} has its unfinished work, {resumed}" if (work / PLAN_FILE).is_file() else ""
+        return MissingFileError(f"does not exist{hint}")
+    if path.suffix == ".work" and (path / PLAN_FILE).is_file():
+        if re.search(r"\.[0-9]+-of-[0-9]+$", path.stem):
+            return ResultError("is a part of a sweep, which impact merge joins with the others")
+        return ResultError(f"is the unfinished work of {path.stem}, {resumed}")
+    return ResultError("is not a regular file")
 
 
 def has_seal(path: Path, seal: str) -> bool:
