@@ -138,6 +138,15 @@ def test_a_changed_model_has_another_fingerprint() -> None:
             {"velocity_coordinate": "force"},
             'velocity_coordinate "force": expected a coefficient c and a coefficient q, a force of elastic and c',
         ),
+        (
+            {
+                "velocity_coordinate": "force",
+                "parameters": (impact.Parameter("p", "1", ""),),
+                "coefficients": {"c": lambda: 1.0, "q": lambda p: p},
+                "force": lambda elastic, x, v, c, q: elastic + c * x**q * v,
+            },
+            'its coefficient q asks for "p"; known: n',
+        ),
         ({"velocity_coordinate": "w"}, 'velocity_coordinate: got \'w\', expected "v", "log" or "force"'),
     ],
 )

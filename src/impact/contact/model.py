@@ -241,6 +241,8 @@ class ForceModel:
                 f'model {self.key}: velocity_coordinate "{self.velocity_coordinate}": expected a coefficient '
                 f"{' and a coefficient '.join(required)}, a force of elastic and {required[0]}, and no breakpoints"
             )
+        if "q" in required:
+            self._check_arguments("coefficient q", {"n"}, self.coefficients["q"])
 
     def _check_fields(self) -> None:
         are_parameters = isinstance(self.parameters, tuple) and all(
