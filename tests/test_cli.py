@@ -569,6 +569,10 @@ def test_the_schema_is_printed_or_written(cli: Run, tmp_path: Path) -> None:
     assert json.loads((tmp_path / "s.json").read_text(encoding="utf-8")) == schema
 
 
+def test_the_schema_is_json_in_a_locale_without_the_letters_of_units(cli: Run) -> None:
+    assert json.loads(cli("schema", PYTHONIOENCODING="ascii").stdout) == impact.schema()
+
+
 def test_no_switch_is_on_unless_it_is_given() -> None:
     switches = {
         (name, option.name): option.default

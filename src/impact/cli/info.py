@@ -30,7 +30,7 @@ def schema(
     """Print the JSON Schema of a config, for completion and validation in editors."""
     json_schema = impact.schema(output, overwrite=overwrite)
     if output is None:
-        print(json.dumps(json_schema, indent=2, ensure_ascii=False))
+        print(json.dumps(json_schema, indent=2))
     else:
         exits.print_written(output)
 

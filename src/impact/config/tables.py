@@ -557,7 +557,7 @@ def schema(output: str | Path | None = None, *, overwrite: bool = False) -> dict
         "then": {"properties": {"sweep": {"allOf": required}}},
     }
     if output is not None:
-        text = json.dumps(content, indent=2, ensure_ascii=False) + "\n"
+        text = json.dumps(content, indent=2) + "\n"
         write_file(Path(output), text.encode(), overwrite=overwrite)
     return content
 
