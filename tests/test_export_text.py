@@ -291,6 +291,12 @@ def test_the_header_says_what_the_step_delivers_and_recommends_no_longer_one_tha
     assert 0.99 * needed.dt < recommended <= needed.dt
 
 
+def test_a_step_that_is_too_large_needs_a_softer_material_and_no_other_characteristic_speed() -> None:
+    export = impact.export("liggghts", "liggghts-hooke", at={"e": 0.7, "v1": 1.0}, dt=1.2e-5)
+    assert export.needed is not None
+    assert export.needed.parameter == "materials.table1.E"
+
+
 def test_the_classes_of_chrono_have_the_names_of_the_release() -> None:
     new = "\n".join(impact.export("chrono", code_version="9.0.0").lines)
     old = "\n".join(impact.export("chrono", code_version="8.0.0").lines)

@@ -718,14 +718,13 @@ def _seek(law: FixedStepLaw, name: str) -> tuple[Parameter, str, float]:
 
 def time_parameter(config: Config, model: ForceModel) -> str:
     """Name the parameter that sets the time scale of a law, as `timestep` takes it; "" where two materials do."""
+    if _takes_moduli(config, model):
+        # rather than a characteristic speed, which is to be that of the contact
+        materials = _materials(config)
+        return f"materials.{materials[0]}.E" if len(materials) == 1 else ""
     arguments = argument_names(model.stiffness)
     names = [p.name for p in model.parameters if p.name in arguments and p.name != model.damping]
-    if len(names) == 1:
-        return names[0]
-    if not _takes_moduli(config, model):
-        return "K"
-    materials = _materials(config)
-    return f"materials.{materials[0]}.E" if len(materials) == 1 else ""
+    return names[0] if len(names) == 1 else "K"
 
 
 def _materials(config: Config) -> list[str]:
