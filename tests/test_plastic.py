@@ -152,7 +152,7 @@ def kogut_etsion(impacts: Impacts, index: int):
         return Fc * np.where(x < meets, w**1.5, np.where(w < 6.0, 1.03 * w**1.425, 1.4 * w**1.263))
 
     def unloading(peak):
-        w, top = max(peak / dc, 1.0), float(loading(np.array([peak]))[0])
+        w, top = peak / dc if peak > 1.11416553 * dc else 1.0, float(loading(np.array([peak]))[0])
         rest = peak * (1 - w**-0.28) * (1 - w**-0.69)
         return rest, lambda x: top * (np.maximum(x - rest, 0.0) / (peak - rest)) ** (1.5 * w**-0.0331), []
 
@@ -252,6 +252,15 @@ def test_below_the_yield_speed_it_is_elastic(key):
     # a law that is designed for one speed also dissipates less at higher ones
     assert np.all(np.diff(contact["e_out"]) <= 1e-9) or key == "muthukumar-2003"
     assert contact["e_out"].min() < 0.8
+
+
+def test_kogut_and_etsion_make_no_energy_just_above_the_first_yield():
+    R, E, Y, nu = materials(table1_impacts())
+    dc = (np.pi * (0.454 + 0.41 * nu) * 2.8 * Y / (2 * E)) ** 2 * R
+    critical = float(np.sqrt(0.8 * 4.0 / 3.0 * E * np.sqrt(R) * dc**2.5 / table1_impacts().m[0]))
+    e_out = struck(find("kogut-etsion-2005"), table1_impacts(v1=np.linspace(0.9, 1.6, 71) * critical))["e_out"]
+    assert e_out.max() <= 1.0 + 1e-9
+    assert -1e-3 < np.diff(e_out).min() <= np.diff(e_out).max() <= 1e-9
 
 
 def test_thornton_at_multiples_of_the_yield_speed():
