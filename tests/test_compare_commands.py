@@ -648,6 +648,20 @@ def test_bless_does_not_copy_another_result_than_it_compared(folder: Path, tmp_p
     assert baseline.read_bytes() == (folder / "base.h5").read_bytes()
 
 
+def test_bless_does_not_replace_another_baseline_than_it_compared(folder: Path, tmp_path: Path) -> None:
+    baseline = tmp_path / "baseline.h5"
+    shutil.copy(folder / "base.h5", baseline)
+
+    def bless_too(verdict: impact.Verdict) -> None:
+        impact.bless(folder / "different.h5", baseline, reason="of another process")
+
+    changed = pytest.raises(impact.InUseError, match=r"baseline\.h5: was changed while it was compared")
+    with pytest.deprecated_call(), changed:
+        impact.bless(folder / "base.h5", baseline, reason="numbers changed", show=bless_too)
+    assert impact.load(baseline).attrs["reason"] == "of another process"
+    assert [path.name for path in tmp_path.iterdir()] == ["baseline.h5"]
+
+
 # rerun
 
 

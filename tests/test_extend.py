@@ -6,6 +6,7 @@ import functools
 import json
 import shutil
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -253,6 +254,22 @@ def test_a_result_that_another_process_extended_meanwhile_is_not_replaced(stored
         impact.extend_to_file(path, ["sweep.v1=[4.0]"], on_progress=extend_too)
     assert impact.load(path)["v1"].values.tolist() == [1.0, 2.0, 3.0]
     assert [other.name for other in path.parent.iterdir()] == ["r.h5"]
+
+
+def test_of_extensions_at_the_same_time_none_that_succeeds_is_lost(stored_sweep: StoredSweep) -> None:
+    path, kept = stored_sweep(BASE), {1.0, 2.0}
+
+    def extend(speed: float) -> float | None:
+        try:
+            impact.extend_to_file(path, [f"sweep.v1=[{speed}]"])
+        except impact.InUseError:
+            return None
+        return speed
+
+    for round in range(4):
+        with ThreadPoolExecutor() as pool:
+            kept |= {*pool.map(extend, (3.0 + round + n / 4 for n in range(4)))} - {None}
+        assert {*impact.load(path)["v1"].values.tolist()} == kept
 
 
 def test_an_extension_that_is_complete_is_not_resumed_and_no_error(cli: Run, stored_sweep: StoredSweep) -> None:

@@ -10,7 +10,7 @@ import re
 import stat
 import time
 import warnings
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from functools import cache
 from pathlib import Path
 from secrets import token_hex
@@ -107,7 +107,9 @@ class Sink(io.FileIO):
 
 
 @contextlib.contextmanager
-def atomic_write(path: Path, *, overwrite: bool, part: Path | None = None) -> Iterator[Sink]:
+def atomic_write(
+    path: Path, *, overwrite: bool, part: Path | None = None, check: Callable[[], None] = lambda: None
+) -> Iterator[Sink]:
     """Open a file that gets its name when the block ends without an error, and then survives a power cut.
 
     Parameters
@@ -116,6 +118,7 @@ def atomic_write(path: Path, *, overwrite: bool, part: Path | None = None) -> It
     overwrite : whether it may replace another file
     part : the temporary name; by default a unique one, and files that killed processes left under such names are
         removed
+    check : called just before the file gets its name, by one process at a time; an exception prevents it
 
     Raises
     ------
@@ -139,7 +142,9 @@ def atomic_write(path: Path, *, overwrite: bool, part: Path | None = None) -> It
             sink.check()
             os.fsync(sink.fileno())
             sink.finish()
-            _publish(part, path, overwrite=overwrite)
+            with _alone_in(path.parent):
+                check()
+                _publish(part, path, overwrite=overwrite)
         finally:
             sink.close()
             with contextlib.suppress(FileNotFoundError):
@@ -154,6 +159,17 @@ def atomic_write(path: Path, *, overwrite: bool, part: Path | None = None) -> It
         raise StoreError(
             f"{path}: written, but its name may not be on the disk: {error.strerror}; a power cut may undo it"
         ) from error
+
+
+@contextlib.contextmanager
+def _alone_in(folder: Path) -> Iterator[None]:
+    """Wait until no other process publishes a file in a folder, where folders can be locked."""
+    with contextlib.ExitStack() as at_end:
+        with contextlib.suppress(OSError, AttributeError):
+            descriptor = os.open(folder, os.O_RDONLY)
+            at_end.callback(os.close, descriptor)
+            fcntl.flock(descriptor, fcntl.LOCK_EX)
+        yield
 
 
 def check_output(path: Path, *sources: Path, overwrite: bool) -> None:

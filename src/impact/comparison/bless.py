@@ -11,10 +11,11 @@ from pathlib import Path
 import xarray as xr
 
 from ..atomic import check_output
-from ..errors import ResultError, UsageError
+from ..errors import InUseError, ResultError, UsageError
 from ..formatting import argument, safe_text
 from ..results.provenance import command_start, describe_point, inputs_at
 from ..results.schema import kind_of
+from ..results.seal import has_seal
 from ..results.summary import summarize
 from ..results.xarray_backend import load, save_with_attributes
 from .compare import Tolerances, check_comparable, compare, effective_tolerances
@@ -48,6 +49,7 @@ def bless(
     ------
     ResultError : one of the files is not a readable result
     UsageError : the reason is empty, a tolerance is invalid, both paths are the same file, or points failed
+    InUseError : another process changed the baseline meanwhile
     StoreError : the disk is full or failed; the baseline is unchanged
 
     >>> import impact, tempfile
@@ -71,21 +73,27 @@ def bless(
     check_comparable(result, str(new))
     if not allow_failed:
         _check_no_failures(result, new)
-    verdict, attributes = None, result.attrs
+    verdict, attributes, old_seal = None, result.attrs, ""
     if baseline.exists():
         try:
             old_baseline = load(baseline)
         except ResultError as error:
             raise ResultError(f"{error}; it is not modified, remove it to create a new baseline") from None
-        attributes = old_baseline.attrs
+        attributes, old_seal = old_baseline.attrs, str(old_baseline.encoding["seal"])
         comparison = compare(result, old_baseline, tol=tol)
         repeats = command_start(str(new), result)
         verdict = replace(comparison, new=str(new), baseline=str(baseline), repeats=repeats)
         if show is not None:
             show(verdict)
     added = {"reason": reason, "tolerances": json.dumps(effective_tolerances(tol, attributes))}
+
+    def check() -> None:
+        is_same = has_seal(baseline, old_seal) if old_seal else not baseline.exists()
+        if not is_same:
+            raise InUseError(f"{baseline}: was changed while it was compared, and is not modified; bless it again")
+
     # what was compared is copied
-    save_with_attributes(new, baseline, str(result.encoding["seal"]), added)
+    save_with_attributes(new, baseline, str(result.encoding["seal"]), added, check)
     return verdict
 
 

@@ -432,9 +432,11 @@ def store_result(
             summary.add_slab(table, slab)
             report(summary.points)
 
-    with atomic_write(output, overwrite=run.overwrite or plan.replaces, part=part) as sink:
-        seal = write_sealed(sink, output, template, values(), plan.config.output)
+    def check() -> None:
         if plan.replaces and not has_seal(output, plan.extends):
             raise InUseError(f"{output}: was changed while it was extended, and is not modified; extend it again")
+
+    with atomic_write(output, overwrite=run.overwrite or plan.replaces, part=part, check=check) as sink:
+        seal = write_sealed(sink, output, template, values(), plan.config.output)
     result.encoding = {"source": str(output), "seal": seal, "layout": plan.layout}
     return SweepOutcome(result, summary, progress.of_trajectories, output=output)

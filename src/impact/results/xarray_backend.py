@@ -97,9 +97,11 @@ def save(
         write_sealed(sink, path, dataset, parts(), output or Output())
 
 
-def save_with_attributes(source: Path, path: Path, seal: str, attributes: Mapping[str, str]) -> None:
+def save_with_attributes(
+    source: Path, path: Path, seal: str, attributes: Mapping[str, str], check: Callable[[], None] = lambda: None
+) -> None:
     """Copy a result file of a seal and set some attributes; its layout stays, an existing file is replaced."""
-    with atomic_write(path, overwrite=True) as sink, source.open("rb") as file:
+    with atomic_write(path, overwrite=True, check=check) as sink, source.open("rb") as file:
         shutil.copyfileobj(file, sink)
         sink.check()
         if digest(sink) != seal:
