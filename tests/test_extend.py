@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import fcntl
 import functools
 import json
+import os
 import shutil
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -270,6 +272,15 @@ def test_of_extensions_at_the_same_time_none_that_succeeds_is_lost(stored_sweep:
         with ThreadPoolExecutor() as pool:
             kept |= {*pool.map(extend, (3.0 + round + n / 4 for n in range(4)))} - {None}
         assert {*impact.load(path)["v1"].values.tolist()} == kept
+
+
+def test_a_script_that_has_locked_the_folder_does_not_stop_a_command_in_it(cli: Run, tmp_path: Path) -> None:
+    """As `flock FOLDER impact sweep ...` does."""
+    folder = os.open(tmp_path, os.O_RDONLY)
+    fcntl.flock(folder, fcntl.LOCK_EX)
+    cli("sweep", "configs/figure6.toml", "-o", tmp_path / "r.h5", "--set", "sweep.e=0.5")
+    os.close(folder)
+    assert impact.load(tmp_path / "r.h5")["e"].item() == 0.5
 
 
 def test_an_extension_that_is_complete_is_not_resumed_and_no_error(cli: Run, stored_sweep: StoredSweep) -> None:

@@ -39,6 +39,8 @@ FILE_SUFFIXES = (".toml", ".json", ".py", ".csv", ".tex", ".parquet", ".html", "
 PICTURE_SUFFIXES = (".png", ".svg", ".pdf", ".eps", ".pgf", ".gif")
 # age of a temporary file from which on it may be left by a process that was killed
 MIN_STALE_S = 60.0
+# longest wait for other processes that give files of a folder their names
+MAX_PUBLISH_S = 1.0
 
 
 class Sink(io.FileIO):
@@ -163,12 +165,18 @@ def atomic_write(
 
 @contextlib.contextmanager
 def _alone_in(folder: Path) -> Iterator[None]:
-    """Wait until no other process publishes a file in a folder, where folders can be locked."""
+    """Wait until no other process publishes a file in a folder, where folders can be locked, for a time."""
     with contextlib.ExitStack() as at_end:
         with contextlib.suppress(OSError, AttributeError):
             descriptor = os.open(folder, os.O_RDONLY)
             at_end.callback(os.close, descriptor)
-            fcntl.flock(descriptor, fcntl.LOCK_EX)
+            # a script may have locked the folder for all of this command
+            end = time.monotonic() + MAX_PUBLISH_S
+            while time.monotonic() < end:
+                with contextlib.suppress(BlockingIOError):
+                    fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                    break
+                time.sleep(0.005)
         yield
 
 
