@@ -111,3 +111,12 @@ def test_the_citation_file_has_the_version_of_the_package() -> None:
     import impact
 
     assert f"version: {impact.__version__}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/physics.md"])
+def test_the_laws_with_adhesion_are_named(page: str) -> None:
+    import impact
+
+    laws = [model for model in impact.models().values() if any("adhesi" in p.meaning for p in model.parameters)]
+    (scope,) = re.findall(r"Adhesion is [^.]*\.", (ROOT / page).read_text(encoding="utf-8"))
+    assert sorted(re.findall(r"`(\w+-\w+)`", scope)) == sorted(model.key for model in laws)
