@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -418,6 +418,25 @@ def test_coverage_of_sets_of_four_specimens(deviation: float, count: int) -> Non
     # a deviation smaller than sigma is often estimated as 0, and the intervals are too long
     most = 1.0 if deviation < sigma else 0.95 + 4.0 * np.sqrt(0.95 * 0.05 / count)
     assert 0.95 - 4.0 * np.sqrt(0.95 * 0.05 / count) <= covered <= most
+
+
+@pytest.mark.parametrize(
+    "count", [pytest.param(count, marks=mark) for count, mark in zip((200, 4000), SLOW_AND_LONG, strict=True)]
+)
+@pytest.mark.parametrize(("loss", "expected"), [("linear", 0.4475), ("huber", 0.957), ("cauchy", 0.945)])
+def test_coverage_of_sets_with_two_outliers(
+    loss: Literal["linear", "huber", "cauchy"], expected: float, count: int
+) -> None:
+    """Squares: from a variance of 10.9 times the given one. The figures of 4000 are in docs/calibrate.md."""
+    sigma, random = np.repeat([0.1, 0.01], [2, 18]), np.random.default_rng(1)
+    bounds = Bounds(np.array([0.0]), np.array([1.0]))
+    sets = 0.7 + sigma * random.standard_normal((count, 20))
+    data = DataPoints(sets[0], np.full(20, 0.01), "given", loss=loss)
+    problems = [FitProblem(constant, bounds, replace(data, values=values)) for values in sets]
+    fits = fit_all(problems, leave_one_out=False)
+    covered = np.mean([result.lower[0] <= 0.7 <= result.upper[0] for result in fits])
+    print(f"{loss}: coverage {covered:.4f}")
+    assert abs(covered - expected) <= 4.0 * np.sqrt(expected * (1.0 - expected) / count)
 
 
 @pytest.mark.parametrize(
