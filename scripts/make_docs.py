@@ -45,12 +45,13 @@ cell of the grid for one model; cells that differ only in parameters of other mo
 
 The dimensions are `model`, then `friction` if the config has friction laws, followed by the swept axes in config
 order under their config names, such as `v1`, `bilinear.K` or `materials.steel.E`. A zip group is named after its
-first member; the other members are coordinates along it. Cases, and groups in which every column has repeated
-values, have the dimension `case`, with points numbered from 0 and all columns as coordinates; samples of uncertain
-inputs have the dimension `sample`. Scalars of the config are scalar coordinates. Coordinates along `model` are
-`title`, `year`, `equation`, `reference`, `doi` and `exponent` (n). With `alpha`, `e` is a coordinate over the axes
-that it depends on, and so is a mass that is computed from radius and density. Variables with the dimension
-`friction` are in results with friction laws only ([oblique.md](oblique.md)).
+first member without repeated values; the other members are coordinates along it. Cases, and groups in which every
+column has repeated values, have the dimension `case`, with points numbered from 0 and all columns as coordinates;
+samples of uncertain inputs have the dimension `sample`. Scalars of the config are scalar coordinates. Coordinates
+along `model` are `title`, `year`, `equation`, `reference`, `doi` and `exponent` (n), the last along an axis n too.
+With `alpha`, `e` is a coordinate over the axes that it depends on, and so is a mass that is computed from radius
+and density. Variables with the dimension `friction` are in results with friction laws only
+([oblique.md](oblique.md)).
 
 | variable | unit | dimensions | judged by compare | meaning | equation |
 |---|---|---|---|---|---|
@@ -78,8 +79,9 @@ those of the law's force along the steps, by the trapezoidal rule from the first
 `energy_residual` is the energy that the scheme adds, relative to m v0²/2, and negative for energy that it takes.
 
 `impact compare` judges the variables as follows. A *scaled* value may differ by its tolerance times the named
-scale at that point. A *bounded* value must stay below its bound or change by less than it. *Exact* values must
-be equal. *Reported* values are printed only. See [ci.md](ci.md).
+scale at that point. The peak is `peak_indentation`, the slip v0 + |g0|, where g0 is the slip of the contact points
+before the impact, and the spin (v0 + |g0|)/R of the ball. A *bounded* value must stay below its bound or change by
+less than it. *Exact* values must be equal. *Reported* values are printed only. See [ci.md](ci.md).
 
 ## Status
 
@@ -100,8 +102,9 @@ Points with status 1 to 9 have values; with status 10 and above they are NaN.
 ## Attributes
 
 - `title`; `schema_version`; `impact_version`; `packages`, versions as JSON.
-- `config`: the verbatim text of the config (JSON if it was a mapping). `config_set`: the overrides in order, as
-  JSON.
+- `config`: the verbatim text of the config (JSON if it was a mapping). `config_set`, as a JSON list of overrides:
+  the built-in materials that the config uses, then the overrides of the caller in their order, then the values of
+  CSV files.
 - `fingerprint`: SHA-256 of the effective config. `rtol` and `max_steps` of the solver, and the `core` that was
   used. `integrator`: the scheme; missing for `"exact"`.
 - `materials`: the materials of the balls, as JSON from name to `E` [Pa], `nu`, `rho` [kg/m3] and
