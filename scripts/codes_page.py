@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 
 import impact
@@ -34,7 +35,7 @@ entered, or with the damping that gives 0.6. *At {steps:g} steps* is the mean ov
 {schemes}
 
 In the tables below, *0.1 m/s* is the restitution of the same lines at a tenth of the speed. The remarks are those
-that `impact export` writes above the lines.
+that `impact export` writes above the lines; one that begins with entries is of these alone.
 {sections}
 """
 E, SLOW, STEPS = 0.6, 0.1, 20.0
@@ -93,7 +94,7 @@ def _overview(code: Code, problem: ExportProblem) -> list[str]:
 def _section(code: Code, problems: Sequence[ExportProblem]) -> Iterator[str]:
     yield f"\n## {code.name}\n"
     yield f"{cell(code.title)}: {cell(code.tested)}.\n"
-    rows, notes = [], dict[str, None]()
+    rows, notes = [], defaultdict[str, list[str]](list)
     for problem in problems:
         numbers = ["–", "–"]
         if _sets_e(problem):
@@ -102,7 +103,10 @@ def _section(code: Code, problems: Sequence[ExportProblem]) -> Iterator[str]:
             slow = impact.run(model=key, at=at).values["e_out"]
             numbers = [f"{e:.3f}" for e in (problem.e_continuous, slow)]
         rows.append([cell(code.laws[problem.model.key]), f"`{problem.model.key}`", *numbers])
-        notes |= dict.fromkeys(code.notes(problem.collision(problem.law.contact_time / STEPS, 0.5)))
+        for note in code.notes(problem.collision(problem.law.contact_time / STEPS, 0.5)):
+            notes[note].append(f"`{problem.model.key}`")
     yield table(("in the code", "entry", "e at 0.6", "0.1 m/s"), rows)
     yield ""
-    yield from (f"- {cell(note)}" for note in notes)
+    for note, laws in notes.items():
+        whose = "" if len(laws) == len(problems) else f"{', '.join(laws)}: " if len(laws) < 5 else "some laws: "
+        yield f"- {whose}{cell(note)}"
