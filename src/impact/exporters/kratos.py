@@ -186,8 +186,8 @@ def lines(collision: Collision, parameters: Parameters) -> Lines:
 
 
 def notes(collision: Collision) -> Lines:
-    yield "in SI; material1, material2 and relation are the Variables of materials and of their relation in"
-    yield "MaterialsDEM.json, parameters are keys of ProjectParametersDEM.json"
+    yield "in SI; material1 and material2 are Variables of materials in MaterialsDEM.json, relation of their pair"
+    yield "parameters are keys of ProjectParametersDEM.json"
     yield "two materials: 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2; the restitution is that of the pair"
     yield "an e below 0.001 is raised to it, and above 0.999 there is no damping; the force is never negative"
     if collision.has_wall:
