@@ -45,6 +45,9 @@ laws, and `impact models KEY` describes one of them.
 | χ | damping of the hysteresis family, where the damping force is χ K δⁿ δ̇/v₀ |
 | ζ | damping ratio of a dashpot, where the damping force is ζ √(2(n + 1) m K) δ^((n−1)/2) δ̇ |
 | e, e_out | requested and delivered restitution |
+| E\\*, R\\* | effective modulus and radius of [elastic contact](physics.md#elastic-contact) [Pa, m]; where K is \
+set, E\\* is 3 K/(4 √R\\*) in elastic-plastic laws and in `jkr-1971` |
+| Y, ν | yield strength and Poisson's ratio of the softer ball, of equally strong ones the smaller ν [Pa, –] |
 
 In a config, `models = "all"` selects every law once, `models = ["family:hysteresis", "!lee-wang-1983"]` a family
 without one of its laws, and `models = ["lankarani-nikravesh-*", "bilinear"]` laws by pattern and by key.

@@ -251,6 +251,44 @@ def test_a_law_states_its_equation_reference_and_year(key):
     assert all(law.year <= int(year) for year in re.findall(r"\b(?:19|20)\d\d\b", law.title))
     for parameter in law.parameters:
         assert parameter.meaning
+    # a stiffness of its own is part of the equation
+    assert law.stiffness is None or "K = " in law.equation or "K" not in law.equation
+
+
+def printed_polynomial(text: str) -> list[float]:
+    """Coefficients of a polynomial of an equation, from the highest power."""
+    terms = re.findall(r"([−+]?) *(\d+\.?\d*)(?: [ew][²³⁴⁵⁶⁷⁸⁹]?)?", text)
+    return [float(number) * (-1 if sign == "−" else 1) for sign, number in reversed(terms)]
+
+
+def test_a_polynomial_of_an_equation_is_that_of_the_law() -> None:
+    e = 0.6
+    p = {
+        key: np.polyval(printed_polynomial(re.split(r"p\(e\) = |, to δ", find(key).equation)[1]), e)
+        for key in ("lammps-tsuji-hooke-without-root", "thornton-cummins-cleary-2013")
+    }
+    zeta = p["lammps-tsuji-hooke-without-root"] / 2
+    delivered = np.exp(-np.pi * zeta / np.sqrt(1 - zeta**2))
+    assert run_at("lammps-tsuji-hooke-without-root", e).values["e_out"] == pytest.approx(delivered, abs=1e-9)
+    beta = np.sqrt(1 / (1 - (1 + e) ** 2 * np.exp(e * p["thornton-cummins-cleary-2013"])) - 1)
+    zeta = 2 * np.sqrt(1.5) * beta / np.sqrt(5)
+    delivered = np.exp(-2 * zeta * np.arccos(zeta) / np.sqrt(1 - zeta**2))
+    assert run_at("thornton-cummins-cleary-2013", e).values["e_out"] == pytest.approx(delivered, abs=1e-9)
+
+
+def test_the_fraction_in_the_equation_of_kuwabara_and_kono_at_a_speed_is_that_of_the_law() -> None:
+    above, below = re.search(r"P\(w\) = \((.*)\)/\((.*)\)", find("kuwabara-kono-at-speed").equation).groups()
+    roots = np.roots(np.polysub(printed_polynomial(above), 0.6 * np.array(printed_polynomial(below))))
+    w = roots[(abs(roots.imag) < 1e-12) & (roots.real > 0)].real.item()
+    # at v_e = 1 m/s
+    A = 2 / 3 * w**2 * (6e9 / (2 / 3)) ** -0.4
+    config = {
+        "models": "kuwabara-kono-1987",
+        "sweep": {**BALLS, "K": 6e9},
+        "model": {"kuwabara-kono-1987": {"A": A}},
+    }
+    e_out = run_at("kuwabara-kono-at-speed", 0.6).values["e_out"]
+    assert impact.run(config).values["e_out"] == pytest.approx(e_out, abs=1e-9)
 
 
 # a source that can be looked up: a file and its commit, a paper and its equation, a named page, or this repository

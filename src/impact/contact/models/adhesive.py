@@ -54,9 +54,10 @@ LIGGGHTS_EDINBURGH = ForceModel(
     key="liggghts-edinburgh",
     title="LIGGGHTS edinburgh, elasto-plastic adhesive (3.8.0)",
     year=2017,
-    equation="F = K δⁿ;  back F = max(k₂(δⁿ − δₚⁿ), −k_a δ^χ),  δₚ = (1 − K/k₂)^(1/n) δₘ,  k_a = f/d^χ,  "
-    "f = min((3/2)π Γ a, k₂ δₚⁿ/2),  a the radius of the spheres' intersection at δₚ,  d = δₚ/2 where f is "
-    "limited to k₂ δₚⁿ/2, else (δₚⁿ − f/k₂)^(1/n);  K = 2E* R* for n = 1, else (4/3)E* √R*",
+    equation="F = K δⁿ;  back F = max(k₂(δⁿ − δₚⁿ), −k_a δ^χ) to δₚ, with Γ > 0 to δ = 0,  "
+    "δₚ = (1 − K/k₂)^(1/n) δₘ,  k_a = f/d^χ,  f = min((3/2)π Γ a, k₂ δₚⁿ/2),  a the radius of the "
+    "spheres' intersection at δₚ,  d = δₚ/2 where f is limited to k₂ δₚⁿ/2, else (δₚⁿ − f/k₂)^(1/n);  "
+    "K = 2E* R* for n = 1, else (4/3)E* √R*",
     reference="LIGGGHTS-PUBLIC, model edinburgh by Mohanty R and Zorec TM (2017), with coefficientRestitution 1, "
     "fixKc off and no pullOffForce",
     evidence=seen(

@@ -58,8 +58,8 @@ LUDING_2008 = elastic_plastic(
     key="luding-2008",
     title="Luding, adhesive",
     year=2008,
-    equation="F = K δ to δ*, then k₂(δ − δ₀*);  back F = max(k(δ − δ₀), −k_c δ),  k = K + (k₂ − K) δₘ/δ*,  "
-    "δ₀ = (1 − K/k)δₘ,  δ* = k₂/(k₂ − K) φ 2R*",
+    equation="F = K δ to δ*, then k₂(δ − (1 − K/k₂)δ*);  back F = max(k(δ − δ₀), −k_c δ) to δ₀, with k_c > 0 to "
+    "δ = 0,  k = K + (k₂ − K) δₘ/δ*, at most k₂,  δ₀ = (1 − K/k) min(δₘ, δ*),  δ* = k₂/(k₂ − K) φ 2R*",
     reference="Luding S (2008) Cohesive, frictional powders: contact models for tension. Granul. Matter 10, 235",
     doi="10.1007/s10035-008-0099-x",
     evidence=seen(
@@ -104,7 +104,7 @@ THORNTON_1997 = hertzian_plastic(
     title="Thornton",
     year=1997,
     equation="F = K δ^(3/2) to δ_y, then F_y + π p_y R*(δ − δ_y);  back F = (4/3)E* √Rₚ (δ − δₚ)^(3/2),  "
-    "δ_y = (π p_y/(2E*))² R*,  Rₚ = (4E*/(3Fₘ))((2Fₘ + F_y)/(2π p_y))^(3/2)",
+    "δ_y = (π p_y/(2E*))² R*,  Rₚ = (4E*/(3Fₘ))((2Fₘ + F_y)/(2π p_y))^(3/2),  p_y = c Y,  F_y = K δ_y^(3/2)",
     reference="Thornton C (1997) Coefficient of restitution for collinear collisions of elastic-perfectly plastic "
     "spheres. J. Appl. Mech. 64, 383; Thornton C, Ning Z (1998) Powder Technol. 99, 154",
     evidence=seen(
@@ -138,8 +138,9 @@ JOHNSON_1985 = hertzian_plastic(
     key="johnson-1985",
     title="Johnson, fully plastic",
     year=1985,
-    equation="F = 2π R* p_d δ;  back F = Fₘ((δ − δₚ)/(δₘ − δₚ))^(3/2),  δₘ − δₚ = 3Fₘ/(4 a E*),  a² = 2R*δₘ;  "
-    "F = K δ^(3/2) where v₀ ≤ V_y,  (1/2) m V_y² = (2/5) K δ_y^(5/2),  δ_y = (1.6π Y/(2E*))² R*",
+    equation="F = 2π R* p_d δ,  p_d = c Y;  back F = Fₘ((δ − δₚ)/(δₘ − δₚ))^(3/2),  δₘ − δₚ = 3Fₘ/(4 a E*), at "
+    "most δₘ,  a² = 2R*δₘ;  F = K δ^(3/2) where v₀ ≤ V_y,  (1/2) m V_y² = (2/5) K δ_y^(5/2),  "
+    "δ_y = (1.6π Y/(2E*))² R*",
     reference="Johnson KL (1985) Contact mechanics, chapter 11. Cambridge University Press",
     evidence=not_verified(
         note="a public digest of Thornton and Ning (1998) gives the prefactor 1.72 of its e(V), ours is 1.7176; "
@@ -186,7 +187,9 @@ JACKSON_GREEN_2010 = hertzian_plastic(
     title="Jackson, Green and Marghitu",
     year=2010,
     equation="F = F_c w^(3/2) to w = 1.9, then F_c[exp(−w^(5/12)/4) w^(3/2) + (4H/(C Y))(1 − exp(−w^(5/9)/25)) "
-    "w];  back F = Fₘ((δ − δₚ)/(δₘ − δₚ))^(3/2),  δₚ = 1.02 δₘ(1 − ((wₘ + 5.9)/6.9)^−0.54);  w = δ/δ_c",
+    "w];  back F = Fₘ((δ − δₚ)/(δₘ − δₚ))^(3/2),  δₚ = 1.02 δₘ(1 − ((wₘ + 5.9)/6.9)^−0.54), 0 to "
+    "wₘ = 1.9;  w = δ/δ_c,  δ_c = (π C Y/(2E*))² R*,  C = 1.295 exp(0.736 ν),  F_c = K δ_c^(3/2),  H/Y = 2.84 − "
+    "0.92(1 − cos(π a/R*)),  a² = R* δ (w/1.9)^B,  B = 0.14 exp(23 Y/E*)",
     reference="Jackson RL, Green I (2005) A finite element study of elasto-plastic hemispherical contact against "
     "a rigid flat. J. Tribol. 127, 343, the loading; Jackson RL, Chusoipin I, Green I (2005), the residual; "
     "Jackson RL, Green I, Marghitu DB (2010) Nonlinear Dyn. 60, 217",
@@ -232,7 +235,8 @@ KOGUT_ETSION_2005 = hertzian_plastic(
     title="Kogut and Etsion, with Etsion, Kligerman and Kadin",
     year=2005,
     equation="F = F_c w^(3/2) to w = 1.48, F_c 1.03 w^1.425 to w = 6, then F_c 1.40 w^1.263;  "
-    "back F = Fₘ((δ − δₚ)/(δₘ − δₚ))^(1.5 wₘ^−0.0331),  δₚ = δₘ(1 − wₘ^−0.28)(1 − wₘ^−0.69);  w = δ/δ_c",
+    "back F = Fₘ((δ − δₚ)/(δₘ − δₚ))^(1.5 wₘ^−0.0331),  δₚ = δₘ(1 − wₘ^−0.28)(1 − wₘ^−0.69),  "
+    "elastic to wₘ = 1.114;  w = δ/δ_c,  δ_c = (π (0.454 + 0.41 ν) 2.8 Y/(2E*))² R*,  F_c = K δ_c^(3/2)",
     reference="Kogut L, Etsion I (2002) Elastic-plastic contact analysis of a sphere and a rigid flat. J. Appl. "
     "Mech. 69, 657; Etsion I, Kligerman Y, Kadin Y (2005) Unloading of an elastic-plastic loaded spherical "
     "contact. Int. J. Solids Struct. 42, 3716",

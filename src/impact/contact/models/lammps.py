@@ -31,6 +31,7 @@ from .viscoelastic import LEE_HERRMANN_1993, drag
 
 # of the polynomial p(e) of α that LAMMPS calls tsuji and credits to Marshall (2009), equation 53, in powers of e
 TSUJI_POLYNOMIAL = (1.2728, -4.2783, 11.087, -22.348, 27.467, -18.022, 4.8218)
+P = "p(e),  p(e) = 1.2728 − 4.2783 e + 11.087 e² − 22.348 e³ + 27.467 e⁴ − 18.022 e⁵ + 4.8218 e⁶"
 DAMPING_KERNEL_SOURCE = "lammps/lammps, src/GRANULAR/gran_sub_mod_damping_kernel.h @07b704ca (2026)"
 DAMPING_SOURCE = "lammps/lammps, src/GRANULAR/gran_sub_mod_damping.cpp @07b704ca (2026)"
 DAMPING_SOURCE_2024 = "LAMMPS release of 29 August 2024, src/GRANULAR/gran_sub_mod_damping.cpp"
@@ -145,16 +146,16 @@ LAMMPS_MODELS: tuple[ForceModel, ...] = (
         renamed(ANAGNOSTOPOULOS_1988, ANAGNOSTOPOULOS_1988_NO_TENSION), **COEFF_RESTITUTION,
     ),
     *with_and_without_limit(
-        "tsuji, hertz", "α √(m K) δ^(1/4) δ̇,  α = √2 p(e), p of degree six", tsuji(np.sqrt(2.0), 1.5),
+        "tsuji, hertz", f"α √(m K) δ^(1/4) δ̇,  α = √2 {P}", tsuji(np.sqrt(2.0), 1.5),
         key="lammps-tsuji", **WITH_ROOT,
     ),
-    *with_and_without_limit("tsuji, hooke", "α √(m K) δ̇,  α = √2 p(e)", tsuji(np.sqrt(2.0), 1.0), **WITH_ROOT),
+    *with_and_without_limit("tsuji, hooke", f"α √(m K) δ̇,  α = √2 {P}", tsuji(np.sqrt(2.0), 1.0), **WITH_ROOT),
     *with_and_without_limit(
-        "tsuji, hertz", "α √(m K) δ^(1/4) δ̇,  α = p(e), p of degree six", tsuji(1.0, 1.5),
+        "tsuji, hertz", f"α √(m K) δ^(1/4) δ̇,  α = {P}", tsuji(1.0, 1.5),
         key="lammps-tsuji-without-root", **WITHOUT_ROOT,
     ),
     *with_and_without_limit(
-        "tsuji, hooke", "α √(m K) δ̇,  α = p(e)", tsuji(1.0, 1.0),
+        "tsuji, hooke", f"α √(m K) δ̇,  α = {P}", tsuji(1.0, 1.0),
         key="lammps-tsuji-hooke-without-root", **WITHOUT_ROOT,
     ),
     *with_and_without_limit(

@@ -124,7 +124,8 @@ SIMBODY_HUNT_CROSSLEY = code_hysteresis(
     "simbody-hunt-crossley",
     title="Simbody and OpenSim HuntCrossleyForce (2010 to 2026)",
     year=2010,
-    equation="F = K δ^(3/2) (1 + χ δ̇/v₀),  χ = (3/2) c v₀",
+    equation="F = K δ^(3/2) (1 + χ δ̇/v₀),  χ = (3/2) c v₀;  K = (4/3) √R* (k₁ k₂/(k₁ + k₂))^(3/2),  "
+    "k = (E/(1 − ν²))^(2/3)",
     reference="Sherman MA, Seth A, Delp SL (2011) Simbody: multibody dynamics for biomedical research. Procedia "
     "IUTAM 2, 241",
     doi="10.1016/j.piutam.2011.04.023",
@@ -139,8 +140,8 @@ SIMBODY_HUNT_CROSSLEY_MIXED = replace(
     SIMBODY_HUNT_CROSSLEY,
     key="simbody-hunt-crossley-mixed",
     title="Simbody and OpenSim HuntCrossleyForce, two materials (2010 to 2026)",
-    equation="F = K δ^(3/2) (1 + χ δ̇/v₀),  χ = (3/2) c v₀,  c = (c₁ k₂ + c₂ k₁)/(k₁ + k₂),  "
-    "k = (E/(1 − ν²))^(2/3)",
+    equation="F = K δ^(3/2) (1 + χ δ̇/v₀),  χ = (3/2) c v₀,  c = (c₁ k₂ + c₂ k₁)/(k₁ + k₂);  "
+    "K = (4/3) √R* (k₁ k₂/(k₁ + k₂))^(3/2),  k = (E/(1 − ν²))^(2/3)",
     parameters=(
         damping("c1", "s/m", "dissipation of the material of ball 1"),
         Parameter("c2", "s/m", "dissipation of the material of ball 2", least=0.0),
@@ -159,7 +160,7 @@ DRAKE_POINT_CONTACT = code_hysteresis(
     "drake-point-contact",
     title="Drake, point contact (defaults since v1.36.0, December 2024)",
     year=2019,
-    equation="F = K δ (1 + χ δ̇/v₀),  χ = d v₀",
+    equation="F = K δ (1 + χ δ̇/v₀),  χ = d v₀;  K = k₁ k₂/(k₁ + k₂)",
     reference="Drake, contact_model_doxygen.h, and the defaults of SceneGraphConfig since v1.36.0 (December 2024)",
     evidence=seen(
         "RobotLocomotion/drake, multibody/plant/contact_model_doxygen.h and geometry/scene_graph_config.h "
@@ -180,7 +181,7 @@ DRAKE_POINT_CONTACT_MIXED = replace(
     DRAKE_POINT_CONTACT,
     key="drake-point-contact-mixed",
     title="Drake, point contact of two materials (defaults since v1.36.0, December 2024)",
-    equation="F = K δ (1 + χ δ̇/v₀),  χ = d v₀,  d = (k₂ d₁ + k₁ d₂)/(k₁ + k₂)",
+    equation="F = K δ (1 + χ δ̇/v₀),  χ = d v₀,  d = (k₂ d₁ + k₁ d₂)/(k₁ + k₂);  K = k₁ k₂/(k₁ + k₂)",
     parameters=(
         damping("d1", "s/m", "Hunt-Crossley dissipation d₁ of ball 1", default=50.0),
         Parameter("d2", "s/m", "Hunt-Crossley dissipation d₂ of ball 2", default=50.0, least=0.0),
