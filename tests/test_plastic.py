@@ -263,6 +263,20 @@ def test_kogut_and_etsion_make_no_energy_just_above_the_first_yield():
     assert -1e-3 < np.diff(e_out).min() <= np.diff(e_out).max() <= 1e-9
 
 
+@pytest.mark.parametrize("nu", [-0.5, 0.0])
+def test_jackson_and_green_make_no_energy_where_their_force_jumps(nu: float) -> None:
+    w = np.linspace(1.901, 2.5, 27)
+    E = 1e11 / (1 - nu**2) / 2
+    # two balls of 1 kg and 0.1 m at 1 m/s, of a yield strength with which the elastic peak is at w
+    peak = (1.25 * 0.5 / (4 / 3 * E * np.sqrt(0.05))) ** 0.4
+    strength = 2 * E * np.sqrt(peak / w / 0.05) / (np.pi * 1.295 * np.exp(0.736 * nu))
+    balls = {"v1": 1.0, "v2": 0.0, "m1": 1.0, "m2": 1.0, "R1": 0.1, "R2": 0.1, "material": "a"}
+    material = {"E": 1e11, "nu": nu, "yield_strength": strength.tolist()}
+    result = impact.sweep({"models": "jackson-green-2010", "sweep": balls, "materials": {"a": material}})
+    assert result["e_out"].max() <= 1.0 + 1e-9
+    assert result["e_out"].min() < 0.97
+
+
 def test_thornton_at_multiples_of_the_yield_speed():
     # its closed form depends on V/V_y alone; far beyond it goes as 1.185 (V_y/V)^(1/4)
     R, E, Y, _ = materials(table1_impacts())

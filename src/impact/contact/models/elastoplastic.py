@@ -187,9 +187,9 @@ JACKSON_GREEN_2010 = hertzian_plastic(
     title="Jackson, Green and Marghitu",
     year=2010,
     equation="F = F_c w^(3/2) to w = 1.9, then F_c[exp(−w^(5/12)/4) w^(3/2) + (4H/(C Y))(1 − exp(−w^(5/9)/25)) "
-    "w];  back F = Fₘ((δ − δₚ)/(δₘ − δₚ))^(3/2),  δₚ = 1.02 δₘ(1 − ((wₘ + 5.9)/6.9)^−0.54), 0 to "
-    "wₘ = 1.9;  w = δ/δ_c,  δ_c = (π C Y/(2E*))² R*,  C = 1.295 exp(0.736 ν),  F_c = K δ_c^(3/2),  H/Y = 2.84 − "
-    "0.92(1 − cos(π a/R*)),  a² = R* δ (w/1.9)^B,  B = 0.14 exp(23 Y/E*)",
+    "w];  back F = Fₘ((δ − δₚ)/(δₘ − δₚ))^(3/2),  δₚ = 1.02 δₘ(1 − ((wₘ + 5.9)/6.9)^−0.54), at "
+    "least δₘ(1 − K δₘ^(3/2)/Fₘ), 0 to wₘ = 1.9;  w = δ/δ_c,  δ_c = (π C Y/(2E*))² R*,  C = 1.295 exp(0.736 ν),  "
+    "F_c = K δ_c^(3/2),  H/Y = 2.84 − 0.92(1 − cos(π a/R*)),  a² = R* δ (w/1.9)^B,  B = 0.14 exp(23 Y/E*)",
     reference="Jackson RL, Green I (2005) A finite element study of elasto-plastic hemispherical contact against "
     "a rigid flat. J. Tribol. 127, 343, the loading; Jackson RL, Chusoipin I, Green I (2005), the residual; "
     "Jackson RL, Green I, Marghitu DB (2010) Nonlinear Dyn. 60, 217",
@@ -211,8 +211,15 @@ JACKSON_GREEN_2010 = hertzian_plastic(
     force=lambda elastic, x, R_eff, C, dc, Fc, B: np.where(
         x < 1.9 * dc, elastic, Fc * jackson_green(np.maximum(x / dc, 1.9), x / R_eff, C, B)
     ),
-    residual=lambda peak, dc: np.where(
-        peak > 1.9 * dc, 1.02 * peak * (1 - np.power((np.maximum(peak / dc, 1.9) + 5.9) / 6.9, -0.54)), 0
+    # the force jumps up at w = 1.9: the second bound is that of the work of an elastic contact
+    residual=lambda peak, force_at_peak, K, dc: np.where(
+        peak > 1.9 * dc,
+        peak
+        * np.maximum(
+            1.02 * (1 - np.power((np.maximum(peak / dc, 1.9) + 5.9) / 6.9, -0.54)),
+            1 - K * power(peak, 1.5) / force_at_peak,
+        ),
+        0,
     ),
 )
 
