@@ -344,6 +344,25 @@ def test_results_can_be_pickled(make: Callable[[], object]) -> None:
     assert str(after) == str(before)
 
 
+@pytest.mark.parametrize(
+    "read",
+    [
+        lambda name, result: impact.run(name),
+        lambda name, result: impact.solve("hertz", "K", {"contact_time": 1e-3}, source=name),
+        lambda name, result: impact.plot(result, style=name),
+        lambda name, result: impact.conform(adapter=f"{name}.py:collide"),
+        lambda name, result: impact.save(result, f"{name}/r.h5"),
+    ],
+    ids=["run", "solve", "plot", "conform", "save"],
+)
+def test_a_name_that_no_file_can_have_is_named(
+    read: Callable[[str, xr.Dataset], object], result: xr.Dataset
+) -> None:
+    name = "x" * 300
+    with pytest.raises((impact.ConfigError, impact.UsageError), match=name[:50]):
+        read(name, result)
+
+
 def test_results_with_other_values_are_not_equal() -> None:
     adapters = (lambda collision: collision), str(ROOT / "docs/conform/rigid.py:collide")
     boards = [impact.conform(adapter=adapter, only="normal-e50-middle-equal") for adapter in adapters]

@@ -183,7 +183,7 @@ def _alone_in(folder: Path) -> Iterator[None]:
 def check_output(path: Path, *sources: Path, overwrite: bool) -> None:
     """Raise a UsageError, before any work, for an output that cannot be written or is a file to be read."""
     folder = path.parent
-    if not folder.is_dir():
+    if not os.path.isdir(folder):
         raise UsageError(f"{path}: the folder {folder} does not exist")
     if not os.access(folder, os.W_OK | os.X_OK):
         raise UsageError(f"{path}: the folder {folder} cannot be written to")
@@ -196,7 +196,7 @@ def check_output(path: Path, *sources: Path, overwrite: bool) -> None:
         raise UsageError(f"{path}: {error.strerror}") from None
     if not stat.S_ISREG(mode):
         raise UsageError(f"{path}: is not a regular file, and is not modified")
-    if any(source.exists() and path.samefile(source) for source in sources):
+    if any(os.path.exists(source) and path.samefile(source) for source in sources):
         raise UsageError(f"{path}: is the file to be read, and is not modified")
     if not overwrite:
         raise UsageError(f"{path}: exists; give another name, or overwrite it ({argument('overwrite', True)})")

@@ -112,11 +112,11 @@ def _command(adapter: object) -> list[str]:
     """Make the words of the command of an adapter."""
     if isinstance(adapter, str) and PYTHON_FUNCTION.fullmatch(adapter):
         path = Path(adapter.rpartition(":")[0])
-        if path.is_file():
+        if os.path.isfile(path):
             return [sys.executable, str(SERVE), str(Path(adapter).absolute())]
         # it may also be the last word of a command
         if " " not in str(path):
-            raise AdapterError(f"{path}: {'is no file' if path.exists() else 'does not exist'}")
+            raise AdapterError(f"{path}: {'is no file' if os.path.exists(path) else 'does not exist'}")
     if not isinstance(adapter, str | Sequence) or not "".join(map(str, adapter)).strip():
         raise AdapterError(f'got {adapter!r}, expected FILE.py:FUNCTION or "PROGRAM ARGUMENTS"')
     try:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import logging
+import os
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -165,7 +166,7 @@ def _close(client: Client) -> None:
 def _wait_for_file(file: Path, scheduler_name: str) -> None:
     """Wait for the file of a scheduler, which may have been started just now."""
     start = time.monotonic()
-    while not file.is_file():
+    while not os.path.isfile(file):
         if time.monotonic() - start > CONNECT_TIMEOUT_S:
             expected = "the file that dask scheduler --scheduler-file makes"
             raise UsageError(

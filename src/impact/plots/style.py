@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import os
 import re
 import shutil
 import tempfile
@@ -65,7 +66,7 @@ def _style_of(style: str | Path | None) -> Mapping[Any, Any]:
 
     if str(style) in styles.library:
         return styles.library[str(style)]
-    if not Path(style).is_file():
+    if not os.path.isfile(Path(style)):
         raise UsageError(f"{argument('style', style)}: no such file, and no style of matplotlib")
     try:
         settings = rc_params_from_file(str(style), use_default_template=False)

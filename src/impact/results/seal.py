@@ -13,6 +13,7 @@ relative to the end of the user block.
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import io
 import itertools
@@ -131,10 +132,12 @@ def has_seal(path: Path, seal: str) -> bool:
 
 def is_result(path: Path, begins: tuple[bytes, ...] = (RESULT_MAGIC, HDF5_MAGIC)) -> bool:
     """Check whether a file begins like a result of this schema version or, by default, of version 1."""
-    if not path.is_file() or not path.stat().st_size:
-        return False
-    with path.open("rb") as file:
-        return file.read(len(RESULT_MAGIC)).startswith(begins)
+    # what cannot be opened is no result, and whatever reads it says why
+    with contextlib.suppress(OSError, ValueError):
+        if path.is_file() and path.stat().st_size:
+            with path.open("rb") as file:
+                return file.read(len(RESULT_MAGIC)).startswith(begins)
+    return False
 
 
 def digest(file: Any) -> str:
