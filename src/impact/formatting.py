@@ -6,6 +6,7 @@ import json
 import math
 import re
 import shlex
+from collections.abc import Sequence
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context
 from pathlib import Path
 from unicodedata import category
@@ -185,6 +186,18 @@ def prefixed(value: object, unit: str = "1", digits: int | None = None) -> str:
     size, shown = scaled_unit(unit, abs(value))
     superscript = re.sub(r"\^(-?\d+)(?![\d.])", lambda power: power[1].translate(SUPERSCRIPTS), shown)
     return write(value / size) + superscript if unit == "rad" else f"{write(value / size)} {superscript}"
+
+
+def polynomial(coefficients: Sequence[float], name: str) -> str:
+    """Write a polynomial, from the constant term on.
+
+    >>> polynomial([-6.9, 0.5, -796.4559], "e")
+    '−6.9 + 0.5 e − 796.4559 e²'
+    """
+    powers = ["", f" {name}", *(f" {name}{str(n).translate(SUPERSCRIPTS)}" for n in range(2, len(coefficients)))]
+    signed = zip(coefficients, powers, strict=False)
+    text = " ".join(f"{'−' if c < 0.0 else '+'} {abs(c):.12g}{power}" for c, power in signed)
+    return text.removeprefix("+ ") if coefficients[0] >= 0.0 else text.replace(" ", "", 1)
 
 
 def heading(name: str, of: str = "", unit: str = "1") -> str:

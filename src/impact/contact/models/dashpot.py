@@ -13,6 +13,7 @@ from typing import Any, Literal, Unpack
 import numpy as np
 
 from ...array_types import Array
+from ...formatting import polynomial
 from ..closed_forms.dashpot import force_damping, force_restitution, gap_damping, gap_restitution
 from ..evidence import derived, seen
 from ..force_expressions import dragged
@@ -87,8 +88,7 @@ THORNTON_POLYNOMIAL = (
 )  # fmt: skip
 THORNTON_EQUATION = (
     "F = K δ^(3/2) + 2 β √(m S) δ̇,  S = (3/2) K δ^(1/2),  β = √(1/(1 − (1 + e)² exp(e p(e))) − 1), to F = 0;  "
-    "p(e) = −6.918798 − 16.41105 e + 146.8049 e² − 796.4559 e³ + 2928.711 e⁴  − 7206.864 e⁵ + 11494.29 e⁶ − "
-    "11342.18 e⁷ + 6276.757 e⁸ − 1489.915 e⁹"
+    f"p(e) = {polynomial(THORNTON_POLYNOMIAL, 'e')}"
 )
 
 KELVIN_VOIGT = dashpot(

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from ...formatting import polynomial
 from ..evidence import seen
 from ..model import ForceModel
 from .aliases import same_law
@@ -31,7 +32,7 @@ from .viscoelastic import LEE_HERRMANN_1993, drag
 
 # of the polynomial p(e) of α that LAMMPS calls tsuji and credits to Marshall (2009), equation 53, in powers of e
 TSUJI_POLYNOMIAL = (1.2728, -4.2783, 11.087, -22.348, 27.467, -18.022, 4.8218)
-P = "p(e),  p(e) = 1.2728 − 4.2783 e + 11.087 e² − 22.348 e³ + 27.467 e⁴ − 18.022 e⁵ + 4.8218 e⁶"
+P = f"p(e),  p(e) = {polynomial(TSUJI_POLYNOMIAL, 'e')}"
 DAMPING_KERNEL_SOURCE = "lammps/lammps, src/GRANULAR/gran_sub_mod_damping_kernel.h @07b704ca (2026)"
 DAMPING_SOURCE = "lammps/lammps, src/GRANULAR/gran_sub_mod_damping.cpp @07b704ca (2026)"
 DAMPING_SOURCE_2024 = "LAMMPS release of 29 August 2024, src/GRANULAR/gran_sub_mod_damping.cpp"

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Literal, Unpack
 
-from ..closed_forms.viscoelastic import pade_damping
+from ...formatting import polynomial
+from ..closed_forms.viscoelastic import PADE_DENOMINATOR, PADE_NUMERATOR, pade_damping
 from ..evidence import derived, not_verified, seen
 from ..force_expressions import dragged
 from ..formula_calls import Formula
@@ -75,8 +76,7 @@ KUWABARA_KONO_AT_SPEED = drag(
     title="Kuwabara and Kono, for a restitution at a speed",
     year=2011,
     equation="F = K(δ^(3/2) + (3/2) A δ^(1/2) δ̇), to F = 0,  A = (2/3) w² v_e^(−1/5) (K/m)^(−2/5),  e = P(w),  "
-    "P(w) = (1 + 1.07232 w + 0.574198 w² + 0.141552 w³)/(1 + 1.07232 w + 1.72765 w² + 1.37842 w³ + 1.19449 w⁴ + "
-    "0.467273 w⁵ + 0.235585 w⁶)",
+    f"P(w) = ({polynomial(PADE_NUMERATOR, 'w')})/({polynomial(PADE_DENOMINATOR, 'w')})",
     reference="Müller P, Pöschel T (2011) Phys. Rev. E 84, 021302; Brilliantov NV, Spahn F, Hertzsch JM, Pöschel "
     "T (1996) Model for collisions in granular gases. Phys. Rev. E 53, 5382",
     doi="10.1103/PhysRevE.84.021302",
