@@ -20,9 +20,10 @@ PAGE = """\
 
 # Types of arguments
 
-A function that takes a number takes those of NumPy, pandas, xarray and pint, and texts with units; one that takes
-several, their arrays. A result is a dataset or the name of its file. "yes" is a call that gives what plain numbers
-in SI, or the dataset, give; "–" is one that an `impact.UsageError` refuses, which names the argument.
+The arguments in these tables take numbers of NumPy, pandas, xarray and pint, and texts with units; those of
+several numbers take their arrays. Counts, such as `jobs` and `phases`, and the tolerances of `conform` are numbers
+of Python or NumPy alone. A result is a dataset or the name of its file. "yes" is a call that gives what plain
+numbers in SI, or the dataset, give; "–" is one that an `impact.UsageError` refuses, which names the argument.
 
 ## One number
 
