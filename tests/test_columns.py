@@ -180,6 +180,16 @@ def test_columns_of_any_name_are_mapped_and_the_others_named_once(folder: Path) 
     assert (again.data, again.notes) == (config.data, ())
 
 
+def test_rows_without_any_value_are_blank_lines(folder: Path) -> None:
+    (folder / "a.csv").write_text("v1 [m/s];e_out;Bemerkung\n1;0,9;\n;;\n2;0,8;\n ; ;\n", encoding="utf-8")
+    config = read({"file": "a.csv", "missing": "error"})
+    assert config.data is not None
+    assert config.data.lines == (2, 4)
+    assert config.notes == ("a.csv: columns without use: Bemerkung",)
+    (folder / "a.csv").write_text("v1 [m/s];e_out\n;\n", encoding="utf-8")
+    assert refused("v1 [m/s];e_out\n;\n") == refused("v1 [m/s];e_out\n")
+
+
 @pytest.mark.parametrize("mark", ["-", "–", "—", "n.a.", "k.A.", "NA", " "])
 def test_a_mark_of_a_missing_value_leaves_out_its_row(folder: Path, mark: str) -> None:
     (folder / "a.csv").write_text(f"v1 [m/s];e_out\n1;0,9\n2;{mark}\n{mark};0,8\n", encoding="utf-8")
@@ -281,6 +291,11 @@ REFUSED = {
         "m1 [g];e_out\n1,250;1\n",
         {},
         'a.csv:2: got 1,250, which may be decimal or separate thousands; decimal = "," settles it',
+    ),
+    "thousands beside a unit": (
+        "drop_height [mm];rebound_height [mm]\n100,5;60,2\n1.300,25;775,5\n",
+        {},
+        'a.csv:3: drop_height: got "1.300,25", expected a number without marks between thousands',
     ),
     "another decimal sign": (
         "v1 [m/s];e_out\n1;0.5\n",

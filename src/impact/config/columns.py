@@ -54,6 +54,7 @@ NUMBER_WITH = {
 # a line without words
 NUMBERS = re.compile(r"[^A-DF-Za-df-z]*")
 THOUSANDS = re.compile(r"[-+]?[1-9][0-9]{0,2}(?:,[0-9]{3})+")
+LONG_NUMBER = re.compile(r"[-+]?[0-9]{1,3}(?:[.,' ][0-9]{3})+(?:[.,][0-9]+)?")
 # keys that say how a CSV file is written, and their values; what is missing is recognised
 CSV_KEYS = {"separator": SEPARATORS, "decimal": DECIMALS}
 # what cells without a value contain
@@ -177,9 +178,13 @@ def _read_cell(
         except ValueError:
             # a cell may have its own unit where its column has none
             if unit:
-                has_own = re.fullmatch(r"[-+.0-9]+(?:[eE][-+]?[0-9]+)?\s*[^\s0-9.].*", cell)
-                alone = f"a number without a unit: the column is in {safe_text(unit)}"
-                raise mismatch_error(cell, alone if has_own else quantity.expected) from None
+                if LONG_NUMBER.fullmatch(cell):
+                    expected = "a number without marks between thousands"
+                elif re.fullmatch(r"[-+.0-9]+(?:[eE][-+]?[0-9]+)?\s*[^\s0-9.].*", cell):
+                    expected = f"a number without a unit: the column is in {safe_text(unit)}"
+                else:
+                    expected = quantity.expected
+                raise mismatch_error(cell, expected) from None
     return quantity.read(f"{cell} {unit}" if unit else number, n)
 
 
@@ -193,9 +198,10 @@ def read_csv(
 ) -> Columns:
     """Read the columns of a CSV file, whose first line has their names and their units.
 
-    Blank lines, and lines that begin with #, have no meaning, except for names just before the first values, which
-    `numpy.savetxt` writes as a comment. An empty separator or decimal sign is recognised. Unless further names are
-    `wanted`, some name has to be known. A ConfigError shows nothing of the content of a file in which no name is.
+    Blank lines, those of separators alone, and those that begin with # have no meaning, except for names just
+    before the first values, which `numpy.savetxt` writes as a comment. An empty separator or decimal sign is
+    recognised. Unless further names are `wanted`, some name has to be known. A ConfigError shows nothing of the
+    content of a file in which no name is.
     """
     looked_for = {split_header(name)[0] for name in wanted or ()} | {*(wanted or ())}
 
@@ -204,7 +210,8 @@ def read_csv(
         return name in looked_for or header in looked_for or is_known(name)
 
     text = io.StringIO(read_text(path, "CSV", MAX_CSV_BYTES), newline=None)
-    lines = [(number, line) for number, line in enumerate(text, 1) if line.strip()]
+    # Excel writes separators for a row that was cleared
+    lines = [(number, line) for number, line in enumerate(text, 1) if re.sub("[,;]", "", line).strip()]
     numbered = [(number, line) for number, line in lines if not line.lstrip().startswith("#")]
     if numbered and numbered[0] != lines[0] and NUMBERS.fullmatch(numbered[0][1]):
         # numpy.savetxt writes names as a comment
