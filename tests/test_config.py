@@ -123,6 +123,8 @@ BAD = [
     ("v1 = 1.0", 'v1 = "1e400 m/s"', [f'x.toml:5: sweep.v1: got "1e400 m/s", {SPEED}']),
     ("v1 = 1.0", 'v1 = "20 degC"',
      ['x.toml:5: sweep.v1: got "20 degC", expected a unit of m/s, such as "1 m/s"; "degC" is not a known unit']),
+    ("v1 = 1.0", 'v1 = "2,5 m/s"',
+     ['x.toml:5: sweep.v1: got "2,5 m/s", expected a number with a decimal point and no comma']),
     ("v1 = 1.0", 'v1 = "1 foo/s"',
      ['x.toml:5: sweep.v1: got "1 foo/s", expected a unit of m/s, such as "1 m/s"; "foo/s" is not a known unit']),
     ("v1 = 1.0", 'v1 = "1 m/s**1e9"',
@@ -732,6 +734,14 @@ def test_only_regular_files_are_opened(tmp_path: Path) -> None:
         (line,) = problems_of(read_config, path)
         assert line.startswith(escape_controls(str(path))[:1000])
         assert re.search(": (not a regular file|cannot be read)", line)
+
+
+def test_a_table_in_place_of_a_config_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "drops.csv"
+    path.write_text("v1 [m/s],e_out\n1.0,0.8\n", encoding="utf-8")
+    names = '[data] file = "drops.csv" or [sweep] cases = "drops.csv"'
+    expected = f"is a CSV file, expected a TOML file, which may have {names}"
+    assert problems_of(read_config, path) == [f"{path}: {expected}"]
 
 
 def test_a_file_with_byte_order_mark_and_crlf_is_read(tmp_path: Path) -> None:

@@ -86,6 +86,9 @@ def read_text(path: Path, kind: str = "TOML", most: int = MAX_CONFIG_BYTES) -> s
         raise ConfigError(f"{name}: {file_hint(path, content)}")
     if content.startswith(NO_TEXT):
         raise ConfigError(f"{name}: not a text file, expected a {kind} file; save a table as CSV")
+    if kind == "TOML" and path.suffix.lower() == ".csv":
+        names = f'[data] file = "{path.name}" or [sweep] cases = "{path.name}"'
+        raise ConfigError(f"{name}: is a CSV file, expected a TOML file, which may have {names}")
     if len(content) > most:
         raise ConfigError(f"{name}: larger than {most:,} bytes")
     try:

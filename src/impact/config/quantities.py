@@ -505,6 +505,8 @@ class Quantity:
     def _with_unit(self, text: str, n: float | None) -> float:
         if len(text) > MAX_UNIT_LENGTH:
             raise mismatch_error(text, f"at most {MAX_UNIT_LENGTH} characters")
+        if re.match(r"\s*[-+]?[0-9]*,[0-9]", text):
+            raise mismatch_error(text, "a number with a decimal point and no comma")
         parts = NUMBER_SYNTAX.fullmatch(text)
         if parts is None or not parts[2]:
             # a number as a text needs a unit, or to be no text
