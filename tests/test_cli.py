@@ -607,6 +607,12 @@ def test_every_command_has_help_with_an_example(cli: Run, command: str) -> None:
     assert f"Example: impact {command}" in done.stdout
 
 
+@pytest.mark.parametrize("command", ["report", "plot", "rerun"])
+def test_the_help_of_a_command_that_takes_a_calibration_says_so(cli: Run, command: str) -> None:
+    arguments = cli(command, "--help").stdout.partition("Options")[0].partition("Arguments")[2]
+    assert "calibrate`" in arguments
+
+
 @pytest.mark.parametrize("words", [["--help"], ["sweep", "--help"], ["--version"]])
 def test_help_loads_no_numpy(words: list[str]) -> None:
     code = (

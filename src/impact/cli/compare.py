@@ -79,7 +79,7 @@ def bless(
 
 
 def rerun(
-    result: options.Result,
+    result: Annotated[Path, typer.Argument(help="A result of `impact sweep` or `impact calibrate`.")],
     plugins: options.Plugins = None,
     tol: options.Tolerance = None,
     subset: SubsetOption = False,

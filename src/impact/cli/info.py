@@ -36,7 +36,7 @@ def schema(
 
 
 def info(
-    file: Annotated[Path, typer.Argument(help="A result or a time history.")],
+    file: Annotated[Path, typer.Argument(help="A result of any command, or a history of `impact run`.")],
     as_json: options.Json = False,
 ) -> None:
     """Show the axes, variables, largest errors and provenance of a file."""

@@ -19,7 +19,12 @@ from .completion import complete_axis, complete_kind, complete_output
 
 
 def plot(
-    result: Annotated[Path, typer.Argument(help="A result of `impact sweep`, or a history of `impact run`.")],
+    result: Annotated[
+        Path,
+        typer.Argument(
+            help="A result of `impact sweep`, `calibrate` or `sensitivity`, or a history of `impact run`."
+        ),
+    ],
     output: Annotated[
         Path | None,
         options.output(

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
+
+import typer
 
 import impact
 
@@ -46,7 +49,10 @@ def recommend(
 
 
 def report(
-    result: options.Result,
+    result: Annotated[
+        Path,
+        typer.Argument(help="A result of `impact sweep`, `calibrate`, `sensitivity` or `conform`."),
+    ],
     output: options.Page = None,
     overwrite: options.Overwrite = False,
     plugins: options.Plugins = None,
