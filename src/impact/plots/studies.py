@@ -367,7 +367,7 @@ SENSITIVITY = Kind(
     source="sensitivity study",
 )
 UNCERTAINTY = Kind(
-    "Delivered restitution: median, and 5 to 95 % of the samples of uncertain inputs.",
+    "Delivered restitution, or another output: median, and 5 to 95 % of the samples of uncertain inputs.",
     uncertainty_curves,
     choose_axis,
     along=("x", SAMPLE),
