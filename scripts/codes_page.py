@@ -99,7 +99,9 @@ def _section(code: Code, problems: Sequence[ExportProblem]) -> Iterator[str]:
         numbers = ["–", "–"]
         if _sets_e(problem):
             key, solved = problem.model.key, problem.law.solved
-            at = {**INPUTS.get(key, {}), **({"e": E} if solved is None else solved), "v1": SLOW}
+            # the stiffness of the lines: without it that of a linear spring would follow from the speed
+            stiffness = {"K": problem.law.continuous["stiffness"], "n": problem.law.impact.n.item()}
+            at = {**INPUTS.get(key, {}), **({"e": E} if solved is None else solved), **stiffness, "v1": SLOW}
             slow = impact.run(model=key, at=at).values["e_out"]
             numbers = [f"{e:.3f}" for e in (problem.e_continuous, slow)]
         rows.append([cell(code.laws[problem.model.key]), f"`{problem.model.key}`", *numbers])
