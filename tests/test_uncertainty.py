@@ -495,6 +495,13 @@ def test_a_design_without_a_number_of_samples_is_one_line(design: str, cli: Run,
         assert words in done.stderr
 
 
+def test_the_first_value_of_a_file_without_a_name_is_not_taken_for_one(tmp_path: Path) -> None:
+    (tmp_path / "c.toml").write_text(TEXT)
+    (tmp_path / "speeds.csv").write_text("0.9\n1.0\n1.3\n")
+    (line,) = problems_of(impact.sweep, tmp_path / "c.toml", overrides=["sweep.v1.empirical=speeds.csv"])
+    assert "speeds.csv:1: got a number, expected the name of the column" in line
+
+
 def test_one_sample_has_no_index(cli: Run, tmp_path: Path) -> None:
     (tmp_path / "c.toml").write_text(TEXT)
     done = cli("sensitivity", "c.toml", "--set", "design.n=1", cwd=tmp_path)

@@ -487,6 +487,8 @@ def _read_column(draft: Draft, name: InputName, column: str | None, columns: Col
     """Convert a column, or without a name that of the input or the only one, which gives its distribution."""
     # the single column of a file that names none may have any name
     is_single = column is None and len(columns.units) == 1
+    if is_single and NUMBERS.fullmatch(label := next(iter(columns.units))) and any(map(str.isdigit, label)):
+        raise ConfigError(columns.problem("got a number, expected the name of the column"))
     header, unit = columns.find(next(iter(columns.units)) if is_single else column or str(name))
     # the values of axes that vary together stand in the same rows
     is_zipped = any(str(name) in group for group in draft.zip_groups)
