@@ -106,7 +106,7 @@ def test_restitution_is_independent_of_masses_speeds_and_materials() -> None:
 
 
 def test_restitutions_at_the_limits_are_the_printed_numbers() -> None:
-    limits = re.findall(r"\((\d+)\) delivers (\d\.\d+)", PAGE)
+    limits = re.findall(r"\((\d+)\) delivers an e_out of (\d\.\d+)", PAGE)
     assert limits == [("22", "0.663"), ("28", "0.594")]
     for (equation, value), e in zip(limits, (0.0, 1.0), strict=True):
         collision = impact.run(model=LAWS[f"({equation})"], at={"e": e})
