@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -132,6 +133,12 @@ def test_a_friction_law_has_a_source_and_whole_parameters(law: FrictionLaw) -> N
         assert parameter.default is None or parameter.least <= parameter.default <= parameter.most
         assert (parameter.default is None) == parameter.optional
         assert not parameter.choices or parameter.most == len(parameter.choices) - 1
+
+
+@pytest.mark.parametrize(("key", "name"), [("drake-regularized", "mu_d"), ("yade-mindlin", "betas")])
+def test_the_description_of_a_law_says_what_a_parameter_is_if_unset(cli: Run, key: str, name: str) -> None:
+    described = " ".join(cli("models", key, "--frictions").stdout.split())
+    assert re.search(rf" {name}: [^;]*; unset, (μ|−ln e/√\(π² \+ ln² e\));", described)
 
 
 @pytest.mark.parametrize(("model", "n"), [("anagnostopoulos-1988", 1.0), ("tsuji-1992", 1.5)])

@@ -148,7 +148,13 @@ YADE_MINDLIN = FrictionLaw(
     ),
     parameters=(
         *MINDLIN_STIFFNESS,
-        Parameter("betas", "1", "damping ratio β_s of the tangential stiffness", least=0.0, optional=True),
+        Parameter(
+            "betas",
+            "1",
+            "damping ratio β_s of the tangential stiffness; unset, −ln e/√(π² + ln² e)",
+            least=0.0,
+            optional=True,
+        ),
         limit("positive"),
     ),
     stiffness="mindlin",

@@ -14,7 +14,7 @@ from ..models.multibody_codes import MUJOCO_SOLREF, SIMBODY_HUNT_CROSSLEY as SIM
 from .textbook import limit
 
 DYNAMIC_FRICTION = Parameter(
-    "mu_d", "1", "dynamic coefficient of friction, at most μ, which is the static one", least=0.0, optional=True
+    "mu_d", "1", "dynamic coefficient of friction, at most μ, the static one; unset, μ", least=0.0, optional=True
 )
 
 
