@@ -199,7 +199,8 @@ JACKSON_GREEN_2010 = hertzian_plastic(
         note="the year of Jackson, Chusoipin and Green was not seen; no loss below w = 1.9, where the fit of e in "
         "the paper has one from w = 1 on: this is up to 0.04 above that fit there, and within 0.009 of it beyond; "
         "the least δₚ, of the work of an elastic contact, is derived here: with the published one alone more "
-        "energy may come back just above w = 1.9 than went in",
+        "energy may come back just above w = 1.9 than went in; the fits are continued: from w = 10,018 on the "
+        "residual is the whole indentation, and e_out is 0",
     ),
     coefficients={
         "E": E_OF_K,
