@@ -196,6 +196,17 @@ def test_quantities_of_pint_have_their_units(default: str, monkeypatch: pytest.M
     assert (swept["v1"].values.tolist(), swept["e"].item()) == ([0.1, 0.3], 1.0)
 
 
+def test_a_data_array_has_the_unit_of_its_attribute() -> None:
+    table = xr.Dataset({"v1": ("drop", [100.0, 200.0], {"units": "mm/s"})})
+    for swept in (impact.sweep(models="hertz", cases=table), impact.sweep(BASE, v1=table["v1"])):
+        assert swept["v1"].values.tolist() == [0.1, 0.2]
+    assert impact.run(BASE, at={"v1": table["v1"][1]}).point["v1"] == 0.2
+    problem = impact.prepare(BASE, outputs="peak_force")
+    assert problem(v1=table["v1"])["peak_force"].tolist() == problem(v1=[0.1, 0.2])["peak_force"].tolist()
+    with pytest.raises(impact.ConfigError, match=r"got .100\.0 mm/s., expected"):
+        impact.sweep(BASE, m1=table["v1"])
+
+
 def test_a_result_of_which_no_values_are_left_is_refused() -> None:
     result = impact.sweep(BASE)
     for function in (impact.info, impact.report, impact.page, impact.plot, impact.run):

@@ -21,7 +21,7 @@ from pydantic_core import PydanticCustomError
 
 from ..errors import ConfigError, ImpactError, MissingFileError, UsageError
 from ..formatting import safe_text
-from .quantities import ConfigProblem, KeyPath, Quantity, as_text
+from .quantities import ConfigProblem, KeyPath, Quantity, as_text, differs_from_si
 
 MAX_CONFIG_BYTES = 1_000_000  # size of a TOML file
 MAX_OVERRIDE_LENGTH = 4_000_000  # characters of the value of an override
@@ -191,7 +191,10 @@ def _from_library(value: Any) -> object:
         return _from_library(value.data)
     if not isinstance(value, str | Mapping) and hasattr(value, "values") and hasattr(value, "dtype"):
         # a series, an index or a data array; texts of pandas are in an array of its own
+        unit = str(value.attrs.get("units", "")) if hasattr(value, "dims") else ""
         value = value.values
+        if differs_from_si(unit):
+            return _with_unit(value.tolist(), unit)
     if getattr(getattr(value, "dtype", None), "char", "") == "g":
         # a long double stays one where it is too large for a float
         with np.errstate(over="ignore"):

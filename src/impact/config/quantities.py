@@ -566,6 +566,16 @@ def is_unit(text: str) -> bool:
     return _si_scale(text) is not None
 
 
+def differs_from_si(text: str) -> bool:
+    """Check whether a text is a unit in which numbers are not those in SI.
+
+    >>> differs_from_si("cm/s"), differs_from_si("m s-1"), differs_from_si("N m-n")
+    (True, False, False)
+    """
+    scale = _si_scale(text)
+    return scale is not None and scale[0] != 1
+
+
 class UnitError(ValueError):
     """A unit is unknown or has another dimension; the message is what is expected."""
 
