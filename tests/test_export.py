@@ -253,6 +253,16 @@ def test_yade_gets_twice_the_spring_and_dashpot_of_the_contact_for_each_ball() -
     assert (export.parameters["kn"], export.parameters["cn"]) == (2e6, 600.0)
 
 
+def test_the_law_of_another_release_has_the_parameters_of_the_config() -> None:
+    config = {
+        "models": ["kelvin-voigt"],
+        "sweep": {"v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 1e6, "n": 1.0},
+        "model": {"kelvin-voigt": {"C": 300.0}},
+    }
+    export = impact.export("yade", source=config, code_version="2023.02a")
+    assert (export.model, export.parameters["cn"]) == ("yade-viscoelastic", 600.0)
+
+
 WALL = {"m2": math.inf, "R2": math.inf}
 
 

@@ -25,7 +25,7 @@ from ..inverse.timestep import FixedStepLaw, first_values_line, law_at_point
 from ..results.calibration import position_of_law, unidentified_notes
 from ..results.single_impact import Calibration, ConfigSource, PointSource, open_source
 from .code import Code, Collision
-from .registry import first_law, has_law, law_of_code
+from .registry import first_law, has_law, is_written_as, law_of_code
 
 # phases over which the mean, the least and the largest restitution are taken
 PHASES = 400
@@ -144,7 +144,7 @@ def prepare_export(
         key, newest = (first_law(code, tuple(code.laws), release) for release in (version, code.newest))
         if key != newest:
             notes.append(f"release {version} lacks the default law of {code.newest}, {newest}")
-    point_source = _with_parameters(point_source, key)
+    point_source = _with_parameters(point_source, key, code, version)
     chosen, left_out = _choose_friction(code, point_source, key, friction)
     scheme = (find_friction(chosen).scheme if chosen else "") or code.scheme
     fixed = law_at_point(
@@ -174,11 +174,12 @@ def prepare_export(
     return ExportProblem(code, version, fixed, tuple(notes), better_fit, left_out)
 
 
-def _with_parameters(source: PointSource, key: str) -> PointSource:
-    """Give a law the parameters that the source has for the same law under another name of the catalogue."""
+def _with_parameters(source: PointSource, key: str, code: Code, version: str) -> PointSource:
+    """Give a law the parameters that the source has for it under another name, or for that of another release."""
     draft = source.config_draft
     tables = draft.table("model")
-    others = [name for name in tables if original_key(name) == original_key(key)]
+    same = original_key(key)
+    others = [name for name in tables if original_key(name) == same or is_written_as(code, name, version, key)]
     # a calibration renames the laws that were fitted
     if source.calibration is not None or key in others or not others:
         return source

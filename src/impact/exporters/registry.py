@@ -104,6 +104,17 @@ def has_law(code: Code, key: str, version: str) -> bool:
     return False
 
 
+def is_written_as(code: Code, model: str, version: str, key: str) -> bool:
+    """Whether the law of a version of a code for a key of the catalogue is the one of another key.
+
+    >>> is_written_as(find_code("yade"), "kelvin-voigt", "2023.02a", "yade-viscoelastic")
+    True
+    """
+    with contextlib.suppress(UsageError):
+        return law_of_code(code, model, version) == key
+    return False
+
+
 def first_law(code: Code, models: Sequence[str], version: str, *, is_fitted: bool = False) -> str:
     """Find the law of a code for the first of some models that a version of it has; a fitted one only as it is.
 
