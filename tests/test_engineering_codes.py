@@ -280,6 +280,13 @@ def test_simscape_at_a_narrow_transition(damping, e_out):
     assert contact["e_out"][0] == pytest.approx(other, abs=1e-8)
 
 
+@pytest.mark.parametrize("b", [0.0, 1e-4, 1e-2, 1.0, 100.0])
+def test_simscape_ends_where_its_damping_would_pull(b: float) -> None:
+    contact = struck("simscape-contact", 1.0, K=1e6, parameters={"b": b, "w": 1e-4})
+    speed = contact["v2_post"] - contact["v1_post"]
+    assert contact["permanent_indentation"] == pytest.approx(b * speed / 1e6, rel=1e-6, abs=1e-18)
+
+
 def test_simscape_without_a_transition_is_kelvin_and_voigt():
     K, b = 1e6, 300.0
     narrow = struck("simscape-contact", 1.0, K=K, parameters={"b": b, "w": 1e-9})

@@ -349,7 +349,8 @@ SIMSCAPE_CONTACT = code_law(
         Parameter("w", "m", "transition region width", least=1e-9),
     ),
     force=lambda elastic, x, v, b, w: smooth_step(x / w) * (elastic + b * v),
-    breakpoints=(lambda w: w,),
+    # the second one is where the force becomes zero: a small damping pulls only where s has nearly vanished
+    breakpoints=(lambda w: w, lambda elastic, v, b: elastic + b * v),
     release="force",
     exponent=1.0,
 )
