@@ -77,6 +77,19 @@ def test_importing_loads_no_numpy() -> None:
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
+def test_a_function_is_the_same_in_threads_that_use_it_first() -> None:
+    code = """
+import sys, impact
+from concurrent.futures import ThreadPoolExecutor
+sys.setswitchinterval(1e-6)
+names = [name for name in dir(impact) if name.islower()] * 8
+with ThreadPoolExecutor(8) as pool:
+    members = list(pool.map(lambda name: getattr(impact, name), names))
+sys.exit(any(member is not getattr(impact, name) for name, member in zip(names, members)))
+"""
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
 def test_a_model_from_python_is_run_and_recorded() -> None:
     result = impact.sweep({"models": ["mine-2026", "exact-hysteresis"], "sweep": SWEEP}, plugins=[_mine()])
     assert np.abs(result["closed_form_error"]).max() < 1e-9

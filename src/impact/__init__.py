@@ -50,7 +50,6 @@ UnfinishedError, MissingFileError, ImpactWarning
 from __future__ import annotations
 
 import ast
-from functools import cache
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -69,13 +68,17 @@ _MODULES = {
 __all__ = sorted(_MODULES.keys() - {"__version__"})
 
 
-# the same function each time, which can be pickled
-@cache
+# the same function for all threads and each time, which can be pickled
+_used: dict[str, Any] = {}
+
+
 def __getattr__(name: str) -> Any:
     if name not in _MODULES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    member = getattr(import_module(_MODULES[name], __name__), name)
-    return import_module(".arguments", __name__).prepare_for_users(member)
+    if name not in _used:
+        member = getattr(import_module(_MODULES[name], __name__), name)
+        _used.setdefault(name, import_module(".arguments", __name__).prepare_for_users(member))
+    return _used[name]
 
 
 def __dir__() -> list[str]:
