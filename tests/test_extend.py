@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import functools
 import json
 import os
@@ -276,6 +275,7 @@ def test_of_extensions_at_the_same_time_none_that_succeeds_is_lost(stored_sweep:
 
 def test_a_script_that_has_locked_the_folder_does_not_stop_a_command_in_it(cli: Run, tmp_path: Path) -> None:
     """As `flock FOLDER impact sweep ...` does."""
+    fcntl = pytest.importorskip("fcntl")
     folder = os.open(tmp_path, os.O_RDONLY)
     fcntl.flock(folder, fcntl.LOCK_EX)
     cli("sweep", "configs/figure6.toml", "-o", tmp_path / "r.h5", "--set", "sweep.e=0.5")

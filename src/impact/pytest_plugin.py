@@ -13,7 +13,7 @@ import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, SupportsFloat
 
 import pytest
 
@@ -99,7 +99,7 @@ class ImpactRegression:
         source: str | Path | Mapping[str, object] | xr.Dataset | Board,
         baseline: str | Path | None = None,
         *,
-        tol: float | str | Tolerances | None = None,
+        tol: SupportsFloat | str | Tolerances | None = None,
         subset: bool = False,
         overrides: Sequence[str] = (),
         plugins: Sequence[ForceModel | str | Path] = (),

@@ -7,6 +7,7 @@ import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import SupportsFloat
 
 import xarray as xr
 
@@ -27,7 +28,7 @@ def bless(
     baseline: str | Path,
     *,
     reason: str,
-    tol: float | str | Tolerances | None = None,
+    tol: SupportsFloat | str | Tolerances | None = None,
     allow_failed: bool = False,
     show: Callable[[Verdict], None] | None = None,
 ) -> Verdict | None:

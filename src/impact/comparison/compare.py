@@ -9,7 +9,7 @@ import math
 import sys
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, TypeGuard
+from typing import Any, SupportsFloat, TypeGuard
 
 import numpy as np
 import xarray as xr
@@ -30,7 +30,7 @@ from .values import compare_values, group_size, representative_regions
 from .verdict import Difference, Verdict
 
 # those that a caller passes; the name "all" is that of the variables that have none of their own
-Tolerances = Mapping[str, float | str]
+Tolerances = Mapping[str, SupportsFloat | str]
 ALL_VARIABLES = "all"
 # ten times the relative accuracy of the ends of profile intervals
 CALIBRATION_TOLERANCE = 1e-5
@@ -41,7 +41,7 @@ def compare(
     new: str | Path | xr.Dataset,
     baseline: str | Path | xr.Dataset,
     *,
-    tol: float | str | Tolerances | None = None,
+    tol: SupportsFloat | str | Tolerances | None = None,
     subset: bool = False,
 ) -> Verdict:
     """Compare a result with a baseline, each variable as docs/schema.md states, at points of equal labels.
@@ -238,7 +238,9 @@ def _attributes_equal(a: Any, b: Any) -> bool:
     return bool(np.array_equal(a, b))
 
 
-def effective_tolerances(tol: float | str | Tolerances | None, attributes: Mapping[str, Any]) -> dict[str, float]:
+def effective_tolerances(
+    tol: SupportsFloat | str | Tolerances | None, attributes: Mapping[str, Any]
+) -> dict[str, float]:
     """Find the tolerances by variable, "all" for the others: the caller's, else the baseline's, else its solver's.
 
     >>> effective_tolerances({"e_out": 1e-6}, {"rtol": 1e-10, "tolerances": '{"all": 1e-8}'})
@@ -265,7 +267,7 @@ def effective_tolerances(tol: float | str | Tolerances | None, attributes: Mappi
     return {ALL_VARIABLES: DEFAULT_RTOL_FACTOR * float(rtol), **stored, **requested}
 
 
-def calibration_tolerances(tol: float | str | Tolerances | None) -> dict[str, float]:
+def calibration_tolerances(tol: SupportsFloat | str | Tolerances | None) -> dict[str, float]:
     """Choose the tolerance of all variables of a calibration or a board, relative to their scales."""
     requested = _by_variable(tol)
     for name, value in requested.items():
@@ -277,7 +279,7 @@ def calibration_tolerances(tol: float | str | Tolerances | None) -> dict[str, fl
     return {ALL_VARIABLES: CALIBRATION_TOLERANCE} | requested
 
 
-def _by_variable(tol: float | str | Tolerances | None) -> dict[str, float]:
+def _by_variable(tol: SupportsFloat | str | Tolerances | None) -> dict[str, float]:
     """Convert what a caller passed to tolerances by name."""
     by_name = dict(tol or {}) if isinstance(tol, Mapping) or tol is None else {ALL_VARIABLES: tol}
     return {name: _as_number(value) for name, value in by_name.items()}

@@ -6,6 +6,7 @@ import json
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import SupportsFloat
 
 import xarray as xr
 
@@ -26,7 +27,7 @@ def rerun(
     result: str | Path,
     *,
     plugins: Sequence[ForceModel | str | Path] = (),
-    tol: float | str | Tolerances | None = None,
+    tol: SupportsFloat | str | Tolerances | None = None,
     subset: bool = False,
     max_points: int = MAX_POINTS,
     execute: Callable[..., xr.Dataset] | None = None,
