@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
 
+import impact
 from impact.config.tables import DEFAULT_RTOL
 from impact.contact import motion
 from impact.contact.closed_forms.hysteresis import peak_indentation
@@ -113,6 +114,19 @@ def test_permanent_indentation_agrees_with_its_closed_form(key, n):
     impacts, outputs = sweep_e(key, n)
     peak = peak_indentation(impacts.m, impacts.v0, impacts.K, n)
     assert max_abs(outputs["permanent_indentation"] / peak - (1.0 - E_GRID * E_GRID)) <= 1e-8
+
+
+@pytest.mark.parametrize("A", np.geomspace(1e-12, 1e-5, 8).tolist())
+def test_a_contact_ends_at_zero_force_however_weak_the_damping(A: float) -> None:
+    """K δ^(3/2) + (3/2) A K δ^(1/2) δ̇ vanishes at δ = (3/2) A e_out v0; before, it pulls."""
+    law, balls = "kuwabara-kono-1987", {"K": 1e6, "m1": 1.0, "m2": 1.0, "v1": 1.0}
+    outputs, elastic = (impact.run(model=law, at={**balls, "A": value}).values for value in (A, 0.0))
+    indentation = 1.5 * A * outputs["e_out"]
+    assert outputs["permanent_indentation"] == pytest.approx(indentation, rel=1e-12)
+    # it is linear in a weak damping
+    strong = impact.run(model=law, at={**balls, "A": 1e-5}).values["contact_time"]
+    shorter, slope = elastic["contact_time"] - outputs["contact_time"], (elastic["contact_time"] - strong) / 1e-5
+    assert shorter == pytest.approx(slope * A, rel=0.01, abs=1e-9 * elastic["contact_time"])
 
 
 @functools.cache

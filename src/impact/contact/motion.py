@@ -186,8 +186,8 @@ def restitution_law(law: MotionLaw) -> MotionLaw:
     return law if law.model.unloading is None else replace(law, coordinate=VelocityCoordinate())
 
 
-def components_at(law: MotionLaw, params: Params, s: Array, v: float) -> Array:
-    """Compute the components, shape (2, n), at s of shape (n,) and a velocity that all have."""
+def components_at(law: MotionLaw, params: Params, s: Array, v: Array | float) -> Array:
+    """Compute the components, shape (2, n), at s of shape (n,) and a velocity, that all may have."""
     y = np.empty((2, s.size))
     y[0] = s
     y[1] = law.coordinate.of(s, v, law.strength(params))

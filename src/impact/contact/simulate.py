@@ -16,7 +16,7 @@ from typing import NamedTuple, NotRequired, TypedDict, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..array_types import Array
+from ..array_types import Array, Mask
 from ..errors import ModelError
 from ..ode.problem import Params, Problem, Solution, Termination
 from ..ode.rk45 import integrate
@@ -44,6 +44,8 @@ STATUS_OF_TERMINATION = np.array(
 STEPS_PER_CONTACT, STEP, PHASE = "sweep.steps_per_contact", "sweep.dt", "sweep.phase"
 # the contact time of a linear spring, in the contact's unit of time
 LINEAR_CONTACT_TIME = np.pi
+# indentations, in the contact's own units, between which an end at zero force is looked for that no step has seen
+HIDDEN_END, HIDDEN_END_BISECTIONS = (1e-12, 1e-2), 60
 
 # arrays that a law needs, by name, in the contact's own units
 ValueArrays = Mapping[str, Array]
@@ -458,6 +460,7 @@ def solve_phases(
         recovery = Recovery(rows, residual[rows])
         restitution = solve(back, motion.restitution_problem(back), start, params, recovery)
         _mark_never_separating(back, restitution, params, recovered)
+        _end_at_zero_force(back, restitution, params)
         velocity = -back.velocity(restitution.state, params)
         ended = STATUS_OF_TERMINATION.take(restitution.termination)
         # the balls are held, or separate at zero speed after infinite time
@@ -467,6 +470,37 @@ def solve_phases(
             velocity[at_limit], ended[at_limit] = 0.0, LIMIT
         e_out[rows], status[rows] = velocity, ended
     return Phases(approach, restitution, rows, params, peak, at_peak, residual, e_out, status)
+
+
+def _end_at_zero_force(law: motion.MotionLaw, solution: Solution, params: Params) -> None:
+    """Move ends at zero indentation to where the force vanished, if it pulls in a part much shorter than a step.
+
+    There it changes the speed by less than the errors of the integration.
+    """
+    ended = (solution.termination == Termination.EVENT_REACHED) & (law.model.release == "force")
+    least, most = HIDDEN_END
+    rows = np.flatnonzero(ended & (np.abs(motion.indentation(law, solution.state[0])) < least))
+    if not rows.size:
+        return
+    of_velocity, p = replace(law, coordinate=VelocityCoordinate()), law.model.coordinate_power
+    force_at = motion.force_of(of_velocity, unloads=True)
+    velocity = law.velocity(solution.state, params)[rows]
+    params = tuple(column[rows] for column in params)
+
+    def pulls(x: Array) -> Mask:
+        return np.broadcast_to(force_at(np.array([power(x, 1.0 / p), velocity]), params) < 0.0, x.shape)
+
+    lower, upper = np.full(rows.size, least), np.full(rows.size, most)
+    hidden = pulls(lower) & ~pulls(upper)
+    if not hidden.any():
+        return
+    for _ in range(HIDDEN_END_BISECTIONS):
+        middle = np.sqrt(lower * upper)
+        is_below = pulls(middle)
+        lower, upper = np.where(is_below, middle, lower), np.where(is_below, upper, middle)
+    at_end = motion.components_at(law, params, power(lower, 1.0 / p), velocity)
+    solution.state[:2, rows[hidden]] = at_end[:, hidden]
+    solution.state[2, rows[hidden]] += (lower / velocity)[hidden]
 
 
 def _mark_never_separating(law: motion.MotionLaw, solution: Solution, params: Params, recovered: Array) -> None:

@@ -37,8 +37,8 @@ class VelocityCoordinate:
 
     strength = ""
 
-    def of(self, s: Array, v: float, strength: Array) -> Array | float:
-        """The coordinate at s for a velocity that all trajectories have."""
+    def of(self, s: Array, v: Array | float, strength: Array) -> Array | float:
+        """The coordinate at s for a velocity, that all trajectories may have."""
         return v
 
     def velocity(self, y: Array, strength: Array) -> Array:
@@ -63,7 +63,7 @@ class LogCoordinate(VelocityCoordinate):
 
     strength = COORDINATE_COEFFICIENTS["log"][0]
 
-    def of(self, s: Array, v: float, strength: Array) -> Array:
+    def of(self, s: Array, v: Array | float, strength: Array) -> Array:
         return np.asarray(np.log1p(strength * v))
 
     def velocity(self, y: Array, strength: Array) -> Array:
@@ -96,7 +96,7 @@ class ForceCoordinate(VelocityCoordinate):
     spring: float
     strength = COORDINATE_COEFFICIENTS["force"][0]
 
-    def of(self, s: Array, v: float, strength: Array) -> Array:
+    def of(self, s: Array, v: Array | float, strength: Array) -> Array:
         return np.asarray(v + signed_power(s, self.spring) / strength)
 
     def velocity(self, y: Array, strength: Array) -> Array:
