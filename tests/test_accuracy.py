@@ -129,6 +129,15 @@ def test_a_contact_ends_at_zero_force_however_weak_the_damping(A: float) -> None
     assert shorter == pytest.approx(slope * A, rel=0.01, abs=1e-9 * elastic["contact_time"])
 
 
+@pytest.mark.parametrize("K", [1e3, 1e9, 1e15])
+def test_a_contact_ends_at_zero_force_where_another_stiffness_than_K_counts(K: float) -> None:
+    """k δ + b δ̇ vanishes at δ = b e_out v0/k, whatever the K of other laws is."""
+    law = "mujoco-solref-direct"
+    at = {"K": K, "m1": 1.0, "m2": 1.0, "R1": 10.0, "v1": 1.0, f"{law}.k": 100.0, f"{law}.b": 1e-4}
+    outputs = impact.run(model=law, at=at).values
+    assert outputs["permanent_indentation"] == pytest.approx(1e-6 * outputs["e_out"], rel=1e-12)
+
+
 @functools.cache
 def sweep_chi(n: float) -> tuple[Impacts, Outputs]:
     impacts = table1_impacts(n, e=np.array(CHI) / 1e3)

@@ -44,7 +44,7 @@ STATUS_OF_TERMINATION = np.array(
 STEPS_PER_CONTACT, STEP, PHASE = "sweep.steps_per_contact", "sweep.dt", "sweep.phase"
 # the contact time of a linear spring, in the contact's unit of time
 LINEAR_CONTACT_TIME = np.pi
-# indentations, in the contact's own units, between which an end at zero force is looked for that no step has seen
+# parts of the recovered indentation between which an end at zero force is looked for that no step has seen
 HIDDEN_END, HIDDEN_END_BISECTIONS = (1e-12, 1e-2), 60
 
 # arrays that a law needs, by name, in the contact's own units
@@ -460,7 +460,7 @@ def solve_phases(
         recovery = Recovery(rows, residual[rows])
         restitution = solve(back, motion.restitution_problem(back), start, params, recovery)
         _mark_never_separating(back, restitution, params, recovered)
-        _end_at_zero_force(back, restitution, params)
+        _end_at_zero_force(back, restitution, params, recovered)
         velocity = -back.velocity(restitution.state, params)
         ended = STATUS_OF_TERMINATION.take(restitution.termination)
         # the balls are held, or separate at zero speed after infinite time
@@ -472,13 +472,13 @@ def solve_phases(
     return Phases(approach, restitution, rows, params, peak, at_peak, residual, e_out, status)
 
 
-def _end_at_zero_force(law: motion.MotionLaw, solution: Solution, params: Params) -> None:
+def _end_at_zero_force(law: motion.MotionLaw, solution: Solution, params: Params, recovered: Array) -> None:
     """Move ends at zero indentation to where the force vanished, if it pulls in a part much shorter than a step.
 
     There it changes the speed by less than the errors of the integration.
     """
     ended = (solution.termination == Termination.EVENT_REACHED) & (law.model.release == "force")
-    least, most = HIDDEN_END
+    least, most = (part * recovered for part in HIDDEN_END)
     rows = np.flatnonzero(ended & (np.abs(motion.indentation(law, solution.state[0])) < least))
     if not rows.size:
         return
@@ -490,7 +490,7 @@ def _end_at_zero_force(law: motion.MotionLaw, solution: Solution, params: Params
     def pulls(x: Array) -> Mask:
         return np.broadcast_to(force_at(np.array([power(x, 1.0 / p), velocity]), params) < 0.0, x.shape)
 
-    lower, upper = np.full(rows.size, least), np.full(rows.size, most)
+    lower, upper = least[rows], most[rows]
     hidden = pulls(lower) & ~pulls(upper)
     if not hidden.any():
         return
