@@ -138,6 +138,16 @@ def test_a_contact_ends_at_zero_force_where_another_stiffness_than_K_counts(K: f
     assert outputs["permanent_indentation"] == pytest.approx(1e-6 * outputs["e_out"], rel=1e-12)
 
 
+def test_a_history_ends_where_the_contact_does() -> None:
+    law, balls = "kuwabara-kono-1987", {"K": 1e6, "m1": 1.0, "m2": 1.0, "v1": 1.0}
+    impact_run = impact.run(model=law, at={**balls, "A": 1e-7})
+    history, outputs = impact_run.history, impact_run.values
+    assert history["t"].values[-1] == pytest.approx(outputs["contact_time"], rel=1e-12)
+    assert history["delta"].values[-1] == pytest.approx(outputs["permanent_indentation"], rel=1e-5)
+    # the force pulls nowhere
+    assert history["F"].values.min() >= -1e-12 * history["F"].values.max()
+
+
 @functools.cache
 def sweep_chi(n: float) -> tuple[Impacts, Outputs]:
     impacts = table1_impacts(n, e=np.array(CHI) / 1e3)

@@ -95,6 +95,10 @@ def history_of(
     approach, tau_c, W_c = _phase(law, problem, steps, params, approach_times)
     back_law = motion.restitution_law(law)
     problem, steps = motion.restitution_problem(back_law), phases.restitution.recorded
+    if back_law.model.release == "force":
+        # the end at zero force may be within the last step
+        (last,), end = _fractions_at(steps, np.array([duration]))
+        steps = (*steps[:last], replace(steps[last], end=end))
     restitution, tau_r, W_r = _phase(back_law, problem, steps, back_params, restitution_times)
 
     restitution[:2] += [phases.approach.state[2, :1], phases.residual[:1]]
