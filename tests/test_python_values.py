@@ -207,6 +207,12 @@ def test_a_data_array_has_the_unit_of_its_attribute() -> None:
         impact.sweep(BASE, m1=table["v1"])
 
 
+def test_a_data_array_of_long_doubles_or_texts_with_a_unit_is_read() -> None:
+    for values in (np.array([100.0, 200.0], np.longdouble), ["0.1 m/s", "20 cm/s"]):
+        swept = impact.sweep(BASE, v1=xr.DataArray(values, attrs={"units": "mm/s"}))
+        assert swept["v1"].values.tolist() == [0.1, 0.2]
+
+
 def test_a_result_of_which_no_values_are_left_is_refused() -> None:
     result = impact.sweep(BASE)
     for function in (impact.info, impact.report, impact.page, impact.plot, impact.run):

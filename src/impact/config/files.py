@@ -194,7 +194,7 @@ def _from_library(value: Any) -> object:
         unit = str(value.attrs.get("units", "")) if hasattr(value, "dims") else ""
         value = value.values
         if differs_from_si(unit):
-            return _with_unit(value.tolist(), unit)
+            return _with_unit(_from_library(value), unit)
     if getattr(getattr(value, "dtype", None), "char", "") == "g":
         # a long double stays one where it is too large for a float
         with np.errstate(over="ignore"):
@@ -210,7 +210,10 @@ def _from_library(value: Any) -> object:
 
 
 def _with_unit(number: object, unit: str) -> object:
-    return [_with_unit(each, unit) for each in number] if isinstance(number, list) else f"{number!r} {unit}"
+    if isinstance(number, list):
+        return [_with_unit(each, unit) for each in number]
+    # a text has a unit of its own
+    return number if isinstance(number, str) else f"{number!r} {unit}"
 
 
 def to_plain_value(value: object) -> Any:
