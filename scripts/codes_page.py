@@ -35,7 +35,7 @@ entered, or with the damping that gives 0.6. *At {steps:g} steps* is the mean ov
 {schemes}
 
 In the tables below, *0.1 m/s* is the restitution of the same lines at a tenth of the speed. The remarks are those
-that `impact export` writes above the lines; one that begins with entries is of these alone.
+that `impact export` writes above the lines; one that begins with entries, or with "some laws", is not of all laws.
 {sections}
 """
 E, SLOW, STEPS = 0.6, 0.1, 20.0

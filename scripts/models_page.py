@@ -47,7 +47,8 @@ laws, and `impact models KEY` describes one of them.
 | e, e_out | requested and delivered restitution |
 | E\\*, R\\* | effective modulus and radius of [elastic contact](physics.md#elastic-contact) [Pa, m]; where K is \
 set, E\\* is 3 K/(4 √R\\*) in elastic-plastic laws and in `jkr-1971` |
-| Y, ν | yield strength and Poisson's ratio of the softer ball, of equally strong ones the smaller ν [Pa, –] |
+| Y, ν | yield strength and Poisson's ratio of the ball with the lower yield strength; where both are equal, the \
+smaller ν [Pa, –] |
 
 In a config, `models = "all"` selects every law once, `models = ["family:hysteresis", "!lee-wang-1983"]` a family
 without one of its laws, and `models = ["lankarani-nikravesh-*", "bilinear"]` laws by pattern and by key.
