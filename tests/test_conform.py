@@ -512,8 +512,8 @@ def test_a_board_is_stored_and_compared(cli: Run, tmp_path: Path) -> None:
     assert (drawn.returncode, drawn.stderr) == (1, f"{tmp_path / 'differences.png'}: where the differences lie\n")
     assert set(verdict.worst_along) == {"engine", "check"}
     assert cli("info", str(older)).returncode == 0
-    for words in (("plot", str(older), "-o", str(tmp_path / "p.png")), ("recommend", str(older))):
-        assert "this is a board" in cli(*words).stderr
+    for command in ("plot", "recommend", "rerun"):
+        assert "this is a board" in cli(command, str(older)).stderr
     blessed = cli("bless", str(newer), str(older), "--reason", "new")
     expected = "expected the result of a sweep; impact compare takes two boards as they are"
     assert (blessed.returncode, blessed.stderr) == (2, f"{newer}: this is a board, {expected}\n")

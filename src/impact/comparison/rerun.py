@@ -63,7 +63,6 @@ def rerun(
     """
     stored, name = load(result), str(result)
     plugin_set = read_plugins(plugins)
-    unknown = unknown_plugins(stored.attrs, plugin_set, name)
     # laws by key, because "all" may include new ones; a calibration has pairs, MODEL with FRICTION, along `model`
     keys = [law_keys(key) for key in stored["model"].values.tolist()] if "model" in stored.dims else [[]]
     laws = zip(("models", "frictions"), map(dict.fromkeys, zip(*keys, strict=True)), strict=False)
@@ -76,6 +75,7 @@ def rerun(
         config = stored_config(
             stored.attrs, changes, plugin_set, name, allow_changed_plugins=True, purpose="calibrate"
         )
+        unknown = unknown_plugins(stored.attrs, plugin_set, name)
         # the file may have a part of the laws, and of the curves
         verdict = compare(calibrate_config(config, plugin_set.of(config.models)), stored, tol=tol, subset=True)
         return replace(verdict, new="the rerun", baseline=name, notes=(*verdict.notes, *unknown))
@@ -85,6 +85,7 @@ def rerun(
     # any core gives the same result
     changes.append('solver.core="auto"')
     config = stored_config(stored.attrs, changes, plugin_set, name, max_points, allow_changed_plugins=True)
+    unknown = unknown_plugins(stored.attrs, plugin_set, name)
     whole = Plan(config, plugin_set.of(config.models))
     plan = replace(whole, config=config_of_part(config, stored))
     plan.check_count(max_points, name)
