@@ -308,7 +308,8 @@ def plot_to_files(
     output : the picture, with the ending of its format; by default the result's name with .png. The name of each
         of several kinds has the kind in it
     kinds : see `impact.plots.kinds.KINDS`
-    data : file for the numbers behind the picture: .csv or .parquet, or .tex, with `labels` and angles in degrees
+    data : file for the numbers behind the picture: .csv or .parquet, or .tex, whose "wide" form has `labels` and
+        angles in degrees
     data_form : "wide", a column for each curve, or "long", a row for each point
     rows, digits : of the numbers: at most so many rows, evenly spread, and significant digits; by default all
     decimal : "point" or "comma", of the picture and of the numbers, whose columns semicolons then separate, or
