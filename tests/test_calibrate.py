@@ -161,6 +161,12 @@ def test_a_law_with_a_stiffness_of_its_own_is_not_charged_for_that_of_its_materi
     both = impact.calibrate({**config, "materials": materials, "solver": QUICK})
     identifiable = both["identifiable"].sel(parameter="materials.ball.E")
     assert identifiable.sel(model=["hertz", "anagnostopoulos-1988"]).values.tolist() == [1, -1]
+    # a spring of friction with a stiffness of its own does not use them either
+    spring = {"frictions": ["cundall-strack-1979"], "friction": {"cundall-strack-1979": {"k_t": 1e5}}}
+    oblique = {**config, **spring, "models": ["anagnostopoulos-1988"], "sweep": {**sweep, "mu": 0.3, "angle": 0.5}}
+    with pytest.warns(impact.ImpactWarning, match=r"materials\.ball\.E: no law takes it"):
+        alone = impact.calibrate({**oblique, "materials": materials})
+    assert alone["identifiable"].sel(parameter="materials.ball.E").item() == -1
 
 
 def test_a_profile_with_several_minima_ends_in_an_interval() -> None:

@@ -12,7 +12,7 @@ import numpy as np
 from pydantic_core import PydanticCustomError
 
 from ..array_types import Array
-from ..contact.friction import FrictionLaw
+from ..contact.friction import HERTZ, FrictionLaw, required_inputs
 from ..contact.model import ForceModel, with_base_quantities
 from ..contact.variables import OUTPUTS
 from ..errors import ConfigError
@@ -580,14 +580,10 @@ def fitted_parameters(
         input_name = InputName.parse(name)
         if input_name.key == "yield_strength":
             return bool(used & {"yield_strength1", "yield_strength2"})
-        # a friction law with a spring may take its stiffness from the materials
-        if (
-            input_name.material
-            and input_name.key in ("E", "nu")
-            and has_own_K
-            and not (friction and friction.stiffness)
-        ):
-            return bool(used & {f"{input_name.key}1", f"{input_name.key}2"})
+        if input_name.material and input_name.key in ("E", "nu") and has_own_K:
+            # the spring of a friction law may be that of the materials
+            of_spring = required_inputs(friction, (), (model.exponent or HERTZ,)) if friction else frozenset()
+            return bool((used | of_spring) & {f"{input_name.key}1", f"{input_name.key}2"})
         return input_name.applies_to(model.key, friction.key if friction else "")
 
     return tuple(filter(is_used, fits))
