@@ -205,6 +205,10 @@ def test_a_data_array_has_the_unit_of_its_attribute() -> None:
     assert problem(v1=table["v1"])["peak_force"].tolist() == problem(v1=[0.1, 0.2])["peak_force"].tolist()
     with pytest.raises(impact.ConfigError, match=r"got .100\.0 mm/s., expected"):
         impact.sweep(BASE, m1=table["v1"])
+    stiffness = xr.DataArray([1e9, 2e9], attrs={"units": "N m-1.5"})
+    assert impact.sweep(BASE, K=stiffness)["K"].values.tolist() == [1e9, 2e9]
+    with pytest.raises(impact.ConfigError, match='"foo" is not a known unit'):
+        impact.sweep(BASE, v1=table["v1"].assign_attrs(units="foo"))
 
 
 def test_a_data_array_of_long_doubles_or_texts_with_a_unit_is_read() -> None:

@@ -567,13 +567,17 @@ def is_unit(text: str) -> bool:
 
 
 def differs_from_si(text: str) -> bool:
-    """Check whether a text is a unit in which numbers are not those in SI.
+    """Check whether a text is a unit in which numbers are not those in SI, or no unit.
 
-    >>> differs_from_si("cm/s"), differs_from_si("m s-1"), differs_from_si("N m-n")
-    (True, False, False)
+    Units of results, such as "N m-n" and "N m-1.5", are in SI.
+
+    >>> differs_from_si("cm/s"), differs_from_si("m s-1"), differs_from_si("N m-n"), differs_from_si("foo")
+    (True, False, False, True)
     """
     scale = _si_scale(text)
-    return scale is not None and scale[0] != 1
+    if scale is None:
+        return text not in ("", "-") and re.search(r"[-^]([A-Za-z(]|[0-9]+\.)", text) is None
+    return scale[0] != 1
 
 
 class UnitError(ValueError):
