@@ -256,10 +256,10 @@ def _flat_cell(cell: object, decimal: str) -> object:
 def _latex(frame: pd.DataFrame, form: TableForm) -> str:
     """Write a tabular of booktabs, with an S column of siunitx for each column of numbers; angles in degrees."""
     frame, names = frame.copy(), [*map(str, frame.columns)]
-    for place, name in enumerate(names):
-        if name.endswith(" [rad]") and frame.dtypes.iloc[place].kind == "f":
-            frame.isetitem(place, frame.iloc[:, place] * math.degrees(1.0))
-            names[place] = name.removesuffix("rad]") + r"\degree]"
+    for index, name in enumerate(names):
+        if name.endswith(" [rad]") and frame.dtypes.iloc[index].kind == "f":
+            frame.isetitem(index, frame.iloc[:, index] * math.degrees(1.0))
+            names[index] = name.removesuffix("rad]") + r"\degree]"
     texts, formats = frame.map(lambda cell: _latex_cell(cell, form.digits or 6)), ""
     for (_, column), (_, shown) in zip(frame.items(), texts.items(), strict=True):
         is_numeric = all(isinstance(cell, int | float) and not isinstance(cell, bool) for cell in column.tolist())

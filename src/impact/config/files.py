@@ -212,7 +212,7 @@ def _from_library(value: Any) -> object:
 def _with_unit(number: object, unit: str) -> object:
     if isinstance(number, list):
         return [_with_unit(each, unit) for each in number]
-    # a text has a unit of its own
+    # a text has its unit
     return number if isinstance(number, str) else f"{number!r} {unit}"
 
 

@@ -140,10 +140,10 @@ class PreparedProblem:
         if not isinstance(self.law, Pair):
             return ""
         names = [InputName.parse(name) for name in (*self.config.scalars, *read)]
-        given = {name.key for name in names if name.friction}
+        of_friction = {name.key for name in names if name.friction}
         n = self.law.model.exponent or (None if "n" in read else float(self.config.scalars["n"]))
         has_stiffness = any(name.key == "K" for name in names)
-        return parameter_problem(self.law.friction, given, n=n, has_stiffness=has_stiffness)
+        return parameter_problem(self.law.friction, of_friction, n=n, has_stiffness=has_stiffness)
 
     @cached_property
     def _collisions(self) -> InterpolatedCollisions | None:
