@@ -116,6 +116,10 @@ def test_the_differences_of_two_calibrations_are_drawn(cli: Run, drops: xr.Datas
     done = cli("compare", "new.h5", "old.h5", "--plot", "differences.png", cwd=tmp_path)
     assert (done.returncode, done.stderr) == (1, "differences.png: where the differences lie\n")
     assert (tmp_path / "differences.png").exists()
+    # the covariance is symmetric, and has one panel
+    along = impact.compare(tmp_path / "new.h5", tmp_path / "old.h5").worst_along
+    assert "parameter" in along
+    assert "other_parameter" not in along
 
 
 def test_models_chooses_the_laws(drops: xr.Dataset) -> None:

@@ -399,7 +399,7 @@ def test_a_number_of_any_size_is_judged(key: str, value: float) -> None:
 
 
 def test_open_mpi_of_an_adapter_starts_no_daemon(tmp_path: Path) -> None:
-    """It would have a session of its own, in which it outlives the adapter."""
+    """The daemon would start a new session, in which it outlives the adapter."""
     text = "import os\nprint(os.environ['OMPI_MCA_ess_singleton_isolated'], flush=True)\ninput()"
     with open_adapter(program(tmp_path, text), 5.0) as ask:
         assert ask(COLLISIONS[0]) == 1

@@ -143,7 +143,8 @@ def compare(
 def _along_axes(largest: Mapping[str, Mapping[str, np.ndarray]], baseline: xr.Dataset) -> dict[str, xr.Dataset]:
     """Collect the largest ratios along each axis, by variable, with the labels of the baseline."""
     along = {}
-    for axis in dict.fromkeys(axis for by_axis in largest.values() for axis in by_axis):
+    # the covariance of a calibration is symmetric
+    for axis in {axis: None for by_axis in largest.values() for axis in by_axis if axis != "other_parameter"}:
         columns = {name: (axis, by_axis[axis]) for name, by_axis in largest.items() if axis in by_axis}
         # a group of neighbours has the label of the first
         first = {axis: slice(None, None, group_size(baseline.sizes[axis]))}

@@ -39,8 +39,8 @@ def rerun(
     Parameters
     ----------
     result : the file
-    plugins : the plug-in models that it was computed with; a note of the verdict names a changed one, and one
-        that no file defines
+    plugins : the plug-in models that it was computed with; notes of the verdict name models
+        whose code has changed, and models that no file defines
     tol, subset : see `compare`
     max_points : the largest number of points
     execute : deprecated; function that runs a plan, by default it is run in this process

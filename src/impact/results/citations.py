@@ -100,7 +100,7 @@ def cite(*laws: str | Path | xr.Dataset | ForceModel | FrictionLaw, plugins: Seq
     Raises
     ------
     ModelError : a law is not in the catalogue; the message names the nearest key
-    UsageError : no law is given, or a result has a law of a file or a package that is not given
+    UsageError : no law is given, or a result has a law of a file or a package that is missing
 
     >>> import impact
     >>> print(impact.cite("hertz"))  # doctest: +ELLIPSIS
