@@ -155,14 +155,23 @@ def test_a_law_that_depends_on_the_speed_has_a_trajectory_for_each_angle_of_a_re
     }
 
 
+# the first two impacts have a wall, the third a second ball
+WALLS = {"m1": 0.1, "m2": [np.inf, np.inf, 0.2], "K": [1e8, 2e8, 3e8], "zip": [["m2", "K"]]}
+
+
 @pytest.mark.parametrize(
     "axes",
-    [{"R2": [0.01, 0.02, np.inf]}, {"cases": {"inertia_factor2": [0.4, 0.4, 0.6]}}],
-    ids=["a plane", "a shell"],
+    [
+        {"R2": [0.01, 0.02, np.inf]},
+        {"cases": {"inertia_factor2": [0.4, 0.4, 0.6]}},
+        {"R2": np.inf, **WALLS},
+        {"inertia_factor2": 0.6, **WALLS},
+    ],
+    ids=["a plane", "a shell", "a plane after walls", "a shell after walls"],
 )
 def test_masses_that_matter_for_some_balls_alone_have_trajectories_of_their_own(axes: dict[str, object]) -> None:
     # where both balls have one factor of inertia, m_t/m is 2/7 for all masses
-    source = oblique(v1=1.0, u1=0.5, mu=0.3, **axes, m1=[0.1, 0.2, 0.5])
+    source = oblique(v1=1.0, u1=0.5, mu=0.3, **{"m1": [0.1, 0.2, 0.5], **axes})
     each = impact.sweep(source, overrides={"solver.collapse": False})
     assert np.nanmax(np.abs(each.friction_residual)) < 1e-8
     assert_same_bits(impact.sweep(source), each)

@@ -190,12 +190,18 @@ def probe_index(inputs: Inputs, swept_names: Iterable[str] = ()) -> Index:
 
     Values computed there have length 1 along the axes on which they do not depend: the shape shows which.
     """
-    # by a plane, or by another factor of inertia, the effective tangential mass depends on the masses
-    planes = [name for name in ("R1", "R2") if inputs.axes_of(name) and np.inf in inputs.values(name)]
-    names = (*swept_names, *planes, "inertia_factor1", "inertia_factor2")
+    names = (*swept_names, "inertia_factor1", "inertia_factor2")
     full_axes = {axis for name in names for axis in inputs.axes_of(name)}
-    sizes = (size if axis in full_axes else min(size, 2) for axis, size in enumerate(inputs.shape))
-    return np.ix_(*map(np.arange, sizes))
+
+    def positions_on(axis: int, size: int) -> NDArray[np.intp]:
+        if axis in full_axes:
+            return np.arange(size)
+        # beside a wall, a plane or another factor of inertia the masses may or may not change m_t/m
+        sizes = (name for name in ("m1", "m2", "R1", "R2") if axis in inputs.axes_of(name))
+        infinite = sum(np.isinf(inputs.values(name)) * np.int8(2**bit) for bit, name in enumerate(sizes))
+        return np.union1d(np.unique(infinite, return_index=True)[1], np.arange(min(size, 2)))
+
+    return np.ix_(*(positions_on(axis, size) for axis, size in enumerate(inputs.shape)))
 
 
 def axes_of_arrays(arrays: Iterable[NDArray[Any]]) -> frozenset[int]:
