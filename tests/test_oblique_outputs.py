@@ -59,6 +59,18 @@ def test_without_a_slip_there_is_no_impulse_and_no_tangential_restitution() -> N
     assert values(result, "e_t") == [1.0, 1.0]
 
 
+def test_a_spin_that_cancels_the_slip_of_an_angle_up_to_rounding_leaves_a_number() -> None:
+    random = np.random.default_rng(0)
+    v1, angle, R1 = random.uniform(0.1, 10.0, 200), random.uniform(0.05, 1.4, 200), random.uniform(0.001, 1.0, 200)
+    spin = -v1 * np.tan(angle) / R1
+    cases = {"v1": v1.tolist(), "angle": angle.tolist(), "R1": R1.tolist(), "omega1": spin.tolist()}
+    result = oblique(v1=None, v2=0.0, R1=None, cases=cases)
+    assert (result["friction_status"] == FrictionStatus.OK).all()
+    np.testing.assert_allclose(result["omega1_post"].values[0, 0], spin, rtol=1e-12)
+    assert np.all(np.abs(result["slip_post"].values) < 1e-12)
+    assert set(values(result, "contact_regime")) <= {1, 3}
+
+
 def test_the_rebound_angle_and_the_ratio_of_impulses_are_those_of_the_velocities_at_any_speed() -> None:
     result = oblique(v1=[0.5, 4.0], v2=0.0, u1=1.0)
     apart = result["v2_post"] - result["v1_post"]

@@ -84,17 +84,21 @@ class ObliqueImpacts:
 
         It has the same bits at the same angle, whatever the speed is.
         """
-        if self.tangent is None:
-            slip_ratio = self.slip / self.impacts.v0
-        else:
-            spinning = _rim(self.impacts.R1, self.omega1) + _rim(self.impacts.R2, self.omega2)
-            slip_ratio = self.tangent + spinning / self.impacts.v0
+        slip_ratio = self.slip / self.impacts.v0 if self.tangent is None else self._tangent_of_slip
         return self.mass_ratio * slip_ratio / self.mu
+
+    @cached_property
+    def _tangent_of_slip(self) -> Array:
+        """The slip over v0 before the impact, where the angle is given."""
+        spinning = _rim(self.impacts.R1, self.omega1) + _rim(self.impacts.R2, self.omega2)
+        return np.asarray(self.tangent) + spinning / self.impacts.v0
 
     @cached_property
     def slip(self) -> Array:
         """Slip speed of the contact points before the impact [m/s], g0 = (u1 + R1 omega1) - (u2 - R2 omega2)."""
-        return (self.u1 + _rim(self.impacts.R1, self.omega1)) - (self.u2 - _rim(self.impacts.R2, self.omega2))
+        slip = (self.u1 + _rim(self.impacts.R1, self.omega1)) - (self.u2 - _rim(self.impacts.R2, self.omega2))
+        # a spin may cancel the slip of one of them, and leave a rounding error of the other
+        return slip if self.tangent is None else np.where(self._tangent_of_slip == 0.0, 0.0, slip)
 
     def spin_after(self, ball: Literal["1", "2"], impulse: Array) -> Array:
         """Compute the spin of a ball after an impulse P [N s]: omega - P/(q m R) [rad/s].
