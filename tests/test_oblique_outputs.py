@@ -102,11 +102,12 @@ def test_a_wall_and_a_plane_do_not_turn(body: dict[str, float]) -> None:
     assert slip.values.ravel() == pytest.approx(values(result, "slip_post"), rel=1e-14)
 
 
-def test_balls_that_do_not_meet_keep_their_motion() -> None:
-    result = oblique(v1=-2.0, u1=1.0, omega1=5.0)
+@pytest.mark.parametrize("mass", [0.2, math.inf], ids=["balls", "walls"])
+def test_balls_that_do_not_meet_keep_their_motion(mass: float) -> None:
+    result = oblique(m1=mass, m2=mass, v1=-2.0, u1=1.0, omega1=5.0 if mass < 1.0 else 0.0)
     assert values(result, "friction_status") == [2, 2]
     assert values(result, "u1_post") == [1.0, 1.0]
-    assert values(result, "omega1_post") == [5.0, 5.0]
+    assert values(result, "omega1_post") == 2 * [result["omega1"].item()]
     assert values(result, "friction_loss") == [0.0, 0.0]
     assert values(result, "contact_regime") == [0, 0]
     assert np.isnan(values(result, "beta")).all()

@@ -271,8 +271,8 @@ FORMULAS: dict[str, Callable[..., Any]] = {
     # impacts that have an answer and no slip before it
     "without_slip": lambda oblique, friction_status: (oblique.slip == 0.0) & (friction_status < FIRST_FAILURE),
     # P [N s]
-    "impulse": lambda oblique, slip_share, without_slip: replace_where(
-        oblique.m_t * oblique.slip * (1.0 - slip_share), without_slip, 0.0
+    "impulse": lambda oblique, slip_share, without_slip, missed: replace_where(
+        oblique.m_t * oblique.slip * (1.0 - slip_share), without_slip | missed, 0.0
     ),
     # impacts with a slip, friction and a complete tangential motion
     "has_works": lambda slip_share, oblique, missed: np.isfinite(slip_share) & (oblique.mu > 0.0) & ~missed,
@@ -288,7 +288,10 @@ FORMULAS: dict[str, Callable[..., Any]] = {
     ),
     "rebound_angle": lambda u1_post, u2_post, e_out, impacts: np.arctan2(u1_post - u2_post, e_out * impacts.v0),
     "impulse_ratio": lambda impulse, e_out, impacts: impulse / ((1.0 + e_out) * impacts.m * impacts.v0),
-    "friction_loss": lambda oblique, slip_post: 0.5 * oblique.m_t * (oblique.slip**2 - slip_post**2),
+    # m_t of two walls is infinite
+    "friction_loss": lambda oblique, slip_post, missed: replace_where(
+        0.5 * oblique.m_t * (oblique.slip**2 - slip_post**2), missed, 0.0
+    ),
     "contact_regime": _contact_regime,
     "friction_residual": _friction_residual,
     "beta_error": lambda beta, exact_share: beta + exact_share,
