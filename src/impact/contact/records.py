@@ -70,7 +70,7 @@ class Record:
             getattr(self, name)[rows] = getattr(part, name)
 
     @classmethod
-    def joined(cls, n: int, status: NDArray[np.int8], parts: Sequence[tuple[Positions, Self]]) -> Self:
+    def joined(cls, n: int, status: NDArray[np.int8] | int, parts: Sequence[tuple[Positions, Self]]) -> Self:
         """n trajectories, composed of parts at their positions; those in no part have only a status."""
         if parts and isinstance(parts[0][0], slice):
             return parts[0][1]

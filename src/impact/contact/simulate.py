@@ -101,10 +101,9 @@ def simulate(
         _simulate_distinct, model, compute=compute or integrate, separates_strong=compute is None
     )
     if integrator != EXACT:
-        collide_part = partial(
+        simulate_part = partial(
             collide_at_fixed_steps, model, scheme=integrator, compute=integrate, max_steps=max_steps
         )
-        simulate_part = partial(simulate_fixed_steps, collide_part=collide_part)
     return simulate_parts(CollisionResult, model.key, n, values, status, simulate_part, collapse, errors)
 
 
@@ -133,6 +132,11 @@ def simulate_parts(
             if count == 1:
                 twice = _values_at(values, np.array([0, 0]))
                 return part_of_n(twice, 2, collapse=False).take(np.array([0]))
+            if collapse and PHASE in values:
+                # at a fixed step problems are distinct by all values
+                first, row_of_impact = deduplicate([values[name] for name in sorted(values)], (count,))
+                if first.size < count:
+                    return part_of_n(_values_at(values, first), first.size, collapse=True).take(row_of_impact)
             return part_of_n(values, count, collapse=collapse)
         except ModelError as error:
             result = record.blank(count)
@@ -228,23 +232,6 @@ def distinct_problems(
         first, row_of_impact = deduplicate((*params, *others), (size,)) if collapse else (slice(None), slice(None))
         distinct_params, distinct_others = (tuple(column[first] for column in part) for part in (params, others))
         yield DistinctProblems(law, rows, first, row_of_impact, distinct_params, distinct_others)
-
-
-def simulate_fixed_steps(
-    n: float,
-    values: ValueArrays,
-    count: int,
-    *,
-    collide_part: SimulatePart[T],
-    collapse: bool,
-) -> T:
-    """Integrate each distinct dimensionless problem at its fixed step once."""
-    if collapse:
-        first, row_of_impact = deduplicate([values[name] for name in sorted(values)], (count,))
-        if first.size < count:
-            distinct = collide_part(n, _values_at(values, first), first.size, collapse=collapse)
-            return distinct.take(row_of_impact)
-    return collide_part(n, values, count, collapse=collapse)
 
 
 def collide_at_fixed_steps(

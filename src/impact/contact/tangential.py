@@ -121,8 +121,9 @@ def simulate_friction(
     )
     if integrator != EXACT:
         compute = partial(simulate.integrate_collisions, rtol=rtol, max_steps=max_steps, core=core)
-        collide_part = partial(_slip_at_fixed_steps, pair, scheme=integrator, compute=compute, max_steps=max_steps)
-        simulate_part = partial(simulate.simulate_fixed_steps, collide_part=collide_part)
+        simulate_part = partial(
+            _slip_at_fixed_steps, pair, scheme=integrator, compute=compute, max_steps=max_steps
+        )
     return simulate.simulate_parts(TangentialResult, pair.key, n, values, status, simulate_part, collapse, errors)
 
 

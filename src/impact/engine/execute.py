@@ -25,6 +25,7 @@ from ..contact.models import catalogue
 from ..contact.numba.dispatch import is_installed
 from ..contact.records import Record, positions
 from ..contact.simulate import simulate
+from ..contact.status import STATUS_OK
 from ..contact.tangential import simulate_friction
 from ..errors import StoreError, UsageError, warn
 from .executors import ExecutorSpec
@@ -175,12 +176,8 @@ def _submit_and_collect(
                 _check_integrated(trajectory_range, integrated, int(np.count_nonzero(~is_reused)))
                 del running[future]
                 collisions, errors = integrated
-                if is_reused.any():
-                    whole = trajectory_range.record.blank(trajectory_range.size)
-                    whole.put(~is_reused, collisions)
-                    whole.put(is_reused, reused_part)
-                    collisions = whole
-                yield trajectory_range, (collisions, errors)
+                parts = [(positions(~is_reused), collisions), (np.flatnonzero(is_reused), reused_part)]
+                yield trajectory_range, (trajectory_range.record.joined(is_reused.size, STATUS_OK, parts), errors)
     finally:
         for future in running:
             future.cancel()
