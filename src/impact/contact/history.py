@@ -18,7 +18,7 @@ from ..ode.problem import Params, Problem, Step
 from . import motion
 from .impacts import Impacts
 from .rigid import ObliqueImpacts
-from .simulate import RecordedMotion
+from .simulate import Phases
 from .slip_motion import LEAST_S, TIME_ROW
 from .status import Status
 from .tangential import SLIP_BOUNDS, RecordedSlip
@@ -62,7 +62,7 @@ class History:
 
 
 def history_of(
-    recorded: RecordedMotion,
+    phases: Phases,
     impacts: Impacts,
     times: int | None = None,
     oblique: ObliqueImpacts | None = None,
@@ -74,8 +74,8 @@ def history_of(
     motion where it has a slip. That by Coulomb's friction is of every slip, and has none of its own.
     `recorded_slip` is empty without slip or friction.
     """
-    law, params, phases = recorded
-    params, back_params = (tuple(column[:1] for column in columns) for columns in (params, phases.params))
+    law = phases.law
+    params, back_params = (tuple(column[:1] for column in columns) for columns in phases.params)
     if phases.restitution is None or phases.status[0] != Status.OK:
         return None
     # without params, of which the phases may have different numbers

@@ -18,7 +18,7 @@ from .model import ForceModel, Law
 from .powers import replace_where
 from .records import CollisionResult
 from .rigid import ObliqueImpacts, velocities_after
-from .simulate import ComputeCollisions, RecordedMotion, Settings, simulate
+from .simulate import ComputeCollisions, Phases, Settings, simulate
 from .slip_motion import SLIDES, STICKS
 from .status import FIRST_FAILURE, LIMIT, NO_IMPACT, STATUS_OK
 from .tangential import RecordedSlip, TangentialResult, simulate_friction
@@ -77,7 +77,7 @@ def collide(
     names: Iterable[str] = CENTRAL_OUTPUTS,
     oblique: ObliqueImpacts | None = None,
     compute: ComputeCollisions | None = None,
-    recorded: list[RecordedMotion] | None = None,
+    recorded: list[Phases] | None = None,
     recorded_slip: list[RecordedSlip] | None = None,
     **settings: Unpack[Settings],
 ) -> Outputs:

@@ -82,7 +82,7 @@ def simulate(
     integrator: str = EXACT,
     errors: dict[str, str] | None = None,
     compute: ComputeCollisions | None = None,
-    recorded: list[RecordedMotion] | None = None,
+    recorded: list[Phases] | None = None,
 ) -> CollisionResult:
     """Integrate impacts by a law; one that fails has a status, and affects no other.
 
@@ -174,7 +174,7 @@ def _simulate_distinct(
 ) -> CollisionResult:
     """Integrate each distinct dimensionless problem once, those with strong damping in their own coordinate."""
     law_values = with_coefficients(model, with_units(values, n), count)
-    status = check_coefficients(model, law_values, values, count)
+    status = check_coefficients(model, law_values, count)
     exact, chi = exact_restitution(model, law_values, count), chi_of(law_values, count)
     chosen = status == STATUS_OK
     parts = []
@@ -268,7 +268,7 @@ def collide_at_fixed_steps(
         return continuous.contact_time, np.where(never_ends, np.int8(Status.NOT_SEPARATED), continuous.status)
 
     law_values = with_coefficients(model, with_units(of_law, n), count)
-    status = check_coefficients(model, law_values, of_law, count)
+    status = check_coefficients(model, law_values, count)
     status[status == LIMIT] = Status.OK
     if STEP not in values:
         times, status = contact_times(slice(None), count)
@@ -309,15 +309,13 @@ def collide_at_fixed_steps(
     return replace(result, chi=chi_of(law_values, count), exact=exact_restitution(model, law_values, count))
 
 
-def check_coefficients(
-    model: ForceModel, law_values: LawValues, values: ValueArrays, count: int
-) -> NDArray[np.int8]:
+def check_coefficients(model: ForceModel, law_values: LawValues, count: int) -> NDArray[np.int8]:
     """Compute the status of impacts by the coefficients of their law, before integration; shape (count,)."""
     status = np.full(count, Status.OK, np.int8)
     coefficients = np.array([law_values[name] for name in model.coefficients]).reshape(-1, count)
     if np.isfinite(coefficients).all():
         return status
-    is_e_zero = values.get("e", np.full(count, np.nan)) == 0.0
+    is_e_zero = np.broadcast_to(law_values.get("e", np.nan), count) == 0.0
     status[(np.isinf(coefficients) & ~is_e_zero).any(axis=0)] = Status.OUT_OF_RANGE
     status[np.isnan(coefficients).any(axis=0)] = Status.INVALID_PARAMETER
     # with infinite damping the balls neither approach nor separate: force and time have no finite limit
@@ -335,7 +333,7 @@ def integrate_collisions(
     max_steps: int,
     never_separates: NDArray[np.bool_] | bool = False,
     core: str = "numpy",
-    recorded: list[RecordedMotion] | None = None,
+    recorded: list[Phases] | None = None,
 ) -> CollisionResult:
     """Integrate n impacts, with params of shape (n,), through approach and restitution.
 
@@ -355,7 +353,7 @@ def integrate_collisions(
         form = forms[0 if recovery is None else 1]
         if form is not None:
             return dispatch.integrate_compiled(form, law, problem, start, params, rtol=rtol, max_steps=max_steps)
-        residual = None if recovery is None else recovery.residual
+        residual = None if recovery is None else recovery[1]
         params, breakpoints = motion.breakpoints(law, params, start, residual)
         return in_parts(run, problem, breakpoints, start, params)
 
@@ -382,24 +380,18 @@ def integrate_collisions(
         if law.model.release == "force":
             result.permanent[rows] += motion.indentation(law, restitution.state[0])
     if recorded is not None:
-        recorded.append(RecordedMotion(law, params, phases))
+        recorded.append(phases)
     return result
 
 
-class Recovery(NamedTuple):
-    """What the restitution phase begins with, for the impacts at `rows` that enter it."""
-
-    rows: Positions
-    residual: Array
-
-
 class Phases(NamedTuple):
-    """The solutions of both phases; `rows` are the impacts that enter restitution, and `params` theirs."""
+    """The motion through both phases, with the params of each; `rows` are the impacts that enter restitution."""
 
+    law: motion.MotionLaw
+    params: tuple[Params, Params]
     approach: Solution
     restitution: Solution | None
     rows: Positions
-    params: Params
     peak: Array
     force_at_peak: Array
     residual: Array
@@ -407,14 +399,8 @@ class Phases(NamedTuple):
     status: NDArray[np.int8]
 
 
-class RecordedMotion(NamedTuple):
-    """The motion of equal impacts: the law and the params of their approach, and both phases with their steps."""
-
-    law: motion.MotionLaw
-    params: Params
-    phases: Phases
-
-
+# the impacts that enter the restitution phase, and their permanent indentation
+Recovery = tuple[Positions, Array]
 # integrates a phase: its law, problem, start, params and, on restitution, the Recovery
 SolvePhase = Callable[[motion.MotionLaw, Problem, Array, Params, Recovery | None], Solution]
 
@@ -432,7 +418,7 @@ def solve_phases(
     approach = solve(law, motion.approach_problem(law), start, params, None)
     peak = motion.indentation(law, approach.state[0])
     at_peak = motion.force_at_peak(law, approach.state[0], params)
-    residual, recovered, params = motion.unloading_state(law, params, peak, at_peak)
+    residual, recovered, back_params = motion.unloading_state(law, params, peak, at_peak)
     e_out, status = np.full(n, np.nan), STATUS_OF_TERMINATION.take(approach.termination)
     # without a recovered indentation the balls stay at their peak
     stays = (status == STATUS_OK) & (recovered <= 0.0)
@@ -440,15 +426,14 @@ def solve_phases(
         status[stays], e_out[stays] = LIMIT, 0.0
 
     rows = positions(status == STATUS_OK)
-    params, recovered = tuple(column[rows] for column in params), recovered[rows]
+    back_params, recovered = tuple(column[rows] for column in back_params), recovered[rows]
     restitution = None
     if recovered.size:
-        start = motion.components_at(back, params, power(recovered, 1.0 / back.model.coordinate_power), 0.0)
-        recovery = Recovery(rows, residual[rows])
-        restitution = solve(back, motion.restitution_problem(back), start, params, recovery)
-        _mark_never_separating(back, restitution, params, recovered)
-        _end_at_zero_force(back, restitution, params, recovered)
-        velocity = -back.velocity(restitution.state, params)
+        start = motion.components_at(back, back_params, power(recovered, 1.0 / back.model.coordinate_power), 0.0)
+        restitution = solve(back, motion.restitution_problem(back), start, back_params, (rows, residual[rows]))
+        _mark_never_separating(back, restitution, back_params, recovered)
+        _end_at_zero_force(back, restitution, back_params, recovered)
+        velocity = -back.velocity(restitution.state, back_params)
         ended = STATUS_OF_TERMINATION.take(restitution.termination)
         # the balls are held, or separate at zero speed after infinite time
         at_limit = restitution.termination == Termination.EVENT_UNREACHABLE
@@ -456,7 +441,8 @@ def solve_phases(
             at_limit &= motion.may_be_overdamped(back.model) | np.broadcast_to(never_separates, n)[rows]
             velocity[at_limit], ended[at_limit] = 0.0, LIMIT
         e_out[rows], status[rows] = velocity, ended
-    return Phases(approach, restitution, rows, params, peak, at_peak, residual, e_out, status)
+    both_params = params, back_params
+    return Phases(law, both_params, approach, restitution, rows, peak, at_peak, residual, e_out, status)
 
 
 def _end_at_zero_force(law: motion.MotionLaw, solution: Solution, params: Params, recovered: Array) -> None:

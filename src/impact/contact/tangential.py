@@ -116,26 +116,22 @@ def simulate_friction(
     ------
     ModelError : of the errors of a law, only what is raised outside its formulas
     """
-    simulate_part: simulate.SimulatePart[TangentialResult] = partial(
-        _simulate_distinct, pair, rtol=rtol, max_steps=max_steps, recorded=recorded
-    )
+    integrate_slip = partial(_integrate, rtol=rtol, max_steps=max_steps, recorded=recorded)
+    simulate_part: simulate.SimulatePart[TangentialResult] = partial(_simulate_distinct, pair, integrate_slip)
     if integrator != EXACT:
         compute = partial(simulate.integrate_collisions, rtol=rtol, max_steps=max_steps, core=core)
-        simulate_part = partial(
-            _slip_at_fixed_steps, pair, scheme=integrator, compute=compute, max_steps=max_steps
-        )
+        collide = partial(simulate.collide_at_fixed_steps, pair.model, scheme=integrator, compute=compute)
+        simulate_part = partial(_slip_at_fixed_steps, pair, partial(collide, max_steps=max_steps))
     return simulate.simulate_parts(TangentialResult, pair.key, n, values, status, simulate_part, collapse, errors)
 
 
 def _simulate_distinct(
     pair: Pair,
+    integrate_slip: simulate.SimulatePart[TangentialResult],
     n: float,
     values: simulate.ValueArrays,
     count: int,
     *,
-    rtol: float,
-    max_steps: int,
-    recorded: list[RecordedSlip] | None,
     collapse: bool,
 ) -> TangentialResult:
     """Integrate each distinct dimensionless problem once."""
@@ -145,7 +141,7 @@ def _simulate_distinct(
     smooth = (p for p in (pair.model.coordinate_power, 4, 8) if all(float(p * q).is_integer() for q in powers))
     model = replace(pair.model, coordinate_power=next(smooth, pair.model.coordinate_power))
     law_values = with_coefficients(model, with_units(values, n), count)
-    status = simulate.check_coefficients(model, law_values, values, count)
+    status = simulate.check_coefficients(model, law_values, count)
     slip = np.ones(count) if form.kind == "coulomb" else np.abs(values[SLIP])
     zero = np.zeros(count)
     stiffness = values[TANGENTIAL_STIFFNESS] if form.kind == "spring" else zero
@@ -166,7 +162,7 @@ def _simulate_distinct(
     parts = []
     for problems in simulate.distinct_problems(model, n, law_values, chosen, collapse, columns):
         never_separates = exact[problems.rows][problems.first] == 0.0
-        distinct = _integrate(form, problems, never_separates, rtol, max_steps, recorded)
+        distinct = integrate_slip(form, problems, never_separates)
         parts.append((problems.rows, distinct.take(problems.row_of_impact)))
     result = TangentialResult.joined(count, status, parts)
     share = np.where(has_friction, slip / integrated, 1.0)
@@ -183,30 +179,18 @@ def _simulate_distinct(
 
 def _slip_at_fixed_steps(
     pair: Pair,
+    collide: simulate.ComputeCollisions,
     n: float,
     values: simulate.ValueArrays,
     count: int,
     *,
-    scheme: str,
-    compute: simulate.ComputeCollisions,
-    max_steps: int,
     collapse: bool,
 ) -> TangentialResult:
     """Integrate slips at a fixed step; those without slip or friction as contacts without slip."""
     form = pair.form(n)
     slip = FixedStepSlip.of(form, values, count)
     is_invalid = (slip.slip != 0.0) & ~(np.isfinite(slip.stiffness) & np.isfinite(slip.damping))
-    collisions = simulate.collide_at_fixed_steps(
-        pair.model,
-        n,
-        values,
-        count,
-        scheme=scheme,
-        compute=compute,
-        collapse=collapse,
-        max_steps=max_steps,
-        slip=slip,
-    )
+    collisions = collide(n, values, count, collapse=collapse, slip=slip)
     status = np.where(is_invalid & (collisions.status == STATUS_OK), Status.OUT_OF_RANGE, collisions.status)
     result = replace(TangentialResult.blank(count), steps=collisions.steps, status=status.astype(np.int8))
     answers: dict[str, NDArray[Any]] = {"sliding_impulse": slip.impulse}
@@ -239,7 +223,7 @@ def _integrate(
     def solve(
         law: motion.MotionLaw, problem: Problem, start: Array, params: Params, recovery: simulate.Recovery | None
     ) -> Solution:
-        index, residual = (slice(None), None) if recovery is None else recovery
+        index, residual = recovery or (slice(None), None)
         in_phase = Columns(*(column[index] for column in base))
         in_phase = in_phase if residual is None else in_phase._replace(residual=residual)
         columns = (*in_phase, *(column[index] for column in coefficient))

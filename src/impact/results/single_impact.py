@@ -40,7 +40,7 @@ from ..contact.materials import Material
 from ..contact.model import ForceModel, with_base_quantities
 from ..contact.models import find
 from ..contact.output_formulas import collide
-from ..contact.simulate import RecordedMotion
+from ..contact.simulate import Phases
 from ..contact.status import FIRST_FAILURE, FrictionStatus, Status
 from ..contact.tangential import RecordedSlip
 from ..contact.units import with_numbers
@@ -355,7 +355,7 @@ def run_single_impact(plan: Plan, first: tuple[str, ...], times: int | None = No
     # what is recorded is not compiled
     solver = replace(config.solver, core="numpy")
     errors: dict[str, str] = {}
-    recorded: list[RecordedMotion] = []
+    recorded: list[Phases] = []
     recorded_slip: list[RecordedSlip] = []
     collision = collide(
         law,
