@@ -11,7 +11,7 @@ from ..fixed_step import KICK_DRIFT
 from ..friction import FrictionLaw
 from ..model import Parameter
 from ..models.cited_sources import KRATOS, LIGGGHTS, YADE_2025
-from .textbook import CONSTANT_STIFFNESS, KT_OVER_KN, MINDLIN_STIFFNESS, XT, choice, limit, stiffness
+from .textbook import CONSTANT_STIFFNESS, KT_OVER_KN, MINDLIN_STIFFNESS, XT, choice, limit, optional, stiffness
 
 # ---- LAMMPS
 
@@ -148,13 +148,7 @@ YADE_MINDLIN = FrictionLaw(
     ),
     parameters=(
         *MINDLIN_STIFFNESS,
-        Parameter(
-            "betas",
-            "1",
-            "damping ratio β_s of the tangential stiffness; unset, −ln e/√(π² + ln² e)",
-            least=0.0,
-            optional=True,
-        ),
+        optional("betas", "1", "damping ratio β_s of the tangential stiffness; unset, −ln e/√(π² + ln² e)"),
         limit("positive"),
     ),
     stiffness="mindlin",

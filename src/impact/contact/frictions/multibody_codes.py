@@ -11,11 +11,9 @@ from ..friction import FrictionLaw
 from ..model import Parameter
 from ..models.cited_sources import SIMBODY
 from ..models.multibody_codes import MUJOCO_SOLREF, SIMBODY_HUNT_CROSSLEY as SIMBODY_FORCE
-from .textbook import limit
+from .textbook import limit, optional
 
-DYNAMIC_FRICTION = Parameter(
-    "mu_d", "1", "dynamic coefficient of friction, at most μ, the static one; unset, μ", least=0.0, optional=True
-)
+DYNAMIC_FRICTION = optional("mu_d", "1", "dynamic coefficient of friction, at most μ, the static one; unset, μ")
 
 
 def smooth_step(t: Array) -> Array:
@@ -84,13 +82,11 @@ MUJOCO_ELLIPTIC = FrictionLaw(
     parameters=(
         Parameter("impratio", "1", "impedance of friction over that of the contact", default=1.0, least=1e-9),
         Parameter("impedance", "1", "constant impedance d of solimp", default=0.9, least=1e-4, most=0.9999),
-        Parameter(
+        optional(
             "b_t",
             "1/s",
             "damping of solreffriction: 2/timeconst, or its negative second number; unset, as in MuJoCo, that of "
             "solref",
-            least=0.0,
-            optional=True,
         ),
     ),
     damping="cone",

@@ -25,6 +25,8 @@ def limit(default: str) -> Parameter:
 
 XT = Parameter("xt", "1", "tangential damping over the damping of the contact force", default=1.0, least=0.0)
 stiffness = partial(Parameter, least=1e-9, optional=True)
+# one that may be left unset
+optional = partial(Parameter, least=0.0, optional=True)
 KT_OVER_KN = stiffness("kt_over_kn", "1", "stiffness over that of the contact at the same indentation, n K δⁿ⁻¹")
 # one of the two has to be set, or 8 G* a is taken
 CONSTANT_STIFFNESS = (stiffness("k_t", "N/m", "tangential stiffness"), KT_OVER_KN)
