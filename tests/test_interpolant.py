@@ -46,7 +46,7 @@ def test_polynomials_agree_with_the_integration(key: str, name: str, n: float) -
     expected = delivered(model, name, values, n)
     np.testing.assert_allclose(delivered(model, name, values, n, compute=compute), expected, rtol=0, atol=1e-10)
     assert compute.group is not None
-    assert any(interval.is_accurate for interval in compute.group[1].intervals)
+    assert any(interval.coefficients is not None for interval in compute.group[1].intervals)
 
 
 def test_samples_are_values_of_the_function_with_its_extrema() -> None:
@@ -156,7 +156,7 @@ def test_a_value_for_which_a_law_raises_has_a_status_and_leaves_the_others_their
     assert computed[1].tolist() == [*[Status.OK] * 3, *[Status.MODEL_ERROR] * 2]
     np.testing.assert_allclose(computed, delivered(model, "p", values, 1.0), rtol=0, atol=1e-10)
     assert compute.group is not None
-    assert any(interval.is_accurate for interval in compute.group[1].intervals)
+    assert any(interval.coefficients is not None for interval in compute.group[1].intervals)
 
 
 def test_laws_of_the_same_motion_share_their_polynomials() -> None:

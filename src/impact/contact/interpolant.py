@@ -97,7 +97,7 @@ class Interval:
     ----------
     divisions : how many times the interval that it is a part of was divided
     values : of the function at the nodes, shape (DEGREE + 1, columns); None before the function was called
-    coefficients : of the polynomials, of the shape of the values
+    coefficients : of the polynomials, of the shape of the values; None if they are not accurate
     """
 
     lower: float
@@ -105,7 +105,6 @@ class Interval:
     divisions: int = 0
     values: Array | None = None
     coefficients: Array | None = None
-    is_accurate: bool = False
 
     @property
     def nodes(self) -> Array:
@@ -114,7 +113,7 @@ class Interval:
 
     def __call__(self, x: Array) -> Array:
         """Compute the polynomials between the bounds, shape (k, columns); NaN if they are not accurate."""
-        if self.coefficients is None or not self.is_accurate:
+        if self.coefficients is None:
             return np.full(x.shape, np.nan)[:, None]
         return np.asarray(chebyshev.chebval(to_unit(x, self.lower, self.upper), self.coefficients).T)
 
@@ -127,7 +126,7 @@ class Interval:
         scale = np.maximum(np.abs(at_nodes).max(axis=0), floors)
         last, error = np.abs(coefficients[-LAST_COEFFICIENTS:]), np.abs(AT_CHECKS @ coefficients - between)
         is_accurate = (last <= COEFFICIENT_TOLERANCE * scale).all() & (error <= CHECK_TOLERANCE * scale).all()
-        return replace(self, values=at_nodes, coefficients=coefficients, is_accurate=bool(is_accurate))
+        return replace(self, values=at_nodes, coefficients=coefficients if is_accurate else None)
 
     def parts(self) -> list[Interval]:
         """Divide the interval, geometrically beside zero."""
@@ -181,7 +180,8 @@ class Interpolant:
         # another thread may replace those of the function
         intervals, is_divided = self.intervals, True
         while is_divided:
-            number = _interval_of(x, intervals)
+            edges = [intervals[0].lower, *(interval.upper for interval in intervals)]
+            number = np.where((x >= edges[0]) & (x <= edges[-1]), np.searchsorted(edges[1:-1], x), -1)
             intervals, is_divided = self._refined(intervals, np.unique(number[number >= 0]))
         values: Array = np.full((x.size, self.floors.size), np.nan)
         for chosen in np.unique(number[number >= 0]).tolist():
@@ -206,7 +206,7 @@ class Interpolant:
             assert interval.values is not None
             x.append(interval.nodes[: DEGREE + 1])
             values.append(interval.values[:, 0])
-            if interval.is_accurate and interval.coefficients is not None:
+            if interval.coefficients is not None:
                 coefficients = interval.coefficients[:, 0]
                 kept = chebyshev.chebtrim(coefficients, NOISE * np.abs(coefficients).max())
                 roots = chebyshev.chebroots(chebyshev.chebder(kept)) if kept.size > 2 else np.zeros(0)
@@ -234,19 +234,13 @@ class Interpolant:
 
     def _is_divided(self, interval: Interval) -> bool:
         """Whether an interval is not accurate, but its parts may be, and are needed."""
-        if interval.values is None or interval.is_accurate or interval.divisions >= self.max_divisions:
+        values = interval.values
+        if values is None or interval.coefficients is not None or interval.divisions >= self.max_divisions:
             return False
-        is_finite = np.isfinite(interval.values)
+        is_finite = np.isfinite(values)
         # what fails in most of it, or near its ends, is not worth many divisions
         is_worth = is_finite.all() or (is_finite.mean() > 0.5 and interval.divisions < MAX_DIVISIONS)
-        return bool(is_worth) and (self.is_needed is None or self.is_needed(interval.values))
-
-
-def _interval_of(x: Array, intervals: Sequence[Interval]) -> NDArray[np.intp]:
-    """Find the number of the interval of each value; -1 outside."""
-    edges = [intervals[0].lower, *(interval.upper for interval in intervals)]
-    number = np.searchsorted(edges[1:-1], x)
-    return np.where((x >= edges[0]) & (x <= edges[-1]), number, -1)
+        return bool(is_worth) and (self.is_needed is None or self.is_needed(values))
 
 
 class InterpolatedCollisions:
