@@ -8,7 +8,7 @@ wait, their requests are evaluated together.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
 from functools import partial
 from queue import SimpleQueue
 from typing import TypeVar
@@ -24,10 +24,6 @@ VectorFunction = Callable[[Array], Array]
 Evaluate = Callable[[VectorFunction, Array], Array]
 # threads at a time
 MAX_THREADS = 256
-
-
-class _Stopped(Exception):
-    """Ends a waiting solver after a function or another solver failed."""
 
 
 def run_together(solvers: Sequence[Callable[[Evaluate], T]]) -> list[T]:
@@ -60,7 +56,8 @@ def run_together(solvers: Sequence[Callable[[Evaluate], T]]) -> list[T]:
         turns.put(None)
         answer = answers[number].get()
         if answer is None:
-            raise _Stopped
+            # a function or another solver failed
+            raise CancelledError
         return answer
 
     def wait_for_turn() -> None:
