@@ -212,16 +212,13 @@ OUTPUTS = by_name(
 )  # fmt: skip
 
 
+CENTRAL_OUTPUTS = tuple(name for name, variable in OUTPUTS.items() if not variable.of_friction)
+
+
 def default_variables(of_friction: bool) -> tuple[str, ...]:
     """List the variables that a result has by default, with or without those of friction."""
-    return tuple(
-        name
-        for name, variable in OUTPUTS.items()
-        if not variable.on_request and (of_friction or not variable.of_friction)
-    )
+    return tuple(name for name in (OUTPUTS if of_friction else CENTRAL_OUTPUTS) if not OUTPUTS[name].on_request)
 
-
-CENTRAL_OUTPUTS = tuple(name for name, variable in OUTPUTS.items() if not variable.of_friction)
 
 # a time history, over the time since first contact
 HISTORY = by_name(
