@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ import numpy as np
 from ..array_types import Array, Mask
 from ..errors import ModelError
 from ..ode.events import choose
-from ..ode.problem import Params, Problem, Rates
+from ..ode.problem import Params, Problem
 from .formula_calls import Formula, argument_names, call_by_name
 from .model import FORCE_ARGUMENTS, UNLOADING_ARGUMENTS, ForceModel
 from .piecewise import BREAKPOINT_TOLERANCE, Breakpoint
@@ -56,6 +57,8 @@ BOUND_RATES = np.geomspace(1e-4, 1e4, 65)
 BOUND_INDENTATIONS = 10.0 ** -np.linspace(0.0, 40.0, 81)
 # rows of rates that are written to
 Rows = Array | Sequence[Any]
+# (rows to write, components, params)
+WriteRates = Callable[[Rows, Array, Params], None]
 # (components, params) -> force
 Force = Callable[[Array, Params], Array]
 # trajectories checked together in `never_separates`
@@ -97,7 +100,7 @@ class MotionLaw:
 def approach_problem(law: MotionLaw) -> Problem:
     """Pose the approach: from contact to the largest indentation, where v falls to zero."""
     return Problem(
-        rates=_rates(law),
+        rates=partial(_rates, rates_writer(law)),
         event=lambda y, k, params: law.coordinate.stop(y, k),
         unreachable=lambda y, k, params: np.asarray(y[0] > MAX_S),
         floor=ERROR_FLOOR,
@@ -122,7 +125,7 @@ def restitution_problem(law: MotionLaw) -> Problem:
 
     ends_at_gap, may_turn_back = law.model.release == "gap", not may_be_overdamped(law.model)
     return Problem(
-        rates=_rates(law, unloads=True),
+        rates=partial(_rates, rates_writer(law, unloads=True)),
         event=(lambda y, k, params: (y[0], k[0])) if ends_at_gap else force_event,
         unreachable=(lambda y, k, params: np.asarray(k[0] >= 0.0)) if may_turn_back else overdamped,
         floor=ERROR_FLOOR,
@@ -154,7 +157,7 @@ def breakpoints(
     phase_breakpoints: list[Breakpoint] = []
     for formula in formulas:
         if not set(FORCE_ARGUMENTS).isdisjoint(argument_names(formula)):
-            phase_breakpoints.append(_breakpoint_of_motion(law, formula, extra))
+            phase_breakpoints.append(partial(_value_of_motion, law, formula, extra))
             continue
         x = np.broadcast_to(law.call(formula, params[:n_law_params], unloading_values), start.shape[1])
         # one at the residual indentation, where s = 0, is known up to rounding
@@ -169,16 +172,6 @@ def breakpoints(
 def _breakpoint_at_column(column: int) -> Breakpoint:
     """Make the breakpoint at the values of s that are a column of the params."""
     return lambda y, params: np.asarray(params[column] - y[0])
-
-
-def _breakpoint_of_motion(law: MotionLaw, formula: Formula, extra: tuple[str, ...]) -> Breakpoint:
-    """Make the breakpoint where a formula of the motion changes its sign."""
-
-    def breakpoint(y: Array, params: Params) -> Array:
-        arguments = _formula_arguments(law, {*argument_names(formula)}, extra, y, params)
-        return law.call(formula, params[: len(law.names)], arguments)
-
-    return breakpoint
 
 
 def restitution_law(law: MotionLaw) -> MotionLaw:
@@ -201,9 +194,8 @@ def indentation(law: MotionLaw, s: Array) -> Array:
 
 def force_at_peak(law: MotionLaw, s: Array, params: Params) -> Array:
     """Compute the force at the end of the approach, at s of shape (n,) and v = 0."""
-    at_rest, formula = components_at(law, params, s, 0.0), law.model.force
-    force = law.call(formula, params, _formula_arguments(law, {*argument_names(formula)}, (), at_rest, params))
-    return np.broadcast_to(force, s.shape)
+    at_rest = components_at(law, params, s, 0.0)
+    return np.broadcast_to(_value_of_motion(law, law.model.force, (), at_rest, params), s.shape)
 
 
 def unloading_state(law: MotionLaw, params: Params, peak: Array, at_peak: Array) -> tuple[Array, Array, Params]:
@@ -223,6 +215,12 @@ def unloading_state(law: MotionLaw, params: Params, peak: Array, at_peak: Array)
         residual, recovered = recovered, residual
     branch = () if model.unloading is None else (peak, at_peak, residual, recovered)
     return residual, recovered, (*params, *branch)
+
+
+def _value_of_motion(law: MotionLaw, formula: Formula, extra: tuple[str, ...], y: Array, params: Params) -> Array:
+    """Compute the value of a formula at components and params."""
+    arguments = _formula_arguments(law, {*argument_names(formula)}, extra, y, params)
+    return law.call(formula, params[: len(law.names)], arguments)
 
 
 def _formula_arguments(
@@ -245,18 +243,14 @@ def _formula_arguments(
     return arguments
 
 
-def _rates(law: MotionLaw, *, unloads: bool = False) -> Rates:
-    write = rates_writer(law, unloads=unloads)
-
-    def rates(y: Array, params: Params, out: Array | None = None) -> Array:
-        out = np.empty((5, y.shape[1])) if out is None else out
-        write(out, y, params)
-        return out
-
-    return rates
+def _rates(write: WriteRates, y: Array, params: Params, out: Array | None = None) -> Array:
+    """Compute the rates of a phase, see `Problem`, by a function of `rates_writer`."""
+    out = np.empty((5, y.shape[1])) if out is None else out
+    write(out, y, params)
+    return out
 
 
-def rates_writer(law: MotionLaw, *, unloads: bool = False) -> Callable[[Rows, Array, Params], None]:
+def rates_writer(law: MotionLaw, *, unloads: bool = False) -> WriteRates:
     """Make the function that writes the rates of a phase to rows: those of s, v or its substitute, t, W, and F.
 
     The last rows may be missing, and that of W may be None.
@@ -284,11 +278,7 @@ def rates_writer(law: MotionLaw, *, unloads: bool = False) -> Callable[[Rows, Ar
 def force_of(law: MotionLaw, *, unloads: bool = False) -> Force:
     """Make the function of components and params that computes the force of a phase alone."""
     evaluate = _formula_of_motion(law, unloads)
-
-    def force(y: Array, params: Params) -> Array:
-        return law.coordinate.force(y, evaluate(y, params)[2], law.strength(params))
-
-    return force
+    return lambda y, params: law.coordinate.force(y, evaluate(y, params)[2], law.strength(params))
 
 
 def _formula_of_motion(
