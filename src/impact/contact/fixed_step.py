@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..array_types import Array
+from ..array_types import Array, Mask
 from ..errors import ModelError, UsageError, require_known
 from .dimensionless import with_coefficients, with_units
 from .fixed_step_slip import FixedStepSlip
@@ -323,7 +323,7 @@ class _Contacts:
             return np.where(x + reach * u <= 0.0, u, (u - h * x) / (1.0 + h * reach))
         return u - h * force
 
-    def _turn(self, turned: NDArray[np.bool_]) -> None:
+    def _turn(self, turned: Mask) -> None:
         """Begin the unloading branch of some collisions at the largest indentation that they reached."""
         peak = self.peak[turned]
         params = tuple(self.params[:, turned])
@@ -333,7 +333,7 @@ class _Contacts:
         self.branch[:, turned] = peak, at_peak, residual, recovered
         self.unloads |= turned
 
-    def keep(self, active: NDArray[np.bool_]) -> None:
+    def keep(self, active: Mask) -> None:
         """Remove the collisions that have ended."""
         for name, value in list(vars(self).items()):
             if isinstance(value, np.ndarray):

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..array_types import Array
+from ..array_types import Array, Mask
 from .powers import power
 from .slip_motion import SLIDES, STICKS, TangentialForm
 
@@ -60,7 +60,7 @@ class FixedStepSlip:
     last_power: Array
     impulse: Array
     regime: NDArray[np.int8]
-    slipped: NDArray[np.bool_]
+    slipped: Mask
     changes: NDArray[np.int32]
 
     @classmethod

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..array_types import Array
+from ..array_types import Array, Indices
 from ..ode.problem import Params, Problem, Step
 from . import motion
 from .impacts import Impacts
@@ -203,7 +203,7 @@ def _phase(
     return sampled, math.fsum(share * (inside[4] * inside[2])), math.fsum(share * inside[3])
 
 
-def _fractions(steps: Sequence[Step]) -> tuple[NDArray[np.intp], Array]:
+def _fractions(steps: Sequence[Step]) -> tuple[Indices, Array]:
     """Make uniform fractions of each step, and the end of the last step; returns their steps' numbers, too."""
     numbers = np.append(np.repeat(np.arange(len(steps)), SAMPLES_PER_STEP), len(steps) - 1)
     inner = np.tile(np.arange(SAMPLES_PER_STEP) / SAMPLES_PER_STEP, len(steps))
@@ -211,7 +211,7 @@ def _fractions(steps: Sequence[Step]) -> tuple[NDArray[np.intp], Array]:
     return numbers, ends[numbers] * np.append(inner, 1.0)
 
 
-def _fractions_at(steps: Sequence[Step], times: Array, time_row: int = 2) -> tuple[NDArray[np.intp], Array]:
+def _fractions_at(steps: Sequence[Step], times: Array, time_row: int = 2) -> tuple[Indices, Array]:
     """Compute where the interpolated time equals increasing times: the numbers of steps, and the fractions."""
     whole = Step.each(steps, np.arange(len(steps)))
     ends = whole.at(whole.end)[time_row]

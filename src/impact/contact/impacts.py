@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..array_types import Array
+from ..array_types import Array, Indices, Mask
 from .closed_forms.hysteresis import peak_indentation
 from .materials import effective_compliance, effective_mass, effective_radius
 from .model import ForceModel, Law
@@ -60,7 +60,7 @@ class Impacts:
     def __len__(self) -> int:
         return len(self.e)
 
-    def __getitem__(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> Impacts:
+    def __getitem__(self, chosen: Mask | Indices) -> Impacts:
         return self.changed(lambda name, array: array[chosen])
 
     def changed(self, change: Callable[[str, Array], Array]) -> Impacts:

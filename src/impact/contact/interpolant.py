@@ -15,9 +15,8 @@ from typing import Any
 
 import numpy as np
 from numpy.polynomial import chebyshev
-from numpy.typing import NDArray
 
-from ..array_types import Array, Mask
+from ..array_types import Array, Indices, Mask
 from ..errors import ModelError
 from ..ode.problem import Params
 from .model import ForceModel
@@ -218,7 +217,7 @@ class Interpolant:
         is_finite = np.isfinite(all_values)
         return all_x[is_finite], all_values[is_finite]
 
-    def _refined(self, old: list[Interval], numbers: NDArray[np.intp]) -> tuple[list[Interval], bool]:
+    def _refined(self, old: list[Interval], numbers: Indices) -> tuple[list[Interval], bool]:
         """Try intervals that are untried, and divide those that are not accurate; also whether any was."""
         intervals = old.copy()
         untried = [number for number in numbers.tolist() if intervals[number].values is None]

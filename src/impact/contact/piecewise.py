@@ -6,9 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..array_types import Array
+from ..array_types import Array, Mask
 from ..ode.problem import Event, Params, Problem, Solution, Step, Termination
 
 # the formula of the force changes where this changes its sign; NaN for no breakpoint
@@ -88,9 +87,7 @@ def _first_event(problem: Problem, breakpoints: Sequence[Breakpoint]) -> Event:
     return event
 
 
-def _reached(
-    problem: Problem, breakpoints: Sequence[Breakpoint], y: Array, k: Array, params: Params
-) -> NDArray[np.bool_]:
+def _reached(problem: Problem, breakpoints: Sequence[Breakpoint], y: Array, k: Array, params: Params) -> Mask:
     """Mask of the breakpoints at which trajectories have ended, shape (breakpoints, n)."""
     g, dg = problem.event(y, k, params)
     times = np.array([np.abs(distance / rate) for distance, rate in _distances(breakpoints, y, k, params)])

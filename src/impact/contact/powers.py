@@ -54,7 +54,7 @@ def _quarters(exponent: float) -> int | None:
     return int(4.0 * exponent) if is_reproducible(exponent) else None
 
 
-def is_reproducible(exponent: Array | float) -> NDArray[np.bool_]:
+def is_reproducible(exponent: Array | float) -> Mask:
     """Return whether `power` computes an exponent from products and square roots; elementwise."""
     quarters = np.multiply(exponent, 4.0)
     return np.asarray((quarters == np.rint(quarters)) & (np.abs(quarters) <= 64.0))

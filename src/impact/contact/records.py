@@ -12,16 +12,16 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from ..array_types import Array
+from ..array_types import Array, Indices, Mask
 from .status import Status, StatusWithMeaning
 
 # positions of trajectories; a slice for all of them, so that nothing is copied
-Positions = NDArray[np.intp] | slice
+Positions = Indices | slice
 # columns of integers; the others are floating-point numbers
 INTEGERS = {"steps": np.int32, "slip_changes": np.int32, "status": np.int8, "regime": np.int8}
 
 
-def positions(mask: NDArray[np.bool_]) -> Positions:
+def positions(mask: Mask) -> Positions:
     """Find the positions at which the mask is True."""
     return slice(None) if mask.all() else np.flatnonzero(mask)
 
@@ -65,7 +65,7 @@ class Record:
                 return f"{name}: got {got}, expected {expected}"
         return ""
 
-    def put(self, rows: Positions | NDArray[np.bool_], part: Self) -> None:
+    def put(self, rows: Positions | Mask, part: Self) -> None:
         for name in self.columns():
             getattr(self, name)[rows] = getattr(part, name)
 
@@ -109,9 +109,7 @@ class CollisionResult(Record):
     exact: Array
 
 
-def deduplicate(
-    columns: Sequence[NDArray[Any]], shape: tuple[int, ...]
-) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def deduplicate(columns: Sequence[NDArray[Any]], shape: tuple[int, ...]) -> tuple[Indices, Indices]:
     """Find the distinct rows of a table, whose columns broadcast to a shape; NaN equals NaN, and -0.0 equals 0.0.
 
     Returns the flat index of the first of each group of equal rows, shape (groups,), and the number of the group
@@ -129,6 +127,6 @@ def deduplicate(
     return first, group.reshape(-1)
 
 
-def _ranks(values: NDArray[Any]) -> NDArray[np.intp]:
+def _ranks(values: NDArray[Any]) -> Indices:
     """Compute the rank of each value among the distinct ones; equal values have equal ranks."""
     return np.unique(values, return_inverse=True)[1].reshape(values.shape)

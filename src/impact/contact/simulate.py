@@ -16,7 +16,7 @@ from typing import NamedTuple, NotRequired, TypedDict, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..array_types import Array, Mask
+from ..array_types import Array, Indices, Mask
 from ..errors import ModelError
 from ..ode.problem import Params, Problem, Solution, Termination
 from ..ode.rk45 import integrate
@@ -209,7 +209,7 @@ def distinct_problems(
     model: ForceModel,
     n: float,
     law_values: LawValues,
-    chosen: NDArray[np.bool_],
+    chosen: Mask,
     collapse: bool,
     columns: Params = (),
     *,
@@ -279,7 +279,7 @@ def collide_at_fixed_steps(
         times = np.full(count, LINEAR_CONTACT_TIME) if per_contact is None else step * per_contact
     result = replace(CollisionResult.blank(count), status=status)
 
-    def collide(rows: NDArray[np.intp]) -> None:
+    def collide(rows: Indices) -> None:
         # at least the contacts of one step
         limits = np.ceil(MAX_CONTACTS * np.maximum(times[rows] / step[rows], 1.0))
         limits = np.fmin(limits, max_steps).astype(np.int64)
@@ -331,7 +331,7 @@ def integrate_collisions(
     *,
     rtol: float,
     max_steps: int,
-    never_separates: NDArray[np.bool_] | bool = False,
+    never_separates: Mask | bool = False,
     core: str = "numpy",
     recorded: list[Phases] | None = None,
 ) -> CollisionResult:
@@ -410,7 +410,7 @@ def solve_phases(
     params: Params,
     n: int,
     solve: SolvePhase,
-    never_separates: NDArray[np.bool_] | bool,
+    never_separates: Mask | bool,
 ) -> Phases:
     """Solve approach and restitution of n impacts, see `integrate_collisions`."""
     back = motion.restitution_law(law)

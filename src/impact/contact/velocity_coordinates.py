@@ -17,9 +17,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..array_types import Array
+from ..array_types import Array, Mask
 from .formula_calls import call_by_name
 from .model import COORDINATE_COEFFICIENTS, ForceModel
 from .powers import integer_power, power
@@ -113,7 +112,7 @@ class ForceCoordinate(VelocityCoordinate):
         out[:] = rate_of_force(v, signed_power(y[0], self.spring - 1.0), self.spring / c, weight, force)
 
 
-def is_strong(model: ForceModel, values: Mapping[str, Array | float], count: int) -> NDArray[np.bool_]:
+def is_strong(model: ForceModel, values: Mapping[str, Array | float], count: int) -> Mask:
     """Find which impacts the coordinate of their law suits, by their own damping alone; shape (count,)."""
     kind = model.velocity_coordinate
     if kind not in STRONG_DAMPING:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..array_types import Array
+from ..array_types import Array, Indices
 from ..config.grid import Axis
 from ..config.input_names import InputName, is_foreign
 from ..contact.formula_calls import argument_names, call_by_name
@@ -24,7 +24,7 @@ from ..contact.simulate import PHASE, STEP, STEPS_PER_CONTACT
 from ..errors import ModelError
 
 # the indices of cells along each axis of the grid, in arrays that broadcast against each other
-Index = tuple[NDArray[np.intp], ...]
+Index = tuple[Indices, ...]
 
 
 def dimensions(index: Index) -> int:

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..array_types import Indices, Mask
 from ..contact.dimensionless import dimensionless_values, exponent_names
 from ..contact.friction import Pair, check_friction, friction_values
 from ..contact.frictions.multibody_codes import MUJOCO_ELLIPTIC
@@ -35,7 +36,7 @@ Columns = dict[str, NDArray[Any]]
 # what a trajectory is of: a model, or its pair with a friction law
 PlanLaw = ForceModel | Pair
 # a mask of the trajectories of a range that are reused from another result, and the results of these
-ReusedPart = tuple[NDArray[np.bool_], Record]
+ReusedPart = tuple[Mask, Record]
 
 
 @dataclass(frozen=True)
@@ -55,7 +56,7 @@ class TrajectoryMap:
     model: int
     axes: tuple[int, ...]
     shape: tuple[int, ...]
-    first: NDArray[np.intp] | None = None
+    first: Indices | None = None
     of_cell: NDArray[np.int32] | None = None
     record: type[Record] = CollisionResult
 
@@ -72,11 +73,11 @@ class TrajectoryMap:
         """Whether several cells may take one trajectory."""
         return self.of_cell is not None
 
-    def index_along(self, cells: NDArray[np.intp]) -> dict[int, NDArray[np.intp]]:
+    def index_along(self, cells: Indices) -> dict[int, Indices]:
         """Convert cells to indices along each axis on which the values of the law depend."""
         return dict(zip(self.axes, index_of(cells, self.shape), strict=True))
 
-    def rows(self, index: Index) -> NDArray[np.intp]:
+    def rows(self, index: Index) -> Indices:
         """Look up the trajectories of cells; of length 1 along axes on which they do not depend."""
         cell = np.zeros((1,) * dimensions(index), np.intp)
         for axis, size in zip(self.axes, self.shape, strict=True):
@@ -99,7 +100,7 @@ class TrajectoryRange:
         return self.stop - self.start
 
     @property
-    def rows(self) -> NDArray[np.intp]:
+    def rows(self) -> Indices:
         """The numbers of its trajectories among those of the model."""
         return np.arange(self.start, self.stop)
 

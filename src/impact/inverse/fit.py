@@ -19,11 +19,10 @@ from functools import cached_property, lru_cache, partial
 from typing import Literal, TypeAlias, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq, least_squares
 from scipy.stats import chi2, qmc, t
 
-from ..array_types import Array, Mask
+from ..array_types import Array, Indices, Mask
 from ..config.tables import Loss, Noise
 from .batched_solvers import Evaluate, VectorFunction, run_together
 
@@ -98,7 +97,7 @@ class DataPoints:
     sigma: Array
     noise: Noise
     # numbers from 0, shape (n,); None if each point has its own specimen
-    specimens: NDArray[np.intp] | None = None
+    specimens: Indices | None = None
     loss: Loss = "linear"
 
     def specimen_sums(self, values: Array) -> Array:
@@ -223,7 +222,7 @@ class FitProblem:
         return self.data.whiten(self.scale(self.predict(evaluate, u)), excess)
 
     def residuals_and_slopes(
-        self, evaluate: Evaluate, u: Array, free: NDArray[np.intp], excess: float
+        self, evaluate: Evaluate, u: Array, free: Indices, excess: float
     ) -> tuple[Array, Array]:
         """Compute the residuals, shape (n,), and their derivatives by the free ones of u, shape (n, len(free)).
 

@@ -25,7 +25,7 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy.optimize import elementwise, minimize_scalar
 
-from ..array_types import Array, Mask
+from ..array_types import Array, Indices, Mask
 from ..config.files import to_plain_data
 from ..config.input_names import InputName
 from ..config.load import Config
@@ -587,7 +587,7 @@ def _with_extrema(
     return scan, np.concatenate([(sign * refined.f_x)[is_found], values])[first]
 
 
-def _minima(values: Array, size: Array) -> NDArray[np.intp]:
+def _minima(values: Array, size: Array) -> Indices:
     """Find the positions of the interior minima of a scan; differences small relative to `size` are noise."""
     rises = np.stack([values[:-2], values[2:]]) - values[1:-1]
     return 1 + np.flatnonzero((rises.min(axis=0) >= 0.0) & (rises.max(axis=0) > SCAN_NOISE * size[1:-1]))

@@ -6,9 +6,8 @@ The formulas use only arithmetic, `choose` and `smaller`, so that they hold for 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..array_types import Array, Mask
+from ..array_types import Array, Indices, Mask
 from .problem import Params, Problem, Termination
 from .state import State, TrialStep, put_columns
 
@@ -81,9 +80,7 @@ def at_event(
     return located, crossed, choose(crossed, shorter, h_next)
 
 
-def locate_event(
-    problem: Problem, state: State, trial: TrialStep, accepted: Mask
-) -> tuple[NDArray[np.intp], Array]:
+def locate_event(problem: Problem, state: State, trial: TrialStep, accepted: Mask) -> tuple[Indices, Array]:
     """End trajectories at their event, and shorten the next step of those shortly before or beyond it.
 
     A step across the event is rejected and tried again with the length to the event, so that all steps up to the
@@ -110,7 +107,7 @@ def locate_event(
 
 
 def _step_to_event(
-    problem: Problem, state: State, trial: TrialStep, positions: NDArray[np.intp], offset: Array
+    problem: Problem, state: State, trial: TrialStep, positions: Indices, offset: Array
 ) -> tuple[Array, Array]:
     """Compute the rows at the event, by steps of order two and one, and the offset of the linear step."""
     params = tuple(column[positions] for column in state.params)

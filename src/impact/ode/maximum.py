@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..array_types import Array, Mask
+from ..array_types import Array, Indices, Mask
 from .events import choose
 from .problem import Params, Problem
 from .state import PeakCandidate, State, TrialStep
@@ -20,7 +19,7 @@ FLAT_SLOPE = 1e-10
 SECANT_STEPS = 2
 
 # (positions, rows, rates, lengths of the step) -> rows and rates at its end
-TakeStep = Callable[[NDArray[np.intp], Array, Array, Array], tuple[Array, Array]]
+TakeStep = Callable[[Indices, Array, Array, Array], tuple[Array, Array]]
 
 
 def begins_to_fall(value: Array, value_end: Array, best: Array) -> Mask:
@@ -34,9 +33,7 @@ def secant_update(left: Array, d_left: Array, right: Array | float, d_right: Arr
     return choose((root >= 0.0) & (root <= 1.0), root, right)
 
 
-def update_peaks(
-    problem: Problem, state: State, trial: TrialStep, accepted: Mask, ended: NDArray[np.intp]
-) -> None:
+def update_peaks(problem: Problem, state: State, trial: TrialStep, accepted: Mask, ended: Indices) -> None:
     """Update the candidates where the watched quantity begins to fall, or a trajectory ends, above `best`."""
     components, watched_row = problem.n_components, problem.n_integrated
     value, value_end = state.k[watched_row], trial.k[watched_row]

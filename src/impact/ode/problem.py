@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ..array_types import Array, Mask
+from ..array_types import Array, Indices, Mask
 from .tableau import DENSE_WEIGHTS
 
 Params = tuple[Array, ...]
@@ -51,7 +51,7 @@ class Switch(Protocol):
         """Compute the rates of the margins that `margins` leaves out; NaN where that is not possible."""
         ...
 
-    def change(self, which: NDArray[np.intp], y: Array, k: Array, params: Params, /) -> tuple[Array, Params]:
+    def change(self, which: Indices, y: Array, k: Array, params: Params, /) -> tuple[Array, Params]:
         """Change the modes of trajectories, by the number of the margin that vanished: new rows and params."""
         ...
 
@@ -115,7 +115,7 @@ class Step:
         return cls(start[:, :1].copy(), length[:1], rows, np.ones(1), params)
 
     @classmethod
-    def each(cls, steps: Sequence[Step], numbers: NDArray[np.intp]) -> Step:
+    def each(cls, steps: Sequence[Step], numbers: Indices) -> Step:
         """Choose steps of a single trajectory by their numbers (n,), to interpolate them at once."""
         start, length, stages, end = (
             np.concatenate([getattr(step, name) for step in steps], axis=-1)[..., numbers]

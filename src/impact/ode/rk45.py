@@ -15,7 +15,7 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from ..array_types import Array
+from ..array_types import Array, Indices
 from .events import choose, locate_event
 from .maximum import refine_maximum, update_peaks
 from .problem import Params, Problem, Solution, Step, Termination
@@ -92,7 +92,7 @@ def integrate(
                 break
         if problem.watch:
 
-            def take_step(positions: NDArray[np.intp], y: Array, k: Array, h: Array) -> tuple[Array, Array]:
+            def take_step(positions: Indices, y: Array, k: Array, h: Array) -> tuple[Array, Array]:
                 step_params = tuple(column[positions] for column in params)
                 y_end, stages = rk_step(problem, y, k, h, step_params, workspace.narrow(positions.size))
                 return y_end, stages[-1]

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..array_types import Array, Mask
+from ..array_types import Array, Indices, Mask
 from .problem import Margins, Params, Problem, Solution, Termination
 
 RUNNING, EVENT_REACHED = int(Termination.RUNNING), int(Termination.EVENT_REACHED)
@@ -24,7 +24,7 @@ class PeakCandidate:
     behind: Array
     ahead: Array
 
-    def put(self, positions: NDArray[np.intp], y: Array, behind: Array, ahead: Array | float) -> None:
+    def put(self, positions: Indices, y: Array, behind: Array, ahead: Array | float) -> None:
         """Replace the candidates at the given positions."""
         put_columns(self.y, positions, y)
         self.behind[positions], self.ahead[positions] = behind, ahead
@@ -54,7 +54,7 @@ class Workspace:
         return Workspace(stages, y_end, part)
 
 
-def put_columns(rows: Array, positions: NDArray[np.intp], values: Array) -> None:
+def put_columns(rows: Array, positions: Indices, values: Array) -> None:
     """Replace columns of the rows; row by row, which is many times faster than by both indices."""
     for row, new in zip(rows, values, strict=True):
         row[positions] = new
@@ -70,7 +70,7 @@ class State:
     next step before a margin shortened it.
     """
 
-    index: NDArray[np.intp]
+    index: Indices
     params: Params
     y: Array
     k: Array

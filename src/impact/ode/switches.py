@@ -8,9 +8,8 @@ second order in the solution where the rates are continuous, and of first order 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..array_types import Array, Mask
+from ..array_types import Array, Indices, Mask
 from .events import event_offset, is_event_ahead, step_of_order_two
 from .problem import Problem, Switch, Termination
 from .state import RUNNING, State, TrialStep, put_columns
@@ -64,10 +63,10 @@ def _locate(
     switch: Switch,
     state: State,
     trial: TrialStep,
-    positions: NDArray[np.intp],
+    positions: Indices,
     all_margins: Array,
     all_rates: Array,
-) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
+) -> tuple[Indices, Indices, Array]:
     """Shorten steps to zeros of margins; returns where a zero is reached, of which margin, and its offset."""
     margins, before = all_margins.take(positions, 1), state.margins[0].take(positions, 1)
     h, h_next = state.h[positions], trial.h_next[positions]
@@ -106,7 +105,7 @@ def _locate(
 
 def _first_zero(
     g: Array, dg: Array, g_before: Array, dg_before: Array, h: Array, unknown: Mask, is_again: Mask
-) -> tuple[NDArray[np.intp], Array, Mask]:
+) -> tuple[Indices, Array, Mask]:
     """Find the margin that vanishes first, the offset from the end of the step, and if it is that of a cubic.
 
     The arrays have the shape (margins, n), `h` and `is_again`, whether the step was shortened before, have (n,).
@@ -140,7 +139,7 @@ def _low_minimum(g: Array, dg: Array, g_before: Array, dg_before: Array, h: Arra
 
 
 def _shorten(
-    state: State, trial: TrialStep, positions: NDArray[np.intp], offset: Array, crossed: Mask, is_shorter: Mask
+    state: State, trial: TrialStep, positions: Indices, offset: Array, crossed: Mask, is_shorter: Mask
 ) -> None:
     """Give steps the length to a zero; the present one is tried again where it crossed the zero."""
     h_next = trial.h_next[positions]
@@ -159,8 +158,8 @@ def _change_modes(
     switch: Switch,
     state: State,
     trial: TrialStep,
-    positions: NDArray[np.intp],
-    which: NDArray[np.intp],
+    positions: Indices,
+    which: Indices,
     offset: Array,
 ) -> None:
     """Change the modes of trajectories next to the ends of their steps.
