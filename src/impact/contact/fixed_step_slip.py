@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..array_types import Array, Mask
+from ..array_types import Array, Flags, Mask
 from .powers import power
 from .slip_motion import SLIDES, STICKS, TangentialForm
 
@@ -59,7 +59,7 @@ class FixedStepSlip:
     memory: Array
     last_power: Array
     impulse: Array
-    regime: NDArray[np.int8]
+    regime: Flags
     slipped: Mask
     changes: NDArray[np.int32]
 

@@ -14,9 +14,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..array_types import Array, Mask
+from ..array_types import Array, Flags, Mask
 from ..errors import ModelError
 from ..formatting import law_name, number
 from . import fixed_step_slip
@@ -181,7 +180,7 @@ def friction_values(pair: Pair, oblique: ObliqueImpacts) -> dict[str, Array]:
     return values
 
 
-def check_friction(pair: Pair, oblique: ObliqueImpacts) -> NDArray[np.int8]:
+def check_friction(pair: Pair, oblique: ObliqueImpacts) -> Flags:
     """Check what a pair and the inputs of friction need; the normal motion is checked by `check_inputs`.
 
     Returns the status before integration, of a shape that broadcasts to that of the impacts: NOT_COMBINABLE for

@@ -11,9 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..array_types import Array, Indices
+from ..array_types import Array, Flags, Indices
 from ..ode.problem import Params, Problem, Step
 from . import motion
 from .impacts import Impacts
@@ -58,7 +57,7 @@ class History:
     e_energetic: float
     slip: Array | None = None
     f: Array | None = None
-    mode: NDArray[np.int8] | None = None
+    mode: Flags | None = None
 
 
 def history_of(

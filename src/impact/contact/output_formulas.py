@@ -8,7 +8,7 @@ from typing import Any, Unpack
 import numpy as np
 from numpy.typing import NDArray
 
-from ..array_types import Array, Mask
+from ..array_types import Array, Flags, Mask
 from .dimensionless import dimensionless_values
 from .fixed_step import MUJOCO_CONE
 from .formula_calls import argument_names
@@ -35,7 +35,7 @@ def outputs(
     impacts: Impacts,
     result: CollisionResult,
     names: Iterable[str],
-    checked: NDArray[np.int8] | None = None,
+    checked: Flags | None = None,
     friction: Friction | None = None,
 ) -> Outputs:
     """Compute outputs of collisions by name; only what they need is computed.
@@ -125,7 +125,7 @@ def _energetic(result: CollisionResult, undefined: Mask) -> Array:
     return replace_where(replace_where(e, result.status == LIMIT, 0.0), undefined, np.nan)
 
 
-def _in_domain(law: Law, impacts: Impacts, damping_ratio: Array) -> NDArray[np.int8]:
+def _in_domain(law: Law, impacts: Impacts, damping_ratio: Array) -> Flags:
     inside = np.ones((1,) * max(1, len(impacts.shape)), bool)
     for name, (low, high) in law.domain.items():
         value = damping_ratio if name == "chi" else impacts.quantity(name)
@@ -175,10 +175,10 @@ def _contact_regime(
     oblique: ObliqueImpacts,
     tangential: TangentialResult,
     kind: str,
-    friction_status: NDArray[np.int8],
+    friction_status: Flags,
     missed: Mask,
     without_slip: Mask,
-) -> NDArray[np.int8]:
+) -> Flags:
     """Whether the contact sticks (1), slides (2) or does both (3); 0 where that is not defined."""
     regime = tangential.regime
     if kind == "coulomb":

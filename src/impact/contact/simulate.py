@@ -14,9 +14,8 @@ from functools import partial
 from typing import NamedTuple, NotRequired, TypedDict, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..array_types import Array, Indices, Mask
+from ..array_types import Array, Flags, Indices, Mask
 from ..errors import ModelError
 from ..ode.problem import Params, Problem, Solution, Termination
 from ..ode.rk45 import integrate
@@ -73,7 +72,7 @@ def simulate(
     model: ForceModel,
     n: Array,
     values: ValueArrays,
-    status: NDArray[np.int8],
+    status: Flags,
     *,
     rtol: float,
     max_steps: int,
@@ -112,7 +111,7 @@ def simulate_parts(
     key: str,
     n: Array,
     values: ValueArrays,
-    status: NDArray[np.int8],
+    status: Flags,
     simulate_part: SimulatePart[T],
     collapse: bool,
     errors: dict[str, str] | None,
@@ -259,7 +258,7 @@ def collide_at_fixed_steps(
         if name not in (STEPS_PER_CONTACT, STEP, PHASE) and not name.startswith(PREFIX)
     }
 
-    def contact_times(rows: Positions, size: int) -> tuple[Array, NDArray[np.int8]]:
+    def contact_times(rows: Positions, size: int) -> tuple[Array, Flags]:
         """Compute the contact times of the continuous law, and statuses that are OK where there is one."""
         continuous = _simulate_distinct(
             model, n, _values_at(of_law, rows), size, compute=compute, collapse=collapse
@@ -309,7 +308,7 @@ def collide_at_fixed_steps(
     return replace(result, chi=chi_of(law_values, count), exact=exact_restitution(model, law_values, count))
 
 
-def check_coefficients(model: ForceModel, law_values: LawValues, count: int) -> NDArray[np.int8]:
+def check_coefficients(model: ForceModel, law_values: LawValues, count: int) -> Flags:
     """Compute the status of impacts by the coefficients of their law, before integration; shape (count,)."""
     status = np.full(count, Status.OK, np.int8)
     coefficients = np.array([law_values[name] for name in model.coefficients]).reshape(-1, count)
@@ -396,7 +395,7 @@ class Phases(NamedTuple):
     force_at_peak: Array
     residual: Array
     e_out: Array
-    status: NDArray[np.int8]
+    status: Flags
 
 
 # the impacts that enter the restitution phase, and their permanent indentation

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..array_types import Array, Mask
+from ..array_types import Array, Flags, Mask
 from ..ode.problem import Params, Problem, Solution, Step
 from ..ode.rk45 import integrate
 from . import motion, simulate
@@ -70,12 +70,12 @@ class TangentialResult(Record):
     damping_work: Array
     memory_work: Array
     elastic_left: Array
-    regime: NDArray[np.int8]
+    regime: Flags
     slip_changes: NDArray[np.int32]
     exact: Array
     stiffness: Array
     steps: NDArray[np.int32]
-    status: NDArray[np.int8]
+    status: Flags
 
 
 class RecordedSlip(NamedTuple):
@@ -89,7 +89,7 @@ def simulate_friction(
     pair: Pair,
     n: Array,
     values: simulate.ValueArrays,
-    status: NDArray[np.int8],
+    status: Flags,
     *,
     rtol: float,
     max_steps: int,

@@ -12,10 +12,9 @@ from pathlib import Path
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from ..arguments import require_counts
-from ..array_types import Array
+from ..array_types import Array, Flags
 from ..atomic import check_outputs, check_result_name, write_file
 from ..config.files import override_text
 from ..config.input_names import InputName
@@ -402,7 +401,7 @@ def _calibration_dataset(config: Config, plugins: Plugins, fits: Mapping[str, Fi
         identifiable[row, columns] = fit.identifiable
         groups.append("; ".join(determined_groups(config, model_of(law), names, fit)))
     weights = akaike_weights({key: fit.aicc for key, fit in fits.items()})
-    values: dict[str, Array | NDArray[np.int8]] = {
+    values: dict[str, Array | Flags] = {
         **arrays,
         "covariance": covariance,
         "identifiable": identifiable,
