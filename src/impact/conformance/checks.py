@@ -6,89 +6,92 @@ prime marks the answer. docs/conform.md states the formula of each check.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
 import numpy as np
 
+from ..array_types import Array
 from ..results.board import CHECKS
 from .suite import ANSWER_KEYS, RELATIONS, Question, Trial, transform
 
 Answer = Mapping[str, float]
-# reads a velocity or spin, before or after the impact
-Read = Callable[[str], float]
 Kind = Literal["impulse", "compliant"]
 # what is asked for, and what was delivered
 Delivered = tuple[float, float]
+MOTION = ("v", "u", "omega")
 
 
 @dataclass(frozen=True)
 class Rebound:
-    """A collision and its answer; a wall has no mass, spin or velocity of its own.
+    """A collision and its answer; arrays have a value for each ball, and none for a wall.
 
     Parameters
     ----------
     trial : the collision
     answer : the velocities and spins after the impact, those of ball 2 only if it is no wall
+    m, R, inertia : of the balls, shape (balls,)
+    before, after : their velocities and spins, shape (3, balls)
     """
 
     trial: Trial
     answer: Answer
+    m: Array
+    R: Array
+    inertia: Array
+    before: Array
+    after: Array
 
-    def before(self, name: str) -> float:
-        """Return a number of the question; that of a wall is 0."""
-        value = self.trial.question[name]
-        return 0.0 if value is None else float(value)
+    @classmethod
+    def of(cls, trial: Trial, answer: Answer) -> Rebound:
+        """Collect what a collision and its answer say of each ball."""
+        bodies = of_balls(("m", "R", "inertia"), trial.question, trial)
+        motions = (of_balls(MOTION, values, trial) for values in (trial.question, answer))
+        return cls(trial, answer, *bodies, *motions)
 
-    def after(self, name: str) -> float:
-        """Return a velocity or spin after the impact; that of a wall is 0."""
-        return self.answer.get(name, 0.0)
+    def number(self, name: str) -> float:
+        """Return a number of the question that is not of a ball."""
+        return float(self.trial.question[name] or 0.0)
 
     @property
-    def balls(self) -> str:
-        return balls_of(self.trial.question)
+    def sides(self) -> Array:
+        """1 of ball 1 and -1 of ball 2."""
+        return np.array([1.0, -1.0])[: self.m.size]
 
     @cached_property
-    def m(self) -> float:
+    def m_n(self) -> float:
         """Effective mass [kg]."""
-        return 1.0 / sum(1.0 / self.before(f"m{ball}") for ball in self.balls)
+        return 1.0 / float(sum(1.0 / self.m))
 
     @cached_property
     def m_t(self) -> float:
         """Effective tangential mass [kg]."""
-        turning = sum(self.before(f"R{ball}") ** 2 / self.before(f"inertia{ball}") for ball in self.balls)
-        return 1.0 / (1.0 / self.m + turning)
+        return float(1.0 / (1.0 / self.m_n + sum(self.R**2 / self.inertia)))
 
     @property
     def v0(self) -> float:
         """Closing speed [m/s]."""
-        return self.before("v1") - self.before("v2")
+        return -separation(self.before[0])
 
     @property
     def separation(self) -> float:
         """Speed of separation [m/s]."""
-        return self.after("v2") - self.after("v1")
+        return separation(self.after[0])
 
-    def slip(self, read: Read) -> float:
+    def slip(self, motion: Array) -> float:
         """Compute the slip of the contact points [m/s], before or after the impact."""
-        rims = sum(self.before(f"R{ball}") * read(f"omega{ball}") for ball in self.balls)
-        return read("u1") - read("u2") + rims
+        return float(sum(self.R * motion[2])) - separation(motion[1])
 
     @property
     def g0(self) -> float:
         return self.slip(self.before)
 
     @property
-    def normal_impulse(self) -> float:
-        return self.before("m1") * (self.before("v1") - self.after("v1"))
-
-    def tangential_impulse(self, ball: str = "1") -> float:
-        """Return the impulse of friction [N s] against g > 0, from the motion of a ball."""
-        change = self.before(f"m{ball}") * (self.before(f"u{ball}") - self.after(f"u{ball}"))
-        return change if ball == "1" else -change
+    def impulses(self) -> Array:
+        """The impulses on ball 1 along the normal and the tangent [N s], from the motion of each ball."""
+        return self.sides * self.m * (self.before - self.after)[:2]
 
     @cached_property
     def speed(self) -> float:
@@ -96,16 +99,8 @@ class Rebound:
 
         Where nothing moves it is a thousandth of R1 per contact time.
         """
-        largest = max(abs(self.before(name)) for name in ("v1", "v2", "u1", "u2"))
-        return self.v0 + abs(self.g0) or largest or 1e-3 * self.before("R1") / self.before("contact_time")
-
-    def total(self, read: Read, part: Callable[[Read, str], float]) -> float:
-        """Sum a part of the balls, before or after the impact."""
-        return sum(part(read, ball) for ball in self.balls)
-
-    def change(self, part: Callable[[Read, str], float]) -> float:
-        """Sum a part of the balls after the impact less that before."""
-        return self.total(self.after, part) - self.total(self.before, part)
+        largest = np.abs(self.before[:2]).max()
+        return self.v0 + abs(self.g0) or largest or 1e-3 * self.R[0] / self.number("contact_time")
 
 
 def balls_of(question: Question) -> str:
@@ -113,23 +108,28 @@ def balls_of(question: Question) -> str:
     return "1" if question["m2"] is None else "12"
 
 
+def of_balls(names: Sequence[str], values: Mapping[str, object], trial: Trial) -> Array:
+    """Collect quantities of the balls of a collision, shape (names, balls)."""
+    balls = balls_of(trial.question)
+    return np.array([[values[f"{name}{ball}"] for ball in balls] for name in names], float)
+
+
+def separation(velocities: Array) -> float:
+    """Subtract the velocity of ball 1 from that of ball 2; that of a wall is 0."""
+    first, second = np.append(velocities, 0.0)[:2]
+    return float(second - first)
+
+
 def finite(rebound: Rebound) -> Delivered:
     """Count the numbers of the answer that are finite."""
-    values = [rebound.after(f"{name}{ball}") for name in ("v", "u", "omega") for ball in rebound.balls]
-    return float(len(values)), float(sum(map(math.isfinite, values)))
+    return float(rebound.after.size), float(np.isfinite(rebound.after).sum())
 
 
 def momentum(rebound: Rebound) -> Delivered:
     """Give the larger change of the momenta along n and t, relative to the sum of m (|v| + |u|) before."""
-
-    def size(read: Read, ball: str) -> float:
-        return rebound.before(f"m{ball}") * (abs(read(f"v{ball}")) + abs(read(f"u{ball}")))
-
-    def change(name: str) -> float:
-        return abs(rebound.change(lambda read, ball: rebound.before(f"m{ball}") * read(f"{name}{ball}")))
-
-    scale = rebound.total(rebound.before, size) or rebound.m * rebound.speed
-    return 0.0, float(np.max([change("v"), change("u")])) / scale
+    momenta, changed = (np.sum(rebound.m * motion[:2], axis=1) for motion in (rebound.before, rebound.after))
+    scale = sum(rebound.m * np.abs(rebound.before[:2]).sum(axis=0)) or rebound.m_n * rebound.speed
+    return 0.0, np.abs(changed - momenta).max() / scale
 
 
 def angular_momentum(rebound: Rebound) -> Delivered:
@@ -137,31 +137,22 @@ def angular_momentum(rebound: Rebound) -> Delivered:
 
     L = I1 omega1 - m1 R1 u1 + I2 omega2 + m2 R2 u2; the scale is the sum of I |omega| + m R (|v| + |u|).
     """
-
-    def part(read: Read, ball: str) -> float:
-        lever = rebound.before(f"R{ball}") * (-1.0 if ball == "1" else 1.0)
-        spinning = rebound.before(f"inertia{ball}") * read(f"omega{ball}")
-        return spinning + rebound.before(f"m{ball}") * lever * read(f"u{ball}")
-
-    def size(read: Read, ball: str) -> float:
-        moving = rebound.before(f"m{ball}") * (abs(read(f"v{ball}")) + abs(read(f"u{ball}")))
-        spinning = rebound.before(f"inertia{ball}") * abs(read(f"omega{ball}"))
-        return spinning + rebound.before(f"R{ball}") * moving
-
-    scale = rebound.total(rebound.before, size) or rebound.before("R1") * rebound.m * rebound.speed
-    return 0.0, abs(rebound.change(part)) / scale
+    m, R, inertia, (v, u, omega) = rebound.m, rebound.R, rebound.inertia, np.abs(rebound.before)
+    before, after = (
+        sum(inertia * motion[2] - rebound.m * (rebound.sides * R) * motion[1])
+        for motion in (rebound.before, rebound.after)
+    )
+    scale = sum(inertia * omega + R * (m * (v + u))) or R[0] * rebound.m_n * rebound.speed
+    return 0.0, abs(after - before) / scale
 
 
 def energy(rebound: Rebound) -> Delivered:
     """Give the kinetic energy after the impact over that before."""
-
-    def part(read: Read, ball: str) -> float:
-        # a power of a large number would raise
-        v, u, omega = (read(f"{name}{ball}") for name in ("v", "u", "omega"))
-        return rebound.before(f"m{ball}") * (v * v + u * u) + rebound.before(f"inertia{ball}") * (omega * omega)
-
-    scale = rebound.total(rebound.before, part) or rebound.m * rebound.speed * rebound.speed
-    return 1.0, 1.0 + rebound.change(part) / scale
+    before, after = (
+        sum(rebound.m * (v * v + u * u) + rebound.inertia * (omega * omega))
+        for v, u, omega in (rebound.before, rebound.after)
+    )
+    return 1.0, 1.0 + (after - before) / (before or rebound.m_n * rebound.speed * rebound.speed)
 
 
 def separates(rebound: Rebound) -> Delivered:
@@ -173,23 +164,24 @@ def restitution(rebound: Rebound) -> Delivered:
     """Give e and the speed of separation over the closing speed; balls at rest relative to each other stay so."""
     if rebound.v0 == 0.0:
         return 0.0, rebound.separation / rebound.speed
-    return rebound.before("e"), rebound.separation / rebound.v0
+    return rebound.number("e"), rebound.separation / rebound.v0
 
 
 def friction(rebound: Rebound, beta: float | None = None) -> Delivered:
     """Give beta = -g1/g0; asked for is `beta`, or that of rigid balls with the delivered normal impulse."""
     g0 = rebound.g0
     if beta is None:
-        bound = rebound.before("mu") * max(rebound.normal_impulse, 0.0)
+        bound = rebound.number("mu") * max(rebound.impulses[0, 0], 0.0)
         beta = min(bound / (rebound.m_t * abs(g0)), 1.0) - 1.0
     return beta, -rebound.slip(rebound.after) / g0
 
 
 def friction_bound(rebound: Rebound) -> Delivered:
     """Give |P|/(mu P_n), which is at most 1; |P| over m (v0 + |g0|) where the bound is 0."""
-    impulse, bound = abs(rebound.tangential_impulse()), rebound.before("mu") * rebound.normal_impulse
+    normal, tangential = rebound.impulses[:, 0]
+    impulse, bound = abs(tangential), rebound.number("mu") * normal
     if bound <= 0.0:
-        return 0.0, impulse / (rebound.m * rebound.speed)
+        return 0.0, impulse / (rebound.m_n * rebound.speed)
     return 1.0, impulse / bound
 
 
@@ -198,13 +190,8 @@ def spin(rebound: Rebound) -> Delivered:
 
     P is that of the same ball; the ball with the larger difference counts.
     """
-
-    def difference(ball: str) -> float:
-        change = rebound.after(f"omega{ball}") - rebound.before(f"omega{ball}")
-        impulse = rebound.before(f"inertia{ball}") * change / rebound.before(f"R{ball}")
-        return abs(impulse + rebound.tangential_impulse(ball))
-
-    return 0.0, float(np.max([*map(difference, rebound.balls)])) / (rebound.m * rebound.speed)
+    changes = rebound.inertia * (rebound.after[2] - rebound.before[2]) / rebound.R
+    return 0.0, np.abs(changes + rebound.impulses[1]).max() / (rebound.m_n * rebound.speed)
 
 
 def related(rebound: Rebound, base: Rebound) -> Delivered:
@@ -212,13 +199,10 @@ def related(rebound: Rebound, base: Rebound) -> Delivered:
 
     It is the largest difference of velocities and R omega, over v0 + |g0|.
     """
-    expected: dict[str, float] = transform(rebound.trial.relation, rebound.trial.change, base.answer)
-
-    def difference(name: str) -> float:
-        length = rebound.before(f"R{name[-1]}") if name.startswith("omega") else 1.0
-        return length * abs(rebound.answer[name] - expected[name])
-
-    return 0.0, float(np.max([*map(difference, rebound.answer)])) / rebound.speed
+    expected = transform(rebound.trial.relation, rebound.trial.change, base.answer)
+    differences = np.abs(rebound.after - of_balls(MOTION, expected, rebound.trial))
+    differences[2] *= rebound.R
+    return 0.0, differences.max() / rebound.speed
 
 
 def repeat(rebound: Rebound, again: Answer) -> Delivered:
@@ -265,9 +249,9 @@ def tolerances(kind: Kind, *, float32: bool, tol: Mapping[str, float]) -> dict[s
 
 def checks_of(trial: Trial) -> list[str]:
     """List the checks that a collision has, in the order of a board."""
-    rebound = Rebound(trial, dict.fromkeys(ANSWER_KEYS, 0.0))
+    rebound = Rebound.of(trial, dict.fromkeys(ANSWER_KEYS, 0.0))
     without = {str(name) for name in RELATIONS if name != trial.relation}
-    if rebound.balls == "1":
+    if rebound.m.size == 1:
         without.add("momentum")
     if rebound.g0 == 0.0 or rebound.v0 == 0.0:
         # beta is not defined

@@ -9,6 +9,8 @@ from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+import numpy as np
+
 from ..atomic import check_outputs
 from ..contact.models import catalogue
 from ..errors import UsageError, did_you_mean, require_known
@@ -145,6 +147,7 @@ def _ask_all(
     return facts, answers, again
 
 
+@np.errstate(all="ignore")
 def _judge(
     facts: Facts,
     checked: Sequence[tuple[Trial, str]],
@@ -161,7 +164,7 @@ def _judge(
     rows = []
     for trial, name in checked:
         chain = trial.chain[: checks.CHAIN_LENGTHS.get(name, 1)]
-        rebounds = [checks.Rebound(link, answer) for link in chain if (answer := answers[link.id]) is not None]
+        rebounds = [checks.Rebound.of(link, answer) for link in chain if (answer := answers[link.id]) is not None]
         further = {"repeat": (again[trial.id] or {},), "friction": (betas.get(trial.id),)}.get(name, ())
         if len(rebounds) == len(chain):
             asked, delivered = checks.CHECK_OF[name](*rebounds, *further)
@@ -170,7 +173,7 @@ def _judge(
         else:
             word, delivered = "not_supported", float("nan")
             # what is asked for is independent of the answer, but for friction
-            silent = checks.Rebound(trial, dict.fromkeys(ANSWER_KEYS, delivered))
+            silent = checks.Rebound.of(trial, dict.fromkeys(ANSWER_KEYS, delivered))
             asked = delivered if name in checks.CHAIN_LENGTHS else checks.CHECK_OF[name](silent)[0]
         rows.append((asked, delivered, tolerance[name], CHECK_STATUSES[word]))
     return EngineChecks(facts.engine, facts.version, facts.kind, *zip(*rows, strict=True))
