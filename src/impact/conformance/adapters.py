@@ -24,7 +24,7 @@ from typing import IO, Any, SupportsFloat
 from ..contact.frictions import frictions
 from ..contact.models import catalogue
 from ..errors import UsageError, did_you_mean
-from ..exporters.programs import MAX_OUTPUT_BYTES, POLL_INTERVAL_S, WITHOUT_DAEMON, end_of, find_program, kill
+from ..exporters.programs import MAX_OUTPUT_BYTES, POLL_INTERVAL_S, end_of, find_program, kill, start
 from ..formatting import argument, number, safe_text
 from .checks import KIND_TOLERANCES, Answer, Kind, balls_of
 from .suite import Question
@@ -89,16 +89,7 @@ def open_adapter(adapter: object, timeout_s: float, folder: str | None = None) -
     words = _command(adapter)
     with tempfile.TemporaryFile() as errors:
         try:
-            process = subprocess.Popen(
-                words,
-                bufsize=0,
-                cwd=folder,
-                env=os.environ | WITHOUT_DAEMON,
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=errors,
-                start_new_session=True,
-            )
+            process = start(words, folder, bufsize=0, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=errors)
         except OSError as error:
             raise AdapterError(f"{words[0]}: {error.strerror}") from None
         with process:

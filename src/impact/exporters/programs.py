@@ -15,7 +15,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 from ..formatting import number
 
@@ -108,15 +108,7 @@ def run_program(command: Sequence[str], folder: str, timeout_s: float) -> subpro
     """Run a command without input, and return the end of its output, which goes through files to save memory."""
     deadline = time.monotonic() + timeout_s
     with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
-        process = subprocess.Popen(
-            command,
-            cwd=folder,
-            env=os.environ | WITHOUT_DAEMON,
-            stdin=subprocess.DEVNULL,
-            stdout=out,
-            stderr=err,
-            start_new_session=True,
-        )
+        process = start(command, folder, stdin=subprocess.DEVNULL, stdout=out, stderr=err)
         try:
             while process.poll() is None:
                 if time.monotonic() > deadline:
@@ -129,6 +121,12 @@ def run_program(command: Sequence[str], folder: str, timeout_s: float) -> subpro
             kill(process)
             raise
         return subprocess.CompletedProcess(command, process.returncode, end_of(out), end_of(err))
+
+
+def start(command: Sequence[str], folder: str | None, **streams: Any) -> subprocess.Popen[bytes]:
+    """Start a command in a session of its own, so that `kill` also reaches what it starts."""
+    env = os.environ | WITHOUT_DAEMON
+    return subprocess.Popen(command, cwd=folder, env=env, start_new_session=True, **streams)
 
 
 def kill(process: subprocess.Popen[bytes]) -> None:
