@@ -116,24 +116,18 @@ def viscoelastic(exponent: float) -> MakeLaw:
     )
 
 
-NOTE_WITHOUT_ROOT = (
-    "where e = 0.5 is asked for LAMMPS itself delivers 0.616 with hertz, 0.581 with hooke, by default"
-)
-NOTE_WITH_ROOT = (
-    "the source credits the polynomial to Marshall (2009), equation 53; the factor √2 is of pull request 5113, "
-    "and the first release with it was not seen"
-)
 LOGARITHM = "−ln e/√(π² + ln² e)"
 WITH_ROOT: dict[str, Any] = {
     "since": "sources of July 2026",
     "year": 2026,
     "source": DAMPING_SOURCE,
-    "note": NOTE_WITH_ROOT,
+    "note": "the source credits the polynomial to Marshall (2009), equation 53; the factor √2 is of pull request "
+    "5113, and the first release with it was not seen",
 }
 WITHOUT_ROOT: dict[str, Any] = {
     "since": "releases from March 2019 to mid-2026",
     "source": DAMPING_SOURCE_2024,
-    "note": NOTE_WITHOUT_ROOT,
+    "note": "where e = 0.5 is asked for LAMMPS itself delivers 0.616 with hertz, 0.581 with hooke, by default",
 }
 COEFF_RESTITUTION: dict[str, Any] = {"since": "since June 2024", "year": 2024, "source": DAMPING_SOURCE}
 
