@@ -27,7 +27,7 @@ from ..results.schema import DEFAULT_RTOL_FACTOR, MODEL_METADATA, SCHEMA, SCHEMA
 from ..results.xarray_backend import load
 from .align import Alignment, align_boards, align_calibrations, align_sweeps, changed_config, unknown_variables
 from .values import compare_values, group_size, representative_regions
-from .verdict import Difference, Verdict
+from .verdict import DIFFERENCE_KINDS, Difference, Verdict
 
 # those that a caller passes; the name "all" is that of the variables that have none of their own
 Tolerances = Mapping[str, SupportsFloat | str]
@@ -132,7 +132,7 @@ def compare(
     return Verdict(
         new=names[0],
         baseline=names[1],
-        faults=tuple(faults),
+        faults=tuple(sorted(faults, key=lambda fault: DIFFERENCE_KINDS.index(fault.kind))),
         variables=tuple(comparison for comparison, _ in compared.values()),
         notes=tuple(notes),
         repeats=repeats,

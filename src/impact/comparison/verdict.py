@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal, get_args
 
@@ -45,11 +45,6 @@ class Difference:
     kind: DifferenceKind
     name: str
     text: str
-
-
-def by_kind(faults: Iterable[Difference]) -> list[Difference]:
-    """Sort differences by their kinds, those that explain others first."""
-    return sorted(faults, key=lambda fault: DIFFERENCE_KINDS.index(fault.kind))
 
 
 @dataclass(frozen=True)
@@ -133,7 +128,7 @@ class Verdict(Displayed):
     Parameters
     ----------
     new, baseline : names of the files
-    faults : differences other than values
+    faults : differences other than values, by their kinds, those that explain others first
     variables : the comparisons of the common variables
     notes : differences that do not affect equality
     repeats : the first words of a command that runs one of the points again; empty if there is none
@@ -198,7 +193,7 @@ class Verdict(Displayed):
     @property
     def lines(self) -> tuple[str, ...]:
         """The differences, a line each; after a variable the command that runs its worst point again."""
-        lines = [f"{fault.kind}: {fault.text}" for fault in by_kind(self.faults)]
+        lines = [f"{fault.kind}: {fault.text}" for fault in self.faults]
         for variable in self.differing:
             command = f"  {self.replay(variable)}"
             # several variables are often worst at one point
@@ -227,7 +222,7 @@ class Verdict(Displayed):
             "headline": self.headline,
             "new": safe_text(self.new),
             "baseline": safe_text(self.baseline),
-            "faults": [{"kind": fault.kind, "text": fault.text} for fault in by_kind(self.faults)],
+            "faults": [{"kind": fault.kind, "text": fault.text} for fault in self.faults],
             "variables": [
                 {
                     **{"times" if name == "ratio" else name: value for name, value in vars(variable).items()},
@@ -332,7 +327,7 @@ def as_markdown(outcome: Verdict) -> str:
     lines = [f"### {sign} {PROGRAM}: {_escape_markdown(outcome.headline)}", ""]
     lines += [f"`{new}` against the baseline `{baseline}`", ""]
     if outcome.faults:
-        lines += [*(f"- {_escape_markdown(fault.text)}" for fault in by_kind(outcome.faults)), ""]
+        lines += [*(f"- {_escape_markdown(fault.text)}" for fault in outcome.faults), ""]
     if outcome.differing:
         lines.append("| variable | differ | worst | × tolerance | at | new | baseline |")
         lines.append("|---|--:|--:|--:|---|--:|--:|")
@@ -350,7 +345,7 @@ def as_markdown(outcome: Verdict) -> str:
 
 def as_github(outcome: Verdict) -> str:
     """Write a workflow command of GitHub Actions: an annotation on the baseline, with the worst differences."""
-    failures = [(fault.text, "") for fault in by_kind(outcome.faults)]
+    failures = [(fault.text, "") for fault in outcome.faults]
     failures += [(variable.text, outcome.replay(variable)) for variable in outcome.differing]
     lines = [outcome.headline]
     for text, command in failures[:MAX_ANNOTATED]:
