@@ -440,6 +440,7 @@ class _JudgedSlab:
     """Points of a slab: the output, its side of the target (-1, 0 or 1) and its distance from it, and which points
     count, failed, have a distance and are within tol."""
 
+    slab: Slab
     output: NDArray[Any]
     side: NDArray[np.float64]
     distance: NDArray[np.float64]
@@ -451,7 +452,7 @@ class _JudgedSlab:
 
 def _judged_slabs(
     evaluated: xr.Dataset, sizes: Mapping[Hashable, int], tol: float, criterion: Criterion
-) -> Iterator[tuple[Slab, _JudgedSlab]]:
+) -> Iterator[_JudgedSlab]:
     """Judge all points, slab by slab, with the dimensions in the order of `sizes`."""
     for slab in slabs(sizes):
         values, status = (read_slab(evaluated, name, slab) for name in criterion.names)
@@ -467,12 +468,8 @@ def _judged_slabs(
         judged = has_target & (status != Status.NO_IMPACT)
         failed = judged & (status >= FIRST_FAILURE)
         evaluable = judged & ~failed & ~np.isnan(distance)
-        yield (
-            slab,
-            _JudgedSlab(
-                output, np.sign(error), distance, judged, failed, evaluable, evaluable & (distance <= tol)
-            ),
-        )
+        within = evaluable & (distance <= tol)
+        yield _JudgedSlab(slab, output, np.sign(error), distance, judged, failed, evaluable, within)
 
 
 def _best_parameters(
@@ -492,8 +489,8 @@ def _best_parameters(
     sizes = {dim: evaluated.sizes[dim] for dim in (*parameter_dims, *other_dims)}
     points, within, errors = np.zeros(shape, int), np.zeros(shape, int), np.full(shape, np.nan)
     others = tuple(range(len(parameter_dims), len(sizes)))
-    for slab, part in _judged_slabs(evaluated, sizes, tol, criterion):
-        parameter_slab = tuple(slab[dim] for dim in parameter_dims)
+    for part in _judged_slabs(evaluated, sizes, tol, criterion):
+        parameter_slab = tuple(part.slab[dim] for dim in parameter_dims)
         points[parameter_slab] += part.judged.sum(axis=others)
         within[parameter_slab] += part.within.sum(axis=others)
         largest = np.fmax.reduce(np.where(part.evaluable, part.distance, np.nan), axis=others, initial=np.nan)
@@ -533,8 +530,8 @@ def _rank_law(law_data: xr.Dataset, tol: float, criterion: Criterion) -> Ranked:
     evaluable_points = failed_points = 0
     total, max_error, e_out = Fraction(), math.nan, math.nan
     worst: dict[Hashable, int] | None = None
-    for slab, part in _judged_slabs(evaluated, sizes, tol, criterion):
-        distance, evaluable = part.distance, part.evaluable
+    for part in _judged_slabs(evaluated, sizes, tol, criterion):
+        slab, distance, evaluable = part.slab, part.distance, part.evaluable
         positions = tuple(slab[dim] for dim in served_input.dims)
         judged[positions] += part.judged.sum(axis=others)
         within[positions] += part.within.sum(axis=others)
@@ -566,11 +563,7 @@ def _rank_law(law_data: xr.Dataset, tol: float, criterion: Criterion) -> Ranked:
         for name in {**chosen, **at}
     }
     exponent = law_data.variables.get("exponent")
-    if exponent is not None and exponent.ndim == 0:
-        numbers = {"n": float(exponent.values)}
-        units = {
-            path: with_numbers(unit, numbers) if names_in(unit) == {"n"} else unit for path, unit in units.items()
-        }
+    numbers = {"n": float(exponent.values)} if exponent is not None and exponent.ndim == 0 else {}
     served = _served_ranges(served_input.values, judged > 0, within < judged) if along_one else None
     crossings = _crossings(served_input.values, side, within > 0) if along_one else ()
     model, friction = _keys(law_data)
@@ -588,7 +581,7 @@ def _rank_law(law_data: xr.Dataset, tol: float, criterion: Criterion) -> Ranked:
         crossings,
         friction,
         criterion,
-        {path: unit for path, unit in units.items() if not names_in(unit)},
+        {path: with_numbers(unit, numbers) for path, unit in units.items() if names_in(unit) <= numbers.keys()},
     )
 
 
