@@ -223,14 +223,12 @@ def check_result_name(path: str | Path | None) -> None:
 def _check_name_length(path: Path) -> None:
     """Refuse a name that is too long for the temporary files next to it, such as RESULT.12345678.part."""
     try:
-        limit = os.pathconf(path.parent, "PC_NAME_MAX")
+        most = os.pathconf(path.parent, "PC_NAME_MAX") - len(".12345678.part")
     except (OSError, ValueError, AttributeError):
         return
-    suffix_length = len(".12345678.part")
     length = len(os.fsencode(path.name))
-    if length > limit - suffix_length:
-        shown = safe_text(str(path), 60)
-        raise UsageError(f"{shown}: got a name of {length} bytes, expected at most {limit - suffix_length}")
+    if length > most:
+        raise UsageError(f"{safe_text(str(path), 60)}: got a name of {length} bytes, expected at most {most}")
 
 
 def write_file(path: Path, content: bytes | memoryview, *, overwrite: bool) -> None:

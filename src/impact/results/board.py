@@ -140,9 +140,8 @@ class Board(DisplayedDataset):
         engines = self.engines
         if len(engines) > 1:
             yield Table(board_rows(engines), ("check", *(engine["engine"] for engine in engines)))
-            yield ""
-        for position, engine in enumerate(engines):
-            if position:
+        for engine in engines:
+            if len(engines) > 1:
                 yield ""
             yield engine_headline(engine)
             yield ""
@@ -173,12 +172,7 @@ def excess_of(name: str, asked: float, delivered: float) -> float:
     (-0.5, True)
     """
     difference = delivered - asked
-    match CHECKS[name]:
-        case "at most":
-            return difference
-        case "at least":
-            return -difference
-    return abs(difference)
+    return {"equal": abs(difference), "at most": difference, "at least": -difference}[CHECKS[name]]
 
 
 def _checks_by_name(engine: Mapping[str, Any]) -> Iterator[tuple[str, list[Mapping[str, Any]]]]:

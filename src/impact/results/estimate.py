@@ -36,6 +36,8 @@ WORKER_COUNTS = (1, 2, 8, 32, 128, 512)
 # spent in dask, see scripts/bench_scaling.py
 DASK_OVERHEAD = 2.0
 
+# where equal points are searched for
+Scope = Literal["plan", "block", "not"]
 # why equal points are not searched for in the whole grid
 NOT_IN_PLAN = {
     "block": "too many cells to compare all, equal points are searched for within a block",
@@ -62,7 +64,7 @@ class ModelCounts:
     cells: int
     trajectories: int
     axes: tuple[str, ...]
-    within: Literal["plan", "block", "not"]
+    within: Scope
 
     @property
     def row(self) -> tuple[str, ...]:
@@ -218,9 +220,6 @@ def estimate(
 def _model_counts(plan: Plan, trajectory_map: TrajectoryMap) -> ModelCounts:
     axes = tuple(plan.config.axes[axis].name for axis in trajectory_map.axes)
     keys = keys_of(plan.laws[trajectory_map.model])
-    within: Literal["plan", "block", "not"] = "block" if not trajectory_map.is_shared else "plan"
-    if not plan.config.solver.collapse:
-        within = "not"
-    return ModelCounts(
-        law_name(*keys), plan.inputs.points_of(*keys), trajectory_map.cells, trajectory_map.count, axes, within
-    )
+    points, cells, trajectories = plan.inputs.points_of(*keys), trajectory_map.cells, trajectory_map.count
+    within: Scope = "plan" if trajectory_map.is_shared else "block" if plan.config.solver.collapse else "not"
+    return ModelCounts(law_name(*keys), points, cells, trajectories, axes, within)

@@ -265,11 +265,10 @@ def stored_table(dataset: xr.Dataset, arrays: Arrays) -> TrajectoryTable:
 
 
 def _axis_numbers(inputs: Inputs, names: Sequence[str]) -> tuple[int, ...]:
-    """Find the numbers of axes; raise a KeyError for an unknown one, a ValueError for a repeated one."""
-    numbers = {axis.name: number for number, axis in enumerate(inputs.axes)}
+    """Find the numbers of axes; raise a ValueError for an unknown or a repeated one."""
     if len({*names}) < len(names):
         raise ValueError
-    return tuple(numbers[name] for name in names)
+    return tuple(map([axis.name for axis in inputs.axes].index, names))
 
 
 def _parts(arrays: Arrays, name: str, lengths: Sequence[int]) -> Iterator[NDArray[Any]]:

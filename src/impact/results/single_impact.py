@@ -494,7 +494,7 @@ def histories(
 
 @dataclass(frozen=True)
 class Calibration:
-    """A calibration of which the config of one law with its fitted parameters is taken."""
+    """A calibration of which the config of one law with its fitted parameters is taken, with the settings."""
 
     dataset: xr.Dataset
     config: Config
@@ -505,17 +505,6 @@ class Calibration:
     def laws(self) -> list[str]:
         """MODEL, or MODEL with FRICTION, the best law first."""
         return [str(law) for law in self.dataset["model"].values]
-
-    def draft(self, model: str, friction: str, plugins: Plugins) -> Draft:
-        """Open the config of a fitted law, by whatever name, under the name of a model."""
-        position = position_of_law(self.laws, law_name(model, friction), self.name)
-        config = fitted_config(self.config, self.dataset.isel(model=position))
-        draft = open_text(config, self.name, plugins.models)
-        fitted = draft.models[0].key
-        table = draft.table("model").get(fitted)
-        is_renamed = table is not None and model != fitted
-        renamed = [Setting(("model", model), table, argument("model", model))] if is_renamed else []
-        return draft.with_settings([*renamed, *self.overrides])
 
 
 @dataclass(frozen=True)
@@ -548,11 +537,18 @@ class PointSource:
         return tuple(model.key for model in (build(draft).models if problems else draft.models))
 
     def draft(self, model: str | None = None, friction: str | None = None) -> Draft:
-        """The config; of a calibration that of a law, by default the best one."""
-        if self.calibration is None:
+        """The config; of a calibration that of a fitted law, by default the best, under the name of the model."""
+        if (fit := self.calibration) is None:
             return self.config_draft
         model = self.models[0] if model is None else model
-        return self.calibration.draft(model, friction or "", self.plugins)
+        position = position_of_law(fit.laws, law_name(model, friction or ""), fit.name)
+        config = fitted_config(fit.config, fit.dataset.isel(model=position))
+        draft = open_text(config, fit.name, self.plugins.models)
+        fitted = draft.models[0].key
+        table = draft.table("model").get(fitted)
+        is_renamed = table is not None and model != fitted
+        renamed = [Setting(("model", model), table, argument("model", model))] if is_renamed else []
+        return draft.with_settings([*renamed, *fit.overrides])
 
 
 def open_source(source: ConfigSource, overrides: Overrides, plugins: Plugins) -> PointSource:
