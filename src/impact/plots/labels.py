@@ -227,18 +227,21 @@ class LawPart(NamedLaw):
 
 def split_by_law(data: xr.Dataset, *, numbered: bool) -> Iterator[LawPart]:
     """Split a part of a result at its models, and at its friction laws where it has that dimension."""
+    has_frictions = "friction" in data.dims
+    # the pairs of a calibration are along the dimension of models, and have the keys of both in one
+    has_pairs = "friction" in data.coords and data["friction"].dims == ("model",)
     for index in range(data.sizes["model"]):
         of_model = data.isel(model=index)
         key, label = str(of_model.variables["model"].values.item()), model_label(of_model, numbered=numbered)
-        if "friction" not in data.dims:
-            yield LawPart(label, key, data=of_model)
-            continue
-        for pair in (of_model.isel(friction=friction) for friction in range(data.sizes["friction"])):
-            friction_key = str(pair.variables["friction"].values.item())
-            of_friction = friction_text(friction_key, scalars_of(pair, f"friction.{friction_key}."))
+        parts = [of_model.isel(friction=i) for i in range(data.sizes["friction"])] if has_frictions else [of_model]
+        for part in parts:
+            friction = str(part.variables["friction"].values.item()) if has_frictions or has_pairs else ""
             # a single model is not named beside every friction law
-            shown = law_name("" if data.sizes["model"] == 1 else label, of_friction)
-            yield LawPart(shown, key, data=pair, friction=friction_key)
+            model = "" if has_frictions and data.sizes["model"] == 1 else label
+            shown = law_name(
+                model, friction and friction_text(friction, scalars_of(part, f"friction.{friction}."))
+            )
+            yield LawPart(shown, key, data=part, friction=friction if has_frictions else "")
 
 
 def with_model(conditions: str, data: xr.Dataset, *, numbered: bool) -> str:

@@ -17,7 +17,7 @@ from ..config.grid import SAMPLE
 from ..config.measurements import SIGMA
 from ..contact.variables import OUTPUTS
 from ..errors import UsageError
-from ..formatting import argument, decimals, heading, law_name, safe_text
+from ..formatting import argument, decimals, heading, safe_text
 from ..results.calibration import calibration_title, fit_status
 from ..results.schema import kind_of
 from ..results.selection import chosen_laws, select, select_laws
@@ -28,8 +28,6 @@ from .kinds import Choice, Kind
 from .labels import (
     NamedLaw,
     axis_text,
-    friction_text,
-    model_label,
     number_axis,
     pretty_conditions,
     split_by_law,
@@ -38,7 +36,7 @@ from .labels import (
     words_of,
 )
 from .restitution import read_line, requested_curve
-from .slices import conditions_of, numeric_axes, scalars_of
+from .slices import choose_line, conditions_of
 from .style import is_geometric, tint
 
 # laws that are drawn unless the user names them
@@ -89,9 +87,9 @@ def _panels(data: xr.Dataset, name: str, varied: str, choice: Choice) -> tuple[P
     x = np.asarray(data[varied or "point"].values, float)
     grid = np.asarray(data["grid"].values, float) if varied else x
     curves, residuals = [], []
-    for index, key in enumerate(map(str, data["model"].values)):
-        law = data.isel(model=index)
-        fitted = NamedLaw(", ".join(filter(None, (_law_label(law, choice), _remark(law)))), key)
+    for part in split_by_law(data, numbered=choice.equations):
+        law = part.data
+        fitted = NamedLaw(", ".join(filter(None, (part.label, _remark(law)))), part.model)
         y = law["predicted"]
         band: list[xr.DataArray] = []
         if varied:
@@ -121,15 +119,6 @@ def _panels(data: xr.Dataset, name: str, varied: str, choice: Choice) -> tuple[P
     )
     # residuals have both signs
     return values.with_log_axes(choice.log), residual.with_log_axes(choice.log.strip("y"))
-
-
-def _law_label(law: xr.Dataset, choice: Choice) -> str:
-    """Write the name of a law, or of a pair of laws."""
-    label = model_label(law, numbered=choice.equations)
-    if "friction" not in law.coords:
-        return label
-    key = str(law["friction"].item())
-    return law_name(label, friction_text(key, scalars_of(law, f"friction.{key}.")))
 
 
 def _is_logarithmic(measured: Array, grid: Array) -> bool:
@@ -291,7 +280,7 @@ def uncertainty_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     name = choice.variable or "e_out"
     if name not in dataset.data_vars:
         raise UsageError(f'no variable "{name}" in this result')
-    x = choice.x or _free_axis(select(dataset, choice.sel or {}))
+    x = choice.x or choose_axis(select(dataset, choice.sel or {})).x
     if x in dataset.coords and dataset[x].dims == (SAMPLE,):
         raise UsageError(f"{argument('x', x)}: is an uncertain input, expected another axis")
     keep = (SAMPLE, "friction") if "friction" in dataset[name].dims else (SAMPLE,)
@@ -341,15 +330,11 @@ def uncertainty_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     )
 
 
-def _free_axis(dataset: xr.Dataset) -> str | None:
-    """Find e, else the first axis of several numbers, which an uncertain input is not."""
-    free = [name for name, values in numeric_axes(dataset).items() if values.dims != (SAMPLE,)]
-    return "e" if "e" in free else next(iter(free), None)
-
-
-def choose_axis(dataset: xr.Dataset, keys: Sequence[str]) -> Choice:
-    """Choose to draw over an axis."""
-    return Choice(_free_axis(dataset), models=keys)
+def choose_axis(dataset: xr.Dataset, keys: Sequence[str] | None = None) -> Choice:
+    """Choose to draw over e, else over the first axis of several numbers, which an uncertain input is not."""
+    return choose_line(
+        dataset.drop_vars([name for name, each in dataset.coords.items() if SAMPLE in each.dims]), keys
+    )
 
 
 CALIBRATION = Kind(
