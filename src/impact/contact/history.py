@@ -188,17 +188,16 @@ def _phase(
     Returns also the impulse and the work, all in the contact's own units.
     """
 
-    def sample(step: Step, fractions: Array) -> tuple[Array, Array]:
-        y = step.at(fractions)
-        return y, problem.rates(y[:2], tuple(np.broadcast_to(column, fractions.shape) for column in params))
+    def rates_at(y: Array) -> Array:
+        return problem.rates(y[:2], tuple(np.broadcast_to(column, y.shape[1]) for column in params))
 
     numbers, fractions = _fractions(steps) if times is None else _fractions_at(steps, times)
-    y, rates = sample(Step.each(steps, numbers), fractions)
+    y = Step.each(steps, numbers).at(fractions)
     nodes, weights = np.polynomial.legendre.leggauss(GAUSS_POINTS)
     samples = Step.each(steps, np.repeat(np.arange(len(steps)), GAUSS_POINTS))
-    _, inside = sample(samples, samples.end * 0.5 * (1.0 + np.tile(nodes, len(steps))))
+    inside = rates_at(samples.at(samples.end * 0.5 * (1.0 + np.tile(nodes, len(steps)))))
     share = 0.5 * np.tile(weights, len(steps)) * (samples.end * samples.length)
-    sampled = np.array([y[2], motion.indentation(law, y[0]), law.velocity(y, params), rates[4]])
+    sampled = np.array([y[2], motion.indentation(law, y[0]), law.velocity(y, params), rates_at(y)[4]])
     return sampled, math.fsum(share * (inside[4] * inside[2])), math.fsum(share * inside[3])
 
 
