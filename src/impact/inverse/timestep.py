@@ -400,9 +400,7 @@ class FixedStepLaw:
     ----------
     law : the model, or its pair with a friction law, which has the tangential inputs `oblique`
     continuous : outputs of the continuous law by name, in SI
-    rayleigh_time : the smaller one of both balls [s]
-    first : names of axes of the source that are at their first value, with that value as text
-    solved : the damping that gives the e of a law without one; None if none was asked for
+    rayleigh_time, first, solved : see `TimestepResult`
     replaced : inputs that replace those of the source; None without any
     """
 
