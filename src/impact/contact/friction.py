@@ -18,7 +18,7 @@ import numpy as np
 from ..array_types import Array, Flags, Mask
 from ..errors import ModelError
 from ..formatting import law_name, number
-from . import fixed_step_slip
+from . import fixed_step
 from .closed_forms.dashpot import gap_damping
 from .dimensionless import LawValues, dimensionless_values, with_coefficients, with_units
 from .evidence import Evidence
@@ -153,23 +153,23 @@ def friction_values(pair: Pair, oblique: ObliqueImpacts) -> dict[str, Array]:
         The kind "coulomb" has no `SLIP`: one trajectory of it is that of every slip
     """
     law, impacts, mu = pair.friction, oblique.impacts, oblique.mu
-    values = {} if law.kind == "cone" else {fixed_step_slip.LIMIT_POSITIVE: _value(law, oblique, "limit")}
+    values = {} if law.kind == "cone" else {fixed_step.LIMIT_POSITIVE: _value(law, oblique, "limit")}
     if law.kind == "coulomb":
         return values
     values |= _spring_values(pair, oblique)
     with np.errstate(all="ignore"):
-        values[fixed_step_slip.SLIP] = np.abs(oblique.G0)
+        values[fixed_step.SLIP] = np.abs(oblique.G0)
         if law.kind == "cone":
-            values[fixed_step_slip.COUPLING] = np.square(mu) * _cone_compliance(law, oblique)
+            values[fixed_step.COUPLING] = np.square(mu) * _cone_compliance(law, oblique)
         if law.stiffness == "classic":
-            values[fixed_step_slip.RADIUS] = np.sqrt(impacts.R_eff * impacts.length)
+            values[fixed_step.RADIUS] = np.sqrt(impacts.R_eff * impacts.length)
         if law.kind == "regularized":
             dynamic = _parameter(law, oblique, "mu_d")
             speed = _value(law, oblique, next(p.name for p in law.parameters if p.unit == "m/s"))
-            values[fixed_step_slip.SLIP_SCALE] = mu / oblique.mass_ratio * (impacts.v0 / speed)
-            values[f"{fixed_step_slip.PREFIX}ratio"] = _ones(impacts) if dynamic is None else dynamic / mu
+            values[fixed_step.SLIP_SCALE] = mu / oblique.mass_ratio * (impacts.v0 / speed)
+            values[f"{fixed_step.PREFIX}ratio"] = _ones(impacts) if dynamic is None else dynamic / mu
             if "viscous" in argument_names(law.coefficient):
-                values[f"{fixed_step_slip.PREFIX}viscous"] = _value(law, oblique, "mu_v") * speed / mu
+                values[f"{fixed_step.PREFIX}viscous"] = _value(law, oblique, "mu_v") * speed / mu
     return values
 
 
@@ -273,9 +273,9 @@ def _spring_values(pair: Pair, oblique: ObliqueImpacts) -> dict[str, Array]:
     law, values = pair.friction, {}
     with np.errstate(all="ignore"):
         if law.stiffness and law.kind == "spring":
-            values[fixed_step_slip.TANGENTIAL_STIFFNESS] = _stiffness(pair, oblique) / oblique.mass_ratio
+            values[fixed_step.TANGENTIAL_STIFFNESS] = _stiffness(pair, oblique) / oblique.mass_ratio
         if law.damping:
-            values[fixed_step_slip.TANGENTIAL_DAMPING] = _damping(pair, oblique) / oblique.mass_ratio
+            values[fixed_step.TANGENTIAL_DAMPING] = _damping(pair, oblique) / oblique.mass_ratio
     return values
 
 

@@ -21,8 +21,7 @@ from ..ode.problem import Params, Problem, Solution, Termination
 from ..ode.rk45 import integrate
 from . import motion
 from .dimensionless import LawValues, chi_of, exact_restitution, with_coefficients, with_units
-from .fixed_step import EXACT, MAX_CONTACTS, MUJOCO_CONE, collide_at_fixed_step
-from .fixed_step_slip import PREFIX, SLIP, FixedStepSlip
+from .fixed_step import EXACT, MAX_CONTACTS, MUJOCO_CONE, PREFIX, SLIP, FixedStepSlip, collide_at_fixed_step
 from .formula_calls import argument_names, describe_error
 from .model import ForceModel
 from .numba import dispatch

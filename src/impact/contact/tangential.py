@@ -19,8 +19,8 @@ from ..ode.problem import Params, Problem, Solution, Step
 from ..ode.rk45 import integrate
 from . import motion, simulate
 from .dimensionless import exact_restitution, with_coefficients, with_units
-from .fixed_step import EXACT
-from .fixed_step_slip import (
+from .fixed_step import (
+    EXACT,
     LIMIT_POSITIVE,
     PREFIX,
     SLIP,
