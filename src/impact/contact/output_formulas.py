@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from functools import partial
 from typing import Any, Unpack
 
 import numpy as np
@@ -48,7 +49,7 @@ def outputs(
     if checked is not None:
         computed["checked"] = checked
     if friction is not None:
-        computed |= dict(zip(("oblique", "tangential", "kind"), friction, strict=True))
+        computed |= dict(zip(("oblique", "tangential", "kind"), friction, strict=True), friction=friction)
 
     with np.errstate(all="ignore"):
         values = {name: _compute(name, computed) for name in names}
@@ -148,38 +149,27 @@ def _separation_time(
 # ---- outputs of friction; G is the slip in units of mu v0 m/m_t, positive before the impact
 
 
-def _share(name: str) -> Callable[..., Array]:
-    """Make the formula of G1/G0 from the "slip" of the tangential motion, or from the "exact" one.
+def _share(friction: Friction, friction_status: Array, missed: Mask, name: str) -> Array:
+    """G1/G0 from the "slip" of the tangential motion, or from the "exact" one.
 
     It is 1 where nothing changes the slip, NaN where it is not known or G0 is 0.
     """
-
-    def share(
-        oblique: ObliqueImpacts, tangential: TangentialResult, kind: str, friction_status: Array, missed: Mask
-    ) -> Array:
-        size, after = np.abs(oblique.G0), getattr(tangential, name)
-        unknown = (friction_status >= FIRST_FAILURE) | (oblique.slip == 0.0)
-        if kind == "coulomb":
-            # its exact value is that of the impulse
-            impulse = after if name == "exact" else tangential.sliding_impulse
-            after = np.maximum(size - impulse, 0.0)
-        else:
-            unknown = unknown | (friction_status == LIMIT)
-        share = replace_where(after / size, oblique.mu == 0.0, 1.0)
-        return replace_where(replace_where(share, unknown, np.nan), missed, 1.0)
-
-    return share
+    oblique, tangential, kind = friction
+    size, after = np.abs(oblique.G0), getattr(tangential, name)
+    unknown = (friction_status >= FIRST_FAILURE) | (oblique.slip == 0.0)
+    if kind == "coulomb":
+        # its exact value is that of the impulse
+        impulse = after if name == "exact" else tangential.sliding_impulse
+        after = np.maximum(size - impulse, 0.0)
+    else:
+        unknown = unknown | (friction_status == LIMIT)
+    share = replace_where(after / size, oblique.mu == 0.0, 1.0)
+    return replace_where(replace_where(share, unknown, np.nan), missed, 1.0)
 
 
-def _contact_regime(
-    oblique: ObliqueImpacts,
-    tangential: TangentialResult,
-    kind: str,
-    friction_status: Flags,
-    missed: Mask,
-    without_slip: Mask,
-) -> Flags:
+def _contact_regime(friction: Friction, friction_status: Flags, missed: Mask, without_slip: Mask) -> Flags:
     """Whether the contact sticks (1), slides (2) or does both (3); 0 where that is not defined."""
+    oblique, tangential, kind = friction
     regime = tangential.regime
     if kind == "coulomb":
         regime = np.where(np.abs(oblique.G0) >= tangential.sliding_impulse, SLIDES, STICKS | SLIDES)
@@ -188,10 +178,9 @@ def _contact_regime(
     return np.where((friction_status >= FIRST_FAILURE) | missed, np.int8(0), regime).astype(np.int8)
 
 
-def _friction_residual(
-    oblique: ObliqueImpacts, tangential: TangentialResult, kind: str, slip_share: Array, has_works: Mask
-) -> Array:
+def _friction_residual(friction: Friction, slip_share: Array, has_works: Mask) -> Array:
     """What the works leave of the loss, relative to the tangential energy before the impact."""
+    oblique, tangential, kind = friction
     if kind == "coulomb":
         return np.where(has_works, 0.0, np.nan)
     works = tangential.slip_work + tangential.damping_work + tangential.memory_work + tangential.elastic_left
@@ -199,20 +188,15 @@ def _friction_residual(
     return np.where(has_works, loss - 2.0 * works / np.square(oblique.G0), np.nan)
 
 
-def _work(name: str) -> Callable[..., Array]:
-    """Make the formula of a work in SI, from that in units of mu^2 (m v0)^2/m_t."""
-
-    def work(
-        oblique: ObliqueImpacts, tangential: TangentialResult, kind: str, friction_loss: Array, has_works: Mask
-    ) -> Array:
-        # 0 where nothing acts, NaN where the slip is not known
-        without = 0.0 * friction_loss
-        if kind == "coulomb":
-            return friction_loss if name == "slip_work" else without
-        unit = np.square(oblique.mu * oblique.impacts.m * oblique.impacts.v0) / oblique.m_t
-        return np.where(has_works, getattr(tangential, name) * unit, without)
-
-    return work
+def _work(friction: Friction, friction_loss: Array, has_works: Mask, name: str) -> Array:
+    """A work in SI, from that in units of mu^2 (m v0)^2/m_t."""
+    oblique, tangential, kind = friction
+    # 0 where nothing acts, NaN where the slip is not known
+    without = 0.0 * friction_loss
+    if kind == "coulomb":
+        return friction_loss if name == "slip_work" else without
+    unit = np.square(oblique.mu * oblique.impacts.m * oblique.impacts.v0) / oblique.m_t
+    return np.where(has_works, getattr(tangential, name) * unit, without)
 
 
 # formulas by the names of their values; their arguments are names of this dict, or law, impacts and result
@@ -266,8 +250,8 @@ FORMULAS: dict[str, Callable[..., Any]] = {
     "friction_status": lambda tangential, status, not_integrated: replace_where(
         replace_where(tangential.status, tangential.status == STATUS_OK, status), not_integrated, status
     ),
-    "slip_share": _share("slip"),
-    "exact_share": _share("exact"),
+    "slip_share": partial(_share, name="slip"),
+    "exact_share": partial(_share, name="exact"),
     # impacts that have an answer and no slip before it
     "without_slip": lambda oblique, friction_status: (oblique.slip == 0.0) & (friction_status < FIRST_FAILURE),
     # P [N s]
@@ -295,10 +279,10 @@ FORMULAS: dict[str, Callable[..., Any]] = {
     "contact_regime": _contact_regime,
     "friction_residual": _friction_residual,
     "beta_error": lambda beta, exact_share: beta + exact_share,
-    "slip_work": _work("slip_work"),
-    "tangential_damping_work": _work("damping_work"),
-    "memory_work": _work("memory_work"),
-    "elastic_left": _work("elastic_left"),
+    "slip_work": partial(_work, name="slip_work"),
+    "tangential_damping_work": partial(_work, name="damping_work"),
+    "memory_work": partial(_work, name="memory_work"),
+    "elastic_left": partial(_work, name="elastic_left"),
     "psi1": lambda tangential, oblique, has_works: np.where(has_works, tangential.stiffness * oblique.G0, np.nan),
     "psi2": lambda psi1, slip_share: psi1 * slip_share,
     "slip_changes": lambda tangential, kind, contact_regime: (
