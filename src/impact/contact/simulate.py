@@ -48,13 +48,23 @@ HIDDEN_END, HIDDEN_END_BISECTIONS = (1e-12, 1e-2), 60
 # arrays that a law needs, by name, in the contact's own units
 ValueArrays = Mapping[str, Array]
 
-
-# simulates impacts with the same n: n, the values and the number of impacts, and `collapse`
 T = TypeVar("T", bound=Record)
-SimulatePart = Callable[..., T]
 
 # computes the collisions of distinct impacts, see `integrate_collisions`
 ComputeCollisions = Callable[..., CollisionResult]
+
+
+class Part(NamedTuple):
+    """Impacts with the same n: their values, their number, and whether equal ones are integrated once."""
+
+    n: float
+    values: ValueArrays
+    size: int
+    collapse: bool
+
+    def at(self, rows: Positions, size: int) -> Part:
+        """Choose some of the impacts."""
+        return self._replace(values={name: array[rows] for name, array in self.values.items()}, size=size)
 
 
 class Settings(TypedDict):
@@ -95,7 +105,7 @@ def simulate(
     recorded : receives the motion, of a single impact
     """
     integrate = partial(integrate_collisions, rtol=rtol, max_steps=max_steps, core=core, recorded=recorded)
-    simulate_part: SimulatePart[CollisionResult] = partial(
+    simulate_part = partial(
         _simulate_distinct, model, compute=compute or integrate, separates_strong=compute is None
     )
     if integrator != EXACT:
@@ -111,7 +121,7 @@ def simulate_parts(
     n: Array,
     values: ValueArrays,
     status: Flags,
-    simulate_part: SimulatePart[T],
+    simulate_part: Callable[[Part], T],
     collapse: bool,
     errors: dict[str, str] | None,
 ) -> T:
@@ -119,23 +129,24 @@ def simulate_parts(
     parts: list[tuple[Positions, T]] = []
     reported = {} if errors is None else errors
 
-    def isolate_failures(part_of_n: Callable[..., T], values: ValueArrays, count: int) -> T:
+    def isolate_failures(part: Part) -> T:
         """Simulate impacts with the same n; those for which the law raises an error have the status MODEL_ERROR.
 
         After an error both halves are tried again, so that only the impacts that cause it fail. A single impact is
         tried together with a copy: a result of the wrong shape, or an `if`, raises no error for an array of
         length 1.
         """
+        count = part.size
         try:
             if count == 1:
-                twice = _values_at(values, np.array([0, 0]))
-                return part_of_n(twice, 2, collapse=False).take(np.array([0]))
-            if collapse and PHASE in values:
+                twice = part.at(np.array([0, 0]), 2)._replace(collapse=False)
+                return simulate_part(twice).take(np.array([0]))
+            if collapse and PHASE in part.values:
                 # at a fixed step problems are distinct by all values
-                first, row_of_impact = deduplicate([values[name] for name in sorted(values)], (count,))
+                first, row_of_impact = deduplicate([part.values[name] for name in sorted(part.values)], (count,))
                 if first.size < count:
-                    return part_of_n(_values_at(values, first), first.size, collapse=True).take(row_of_impact)
-            return part_of_n(values, count, collapse=collapse)
+                    return simulate_part(part.at(first, first.size)).take(row_of_impact)
+            return simulate_part(part)
         except ModelError as error:
             result = record.blank(count)
             if count == 1:
@@ -143,7 +154,7 @@ def simulate_parts(
                 reported.setdefault(*describe_error(key, error))
                 return result
             for half in np.array_split(np.arange(count), 2):
-                result.put(half, isolate_failures(part_of_n, _values_at(values, half), half.size))
+                result.put(half, isolate_failures(part.at(half, half.size)))
             return result
 
     with np.errstate(all="ignore"):
@@ -151,26 +162,16 @@ def simulate_parts(
             chosen = (status == STATUS_OK) & (n == exponent)
             count, rows = int(np.count_nonzero(chosen)), positions(chosen)
             if count:
-                part_of_n = partial(simulate_part, float(exponent))
-                parts.append((rows, isolate_failures(part_of_n, _values_at(values, rows), count)))
+                part = Part(float(exponent), values, n.size, collapse).at(rows, count)
+                parts.append((rows, isolate_failures(part)))
     return record.joined(n.size, status, parts)
 
 
-def _values_at(values: ValueArrays, rows: Positions) -> ValueArrays:
-    return {name: array[rows] for name, array in values.items()}
-
-
 def _simulate_distinct(
-    model: ForceModel,
-    n: float,
-    values: ValueArrays,
-    count: int,
-    *,
-    compute: ComputeCollisions,
-    collapse: bool,
-    separates_strong: bool = True,
+    model: ForceModel, part: Part, *, compute: ComputeCollisions, separates_strong: bool = True
 ) -> CollisionResult:
     """Integrate each distinct dimensionless problem once, those with strong damping in their own coordinate."""
+    n, values, count, collapse = part
     law_values = with_coefficients(model, with_units(values, n), count)
     status = check_coefficients(model, law_values, count)
     exact, chi = exact_restitution(model, law_values, count), chi_of(law_values, count)
@@ -234,13 +235,10 @@ def distinct_problems(
 
 def collide_at_fixed_steps(
     model: ForceModel,
-    n: float,
-    values: ValueArrays,
-    count: int,
+    part: Part,
     *,
     scheme: str,
     compute: ComputeCollisions,
-    collapse: bool,
     max_steps: int,
     slip: FixedStepSlip | None = None,
 ) -> CollisionResult:
@@ -249,23 +247,19 @@ def collide_at_fixed_steps(
     `slip`, of the same impacts under friction, is advanced to their ends. A scheme in which friction changes the
     restitution takes that of the values, if they have one.
     """
+    n, values, count, _ = part
     if scheme == MUJOCO_CONE and slip is None and SLIP in values:
         slip = FixedStepSlip.of(TangentialForm("cone"), values, count)
-    of_law = {
-        name: array
-        for name, array in values.items()
-        if name not in (STEPS_PER_CONTACT, STEP, PHASE) and not name.startswith(PREFIX)
-    }
+    of_scheme = (STEPS_PER_CONTACT, STEP, PHASE, PREFIX)
+    of_law = part._replace(values={name: a for name, a in values.items() if not name.startswith(of_scheme)})
 
     def contact_times(rows: Positions, size: int) -> tuple[Array, Flags]:
         """Compute the contact times of the continuous law, and statuses that are OK where there is one."""
-        continuous = _simulate_distinct(
-            model, n, _values_at(of_law, rows), size, compute=compute, collapse=collapse
-        )
+        continuous = _simulate_distinct(model, of_law.at(rows, size), compute=compute)
         never_ends = continuous.status == LIMIT
         return continuous.contact_time, np.where(never_ends, np.int8(Status.NOT_SEPARATED), continuous.status)
 
-    law_values = with_coefficients(model, with_units(of_law, n), count)
+    law_values = with_coefficients(model, with_units(of_law.values, n), count)
     status = check_coefficients(model, law_values, count)
     status[status == LIMIT] = Status.OK
     if STEP not in values:
@@ -281,12 +275,12 @@ def collide_at_fixed_steps(
         # at least the contacts of one step
         limits = np.ceil(MAX_CONTACTS * np.maximum(times[rows] / step[rows], 1.0))
         limits = np.fmin(limits, max_steps).astype(np.int64)
-        part = None if slip is None else slip.take(rows)
+        chosen, slip_at_rows = of_law.at(rows, rows.size), None if slip is None else slip.take(rows)
         fixed = collide_at_fixed_step(
-            model, n, _values_at(of_law, rows), step[rows], values[PHASE][rows], limits, scheme, part
+            model, n, chosen.values, step[rows], values[PHASE][rows], limits, scheme, slip_at_rows
         )
-        if slip is not None and part is not None:
-            slip.put(rows, part)
+        if slip is not None and slip_at_rows is not None:
+            slip.put(rows, slip_at_rows)
         # where the user limits the steps
         unfinished = np.where(limits >= max_steps, np.int8(Status.MAX_STEPS), np.int8(Status.NOT_SEPARATED))
         status = np.where(fixed.status == Status.NOT_SEPARATED, unfinished, fixed.status)

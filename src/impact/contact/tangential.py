@@ -7,6 +7,7 @@ together, see `impact.contact.slip_motion`.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, NamedTuple
@@ -117,7 +118,7 @@ def simulate_friction(
     ModelError : of the errors of a law, only what is raised outside its formulas
     """
     integrate_slip = partial(_integrate, rtol=rtol, max_steps=max_steps, recorded=recorded)
-    simulate_part: simulate.SimulatePart[TangentialResult] = partial(_simulate_distinct, pair, integrate_slip)
+    simulate_part = partial(_simulate_distinct, pair, integrate_slip)
     if integrator != EXACT:
         compute = partial(simulate.integrate_collisions, rtol=rtol, max_steps=max_steps, core=core)
         collide = partial(simulate.collide_at_fixed_steps, pair.model, scheme=integrator, compute=compute)
@@ -126,15 +127,10 @@ def simulate_friction(
 
 
 def _simulate_distinct(
-    pair: Pair,
-    integrate_slip: simulate.SimulatePart[TangentialResult],
-    n: float,
-    values: simulate.ValueArrays,
-    count: int,
-    *,
-    collapse: bool,
+    pair: Pair, integrate_slip: Callable[..., TangentialResult], part: simulate.Part
 ) -> TangentialResult:
     """Integrate each distinct dimensionless problem once."""
+    n, values, count, collapse = part
     form = pair.form(n)
     # a coordinate in which the powers of x of the friction are smooth, too
     powers = (form.stiffness_power, form.damping_power)
@@ -177,20 +173,13 @@ def _simulate_distinct(
     return result
 
 
-def _slip_at_fixed_steps(
-    pair: Pair,
-    collide: simulate.ComputeCollisions,
-    n: float,
-    values: simulate.ValueArrays,
-    count: int,
-    *,
-    collapse: bool,
-) -> TangentialResult:
+def _slip_at_fixed_steps(pair: Pair, collide: simulate.ComputeCollisions, part: simulate.Part) -> TangentialResult:
     """Integrate slips at a fixed step; those without slip or friction as contacts without slip."""
+    n, values, count, _ = part
     form = pair.form(n)
     slip = FixedStepSlip.of(form, values, count)
     is_invalid = (slip.slip != 0.0) & ~(np.isfinite(slip.stiffness) & np.isfinite(slip.damping))
-    collisions = collide(n, values, count, collapse=collapse, slip=slip)
+    collisions = collide(part, slip=slip)
     status = np.where(is_invalid & (collisions.status == STATUS_OK), Status.OUT_OF_RANGE, collisions.status)
     result = replace(TangentialResult.blank(count), steps=collisions.steps, status=status.astype(np.int8))
     answers: dict[str, NDArray[Any]] = {"sliding_impulse": slip.impulse}
