@@ -11,7 +11,7 @@ import numpy as np
 
 from ..array_types import Array, Indices, Mask
 from .events import event_offset, is_event_ahead, step_of_order_two
-from .problem import Problem, Switch, Termination
+from .problem import Margins, Problem, Switch, Termination
 from .state import RUNNING, State, TrialStep, put_columns
 
 # a mode changes at the end of a step within this part of the last two steps, or within this time, of the zero; or
@@ -24,6 +24,9 @@ LOW_MARGIN, NEAR_END = 0.05, 0.01
 LARGE_CHANGE = 0.5
 # a margin of unknown rate has changed much if it is above this multiple of the one before
 FAR_ABOVE = 2.0
+
+# where margins vanish: the trajectories, which margin of each, and the offsets from the ends of their steps
+Zeros = tuple[Indices, Indices, Array]
 
 
 def locate_switches(problem: Problem, switch: Switch, state: State, trial: TrialStep, accepted: Mask) -> Array:
@@ -46,28 +49,22 @@ def locate_switches(problem: Problem, switch: Switch, state: State, trial: Trial
     may_vanish |= (rates_before < 0.0) & (rates > 0.0)
     may_vanish |= np.isnan(rates) & ((margins < vanishing * before) | (margins > FAR_ABOVE * before))
     positions = (may_vanish.any(axis=0) & accepted).nonzero()[0]
-    reached = which = positions[:0]
-    offset = np.zeros(0)
+    zeros: Zeros = positions[:0], positions[:0], np.zeros(0)
     if positions.size:
-        reached, which, offset = _locate(switch, state, trial, positions, margins, rates)
+        zeros = _locate(switch, state, trial, positions, (margins, rates))
     stay = (~trial.is_accurate).nonzero()[0]
     for rows, rows_before in ((margins, before), (rates, rates_before)):
         put_columns(rows, stay, rows_before.take(stay, 1))
     state.margins = margins, rates
+    reached, _, offset = zeros
     if reached.size:
-        _change_modes(problem, switch, state, trial, reached, which, offset)
+        _change_modes(problem, switch, state, trial, zeros)
     return offset / state.h[reached]
 
 
-def _locate(
-    switch: Switch,
-    state: State,
-    trial: TrialStep,
-    positions: Indices,
-    all_margins: Array,
-    all_rates: Array,
-) -> tuple[Indices, Indices, Array]:
-    """Shorten steps to zeros of margins; returns where a zero is reached, of which margin, and its offset."""
+def _locate(switch: Switch, state: State, trial: TrialStep, positions: Indices, ends: Margins) -> Zeros:
+    """Shorten steps to zeros of margins; returns those that are reached."""
+    all_margins, all_rates = ends
     margins, before = all_margins.take(positions, 1), state.margins[0].take(positions, 1)
     h, h_next = state.h[positions], trial.h_next[positions]
     changes = np.abs(margins - before) > LARGE_CHANGE * np.maximum(np.abs(margins), np.abs(before))
@@ -153,19 +150,12 @@ def _shorten(
     trial.is_accurate[back], state.termination[back] = False, RUNNING
 
 
-def _change_modes(
-    problem: Problem,
-    switch: Switch,
-    state: State,
-    trial: TrialStep,
-    positions: Indices,
-    which: Indices,
-    offset: Array,
-) -> None:
+def _change_modes(problem: Problem, switch: Switch, state: State, trial: TrialStep, zeros: Zeros) -> None:
     """Change the modes of trajectories next to the ends of their steps.
 
     They go on with the step of before they were shortened, or to the next zero.
     """
+    positions, which, offset = zeros
     params = tuple(column[positions] for column in state.params)
     y, k = step_of_order_two(problem, trial.y.take(positions, 1), trial.k.take(positions, 1), offset, params)
     y, params = switch.change(which, y, k, params)
