@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,3 +12,4 @@ Mask = NDArray[np.bool_]
 Indices = NDArray[np.intp]
 # of statuses, modes and regimes
 Flags = NDArray[np.int8]
+AnyArray = NDArray[Any]

@@ -11,12 +11,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from copy import copy
 from dataclasses import dataclass, fields, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..array_types import Array, Flags, Mask
+from ..array_types import AnyArray, Array, Flags, Mask
 from ..errors import ModelError, UsageError, require_known
 from .dimensionless import with_coefficients, with_units
 from .formula_calls import Formula, argument_names
@@ -414,11 +413,11 @@ class FixedStepSlip:
             changes=np.zeros(count, np.int32),
         )
 
-    def take(self, rows: NDArray[Any]) -> FixedStepSlip:
+    def take(self, rows: AnyArray) -> FixedStepSlip:
         """Take some of the contacts."""
         return FixedStepSlip(self.form, *(getattr(self, field.name)[rows] for field in fields(self)[1:]))
 
-    def put(self, rows: NDArray[Any], part: FixedStepSlip) -> None:
+    def put(self, rows: AnyArray, part: FixedStepSlip) -> None:
         """Write contacts that have ended to their positions."""
         for field in fields(self)[1:]:
             getattr(self, field.name)[rows] = getattr(part, field.name)

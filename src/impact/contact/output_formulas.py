@@ -7,9 +7,8 @@ from functools import partial
 from typing import Any, Unpack
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..array_types import Array, Flags, Mask
+from ..array_types import AnyArray, Array, Flags, Mask
 from .dimensionless import dimensionless_values
 from .fixed_step import MUJOCO_CONE
 from .formula_calls import argument_names
@@ -25,7 +24,7 @@ from .status import FIRST_FAILURE, LIMIT, NO_IMPACT, STATUS_OK
 from .tangential import RecordedSlip, TangentialResult, simulate_friction
 from .variables import CENTRAL_OUTPUTS
 
-Outputs = dict[str, NDArray[Any]]
+Outputs = dict[str, AnyArray]
 # the tangential inputs of impacts, their tangential motion, and the kind of the friction law
 Friction = tuple[ObliqueImpacts, TangentialResult, str]
 InSI = Callable[[Array, Array], Array]

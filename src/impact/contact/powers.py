@@ -6,9 +6,8 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..array_types import Array, Mask
+from ..array_types import AnyArray, Array, Mask
 
 
 def power(base: Array, exponent: float) -> Array:
@@ -88,9 +87,7 @@ def distinct_values(values: Array) -> Array:
     return values[:1] if (values == values[:1]).all() else np.unique(values)
 
 
-def replace_where(
-    value: NDArray[Any], mask: Mask, otherwise: float | np.integer[Any] | NDArray[Any]
-) -> NDArray[Any]:
+def replace_where(value: AnyArray, mask: Mask, otherwise: float | np.integer[Any] | AnyArray) -> AnyArray:
     """Replace the value by another one where the mask is True; the shape grows only if it is True somewhere."""
     return np.where(mask, otherwise, value) if mask.any() else value
 

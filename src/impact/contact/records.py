@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from ..array_types import Array, Flags, Indices, Mask
+from ..array_types import AnyArray, Array, Flags, Indices, Mask
 from .status import Status, StatusWithMeaning
 
 # positions of trajectories; a slice for all of them, so that nothing is copied
@@ -109,7 +109,7 @@ class CollisionResult(Record):
     exact: Array
 
 
-def deduplicate(columns: Sequence[NDArray[Any]], shape: tuple[int, ...]) -> tuple[Indices, Indices]:
+def deduplicate(columns: Sequence[AnyArray], shape: tuple[int, ...]) -> tuple[Indices, Indices]:
     """Find the distinct rows of a table, whose columns broadcast to a shape; NaN equals NaN, and -0.0 equals 0.0.
 
     Returns the flat index of the first of each group of equal rows, shape (groups,), and the number of the group
@@ -120,13 +120,13 @@ def deduplicate(columns: Sequence[NDArray[Any]], shape: tuple[int, ...]) -> tupl
     ([0, 2, 3, 5], [0, 0, 1, 2, 2, 3])
     """
     # columns are combined before they are broadcast, so that an axis along which they do not vary costs nothing
-    keys: NDArray[Any] = columns[0] if columns else np.zeros((1,) * len(shape), np.intp)
+    keys: AnyArray = columns[0] if columns else np.zeros((1,) * len(shape), np.intp)
     for values in columns[1:]:
         keys = _ranks(keys) * values.size + _ranks(values)
     _, first, group = np.unique(np.broadcast_to(keys, shape), return_index=True, return_inverse=True)
     return first, group.reshape(-1)
 
 
-def _ranks(values: NDArray[Any]) -> Indices:
+def _ranks(values: AnyArray) -> Indices:
     """Compute the rank of each value among the distinct ones; equal values have equal ranks."""
     return np.unique(values, return_inverse=True)[1].reshape(values.shape)

@@ -10,12 +10,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..array_types import Array, Flags, Mask
+from ..array_types import AnyArray, Array, Flags, Mask
 from ..ode.problem import Params, Problem, Solution, Step
 from ..ode.rk45 import integrate
 from . import motion, simulate
@@ -182,7 +182,7 @@ def _slip_at_fixed_steps(pair: Pair, collide: simulate.ComputeCollisions, part: 
     collisions = collide(part, slip=slip)
     status = np.where(is_invalid & (collisions.status == STATUS_OK), Status.OUT_OF_RANGE, collisions.status)
     result = replace(TangentialResult.blank(count), steps=collisions.steps, status=status.astype(np.int8))
-    answers: dict[str, NDArray[Any]] = {"sliding_impulse": slip.impulse}
+    answers: dict[str, AnyArray] = {"sliding_impulse": slip.impulse}
     if form.kind != "coulomb":
         answers |= {"slip": slip.slip, "regime": slip.regime, "slip_changes": slip.changes}
     for name, column in answers.items():

@@ -9,12 +9,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..array_types import Flags, Indices, Mask
+from ..array_types import AnyArray, Flags, Indices, Mask
 from ..contact.dimensionless import dimensionless_values, exponent_names
 from ..contact.friction import Pair, check_friction, friction_values
 from ..contact.frictions.multibody_codes import MUJOCO_ELLIPTIC
@@ -32,7 +31,7 @@ RANGE_TRAJECTORIES = 32768
 
 # the dimensionless problems of trajectories: the exponent `n`, the `status` after the checks of inputs, and by
 # name the arguments of the law and the fixed step of a scheme
-Columns = dict[str, NDArray[Any]]
+Columns = dict[str, AnyArray]
 # what a trajectory is of: a model, or its pair with a friction law
 PlanLaw = ForceModel | Pair
 # a mask of the trajectories of a range that are reused from another result, and the results of these
@@ -205,12 +204,12 @@ def probe_index(inputs: Inputs, swept_names: Iterable[str] = ()) -> Index:
     return np.ix_(*(positions_on(axis, size) for axis, size in enumerate(inputs.shape)))
 
 
-def axes_of_arrays(arrays: Iterable[NDArray[Any]]) -> frozenset[int]:
+def axes_of_arrays(arrays: Iterable[AnyArray]) -> frozenset[int]:
     """Find the axes along which any of the arrays varies; the arrays have as many axes as the grid."""
     return frozenset(axis for array in arrays for axis, size in enumerate(array.shape) if size > 1)
 
 
-def checked_arrays(impacts: Impacts) -> Mapping[str, list[NDArray[Any]]]:
+def checked_arrays(impacts: Impacts) -> Mapping[str, list[AnyArray]]:
     """List the arrays on which each check of `check_inputs` depends."""
     with np.errstate(all="ignore"):
         scales = [impacts.v0, impacts.length, impacts.energy, impacts.time]

@@ -11,10 +11,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import xarray as xr
-from numpy.typing import NDArray
 
 from ..arguments import name_wrong_types
-from ..array_types import Array
+from ..array_types import AnyArray, Array
 from ..config.files import read_number, to_plain_data
 from ..config.grid import Axis
 from ..config.input_names import InputName
@@ -48,7 +47,7 @@ def interpolated(config: Config, law: PlanLaw, outputs: Sequence[str]) -> Interp
     return InterpolatedCollisions(law, outputs, rtol=solver.rtol, max_steps=solver.max_steps, core=solver.core)
 
 
-def trial_inputs(config: Config, columns: Mapping[str, NDArray[Any]]) -> Inputs:
+def trial_inputs(config: Config, columns: Mapping[str, AnyArray]) -> Inputs:
     """Replace inputs of a config by columns of one length, along the axis of the cells; no column is one cell."""
     size = len(next(iter(columns.values()))) if columns else 1
     scalars = {name: value for name, value in config.scalars.items() if name not in columns}
@@ -60,7 +59,7 @@ def trial_inputs(config: Config, columns: Mapping[str, NDArray[Any]]) -> Inputs:
 def outputs_at(
     config: Config,
     law: PlanLaw,
-    columns: Mapping[str, NDArray[Any]],
+    columns: Mapping[str, AnyArray],
     names: Sequence[str],
     compute: ComputeCollisions | None = None,
 ) -> Outputs:

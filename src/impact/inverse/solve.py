@@ -22,10 +22,9 @@ from typing import Any, Literal, NoReturn, TypeAlias
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 from scipy.optimize import elementwise, minimize_scalar
 
-from ..array_types import Array, Indices, Mask
+from ..array_types import AnyArray, Array, Indices, Mask
 from ..config.files import to_plain_data
 from ..config.input_names import InputName
 from ..config.load import Config
@@ -329,14 +328,14 @@ class SolveProblem:
     def n_conditions(self) -> int:
         return math.prod(axis.size for axis in self.config.axes)
 
-    def columns(self, values: Array) -> dict[str, NDArray[Any]]:
+    def columns(self, values: Array) -> dict[str, AnyArray]:
         """Pair each value with the inputs of every condition."""
-        columns: dict[str, NDArray[Any]] = {self.name: np.repeat(values, self.n_conditions)}
+        columns: dict[str, AnyArray] = {self.name: np.repeat(values, self.n_conditions)}
         for axis in self.config.axes:
             columns |= {name: np.tile(column, values.size) for name, column in axis.columns.items()}
         return columns
 
-    def evaluate(self, values: Array, *, is_scan: bool = False) -> dict[str, NDArray[Any]]:
+    def evaluate(self, values: Array, *, is_scan: bool = False) -> dict[str, AnyArray]:
         """Compute the target variable, its status and e_out at k values; NaN where the integration fails.
 
         The arrays are of shape (k,), or over an axis of shape (k, conditions).

@@ -20,11 +20,11 @@ from typing import Any, SupportsFloat
 
 import numpy as np
 import xarray as xr
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.optimize import elementwise
 
 from ..arguments import require_counts
-from ..array_types import Array
+from ..array_types import AnyArray, Array
 from ..config.files import read_number, read_numbers
 from ..config.input_names import InputName, with_words
 from ..config.load import Config
@@ -449,7 +449,7 @@ class FixedStepLaw:
         """The requested e, also of a law without one whose damping was solved for."""
         return self.e if self.solved is None else float(self.config.scalars["e"])
 
-    def outputs(self, dt: Array, *names: str, e: Array | None = None) -> list[NDArray[Any]]:
+    def outputs(self, dt: Array, *names: str, e: Array | None = None) -> list[AnyArray]:
         """Compute outputs by name at steps dt [s] with the e to ask for at each, of shape (k, phases)."""
         step, phase = np.repeat(dt / self.impact.time, self.phases), (np.arange(self.phases) + 0.5) / self.phases
         impact = self.impact if e is None else replace(self.impact, e=np.repeat(e, self.phases))
