@@ -20,7 +20,7 @@ from ..errors import ModelError, UsageError, require_known
 from .dimensionless import with_coefficients, with_units
 from .formula_calls import Formula, argument_names
 from .model import UNLOADING_ARGUMENTS, ForceModel
-from .motion import MotionLaw, force_at_peak, indentation, unloading_state
+from .motion import MotionLaw, unloading_arguments
 from .powers import power
 from .records import CollisionResult
 from .slip_motion import SLIDES, STICKS, TangentialForm
@@ -334,11 +334,9 @@ class _Contacts:
     def _turn(self, turned: Mask) -> None:
         """Begin the unloading branch of some collisions at the largest indentation that they reached."""
         peak = self.peak[turned]
-        params = tuple(self.params[:, turned])
         s = power(peak, 1.0 / self.law.model.coordinate_power)
-        at_peak = force_at_peak(self.law, s, params)
-        residual, recovered, _ = unloading_state(self.law, params, indentation(self.law, s), at_peak)
-        self.branch[:, turned] = peak, at_peak, residual, recovered
+        _, *others = unloading_arguments(self.law, s, tuple(self.params[:, turned]))
+        self.branch[:, turned] = peak, *others
         self.unloads |= turned
 
     def keep(self, active: Mask) -> None:

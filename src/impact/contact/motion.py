@@ -192,29 +192,20 @@ def indentation(law: MotionLaw, s: Array) -> Array:
     return integer_power(s, law.model.coordinate_power)
 
 
-def force_at_peak(law: MotionLaw, s: Array, params: Params) -> Array:
-    """Compute the force at the end of the approach, at s of shape (n,) and v = 0."""
-    at_rest = components_at(law, params, s, 0.0)
-    return np.broadcast_to(_value_of_motion(law, law.model.force, (), at_rest, params), s.shape)
-
-
-def unloading_state(law: MotionLaw, params: Params, peak: Array, at_peak: Array) -> tuple[Array, Array, Params]:
-    """Compute the residual and the recovered indentation at each peak, and the params of the restitution phase.
-
-    The values of UNLOADING_ARGUMENTS follow the params of the law.
-    """
-    model, residual = law.model, np.zeros_like(peak)
-    formula = model.residual or model.recovered
+def unloading_arguments(law: MotionLaw, s: Array, params: Params) -> tuple[Array, Array, Array, Array]:
+    """Compute UNLOADING_ARGUMENTS: those of the end of the approach, at s of shape (n,) and v = 0."""
+    model, peak, at_rest = law.model, indentation(law, s), components_at(law, params, s, 0.0)
+    force = np.broadcast_to(_value_of_motion(law, model.force, (), at_rest, params), s.shape)
+    residual, formula = np.zeros_like(peak), model.residual or model.recovered
     if formula is not None:
-        value = law.call(formula, params, {"peak": peak, "force_at_peak": at_peak})
+        value = law.call(formula, params, {"peak": peak, "force_at_peak": force})
         if value.shape not in ((), peak.shape):
             raise ModelError(f"{model.key}: the residual has shape {value.shape}, expected {peak.shape}")
         residual = residual + value
     recovered = peak - residual
     if model.recovered is not None:
         residual, recovered = recovered, residual
-    branch = () if model.unloading is None else (peak, at_peak, residual, recovered)
-    return residual, recovered, (*params, *branch)
+    return peak, force, residual, recovered
 
 
 def _value_of_motion(law: MotionLaw, formula: Formula, extra: tuple[str, ...], y: Array, params: Params) -> Array:

@@ -408,9 +408,8 @@ def solve_phases(
     back = motion.restitution_law(law)
     start = motion.components_at(law, params, np.zeros(n), 1.0)
     approach = solve(law, motion.approach_problem(law), start, params, None)
-    peak = motion.indentation(law, approach.state[0])
-    at_peak = motion.force_at_peak(law, approach.state[0], params)
-    residual, recovered, back_params = motion.unloading_state(law, params, peak, at_peak)
+    peak, at_peak, residual, recovered = branch = motion.unloading_arguments(law, approach.state[0], params)
+    back_params = params if law.model.unloading is None else (*params, *branch)
     e_out, status = np.full(n, np.nan), STATUS_OF_TERMINATION.take(approach.termination)
     # without a recovered indentation the balls stay at their peak
     stays = (status == STATUS_OK) & (recovered <= 0.0)
