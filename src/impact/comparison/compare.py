@@ -163,15 +163,13 @@ def check_comparable(dataset: xr.Dataset, name: str) -> None:
     for coordinate in ("model", "v1", "v2", "m1", "m2"):
         if coordinate not in dataset.coords:
             raise UsageError(f"{name}: has no coordinate {coordinate}, expected a whole result")
-        if coordinate != "model" and dataset[coordinate].dtype.kind not in "fiu":
-            raise UsageError(f"{name}: {coordinate}: got {dataset[coordinate].dtype}, expected numbers")
     if not {*dataset["model"].dims} <= {"model"}:
         raise UsageError(f"{name}: model is not an axis, expected a whole result")
     axes = {dim for key, v in dataset.variables.items() if is_input(key) for dim in v.dims}
-    for variable in OUTPUTS:
-        if variable in dataset and dataset[variable].dtype.kind not in "fiu":
+    for variable in (variable for variable in ("v1", "v2", "m1", "m2", *OUTPUTS) if variable in dataset):
+        if dataset[variable].dtype.kind not in "fiu":
             raise UsageError(f"{name}: {variable}: got {dataset[variable].dtype}, expected numbers")
-        if variable in dataset and not axes <= set(dataset[variable].dims):
+        if variable in OUTPUTS and not axes <= set(dataset[variable].dims):
             raise UsageError(f"{name}: {variable} does not vary along all axes, expected a whole result")
 
 
@@ -195,8 +193,7 @@ def _unit_faults(new: xr.Dataset, baseline: xr.Dataset) -> Iterator[Difference]:
     for name in [str(name) for name in baseline.variables if name in new.variables]:
         a, b = (dataset.variables[name].attrs.get("units") for dataset in (new, baseline))
         if not _attributes_equal(a, b):
-            text = f"{name} is in {a}, in BASELINE in {b}"
-            yield Difference("units", name, safe_text(text))
+            yield Difference("units", name, safe_text(f"{name} is in {a}, in BASELINE in {b}"))
 
 
 def _sweep_notes(new: xr.Dataset, baseline: xr.Dataset, aligned: Alignment) -> Iterator[str]:

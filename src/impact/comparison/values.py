@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -182,7 +183,11 @@ def _ratio(
     with np.errstate(all="ignore"):
         difference = np.where(a == b, 0.0, np.abs(a.astype(float) - b.astype(float)))
         largest = np.maximum(np.abs(a), np.abs(b))
-        scale = _scale(variable, aligned, region, b.shape)
+        if aligned.scales:
+            scale = aligned.scales[variable.name][tuple(region.values())]
+        else:
+            read = partial(slabs.read_slab, aligned.baseline, slab=region)
+            scale = scale_of(variable, read, has_peak="peak_indentation" in aligned.baseline)
         # allow for the rounding of values that were stored in single precision
         lost = sum(float(np.finfo(values.dtype).eps) for values in sides if values.dtype == np.float32)
         allowed = tol * scale + (lost * largest if lost else 0.0)
@@ -201,15 +206,6 @@ def _ratio(
         # values of a calibration that the data do not determine are arbitrary
         ratio = np.where(np.isnan(scale), 0.0, ratio)
     return ratio, difference
-
-
-def _scale(variable: Variable, aligned: Alignment, region: Region, shape: tuple[int, ...]) -> NDArray[Any]:
-    """Compute the scale of each point of a region in the variable's unit."""
-    if aligned.scales:
-        return aligned.scales[variable.name][tuple(region.values())]
-    has_peak = "peak_indentation" in aligned.baseline
-    scale = scale_of(variable, lambda name: slabs.read_slab(aligned.baseline, name, region), has_peak=has_peak)
-    return np.broadcast_to(scale, shape)
 
 
 def _may_be_missing(variable: Variable, aligned: Alignment, region: Region) -> NDArray[Any] | bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
+import os
 import shutil
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -285,7 +286,4 @@ class ImpactBackend(BackendEntrypoint):
         return rest
 
     def guess_can_open(self, filename_or_obj: Any) -> bool:
-        try:
-            return is_result(Path(filename_or_obj), (RESULT_MAGIC,))
-        except (OSError, TypeError, ValueError):
-            return False
+        return isinstance(filename_or_obj, str | os.PathLike) and is_result(Path(filename_or_obj), (RESULT_MAGIC,))
