@@ -355,6 +355,14 @@ def test_an_extension_never_drops_a_point(stored_sweep: StoredSweep, layout: str
     assert_refused(stored_sweep(ZIPPED, layout), overrides, "overrides leaves out e=0.3, v1=1.0")
 
 
+@pytest.mark.parametrize("values", ["[0.30000000000000004, 0.9]", "[0.30000000000000004, 0.6, 0.9]"])
+def test_a_value_that_differs_by_rounding_from_one_of_the_result_is_that_one(
+    stored_sweep: StoredSweep, values: str
+) -> None:
+    path = stored_sweep()
+    assert impact.extend(path, [f"sweep.e={values}"])["e"].values.tolist() == [0.3, 0.6, 0.9]
+
+
 @BOTH_LAYOUTS
 def test_an_extension_does_not_take_apart_what_varied_together(stored_sweep: StoredSweep, layout: str) -> None:
     assert_refused(stored_sweep(ZIPPED, layout), ["sweep.zip=[]"], "r.h5: e, v1 varied together and do not now")

@@ -185,16 +185,15 @@ def _extended_config(
     for axis in config.axes:
         name = axis.name
         old_values = np.atleast_1d(old.inputs.values(name))
+        new_values = np.asarray(next(iter(axis.columns.values())))
         # a property of a material that no ball had is NaN, a parameter of a law that is added None
         is_new = old_values[0] is None or old_values[0] != old_values[0]
-        if len(axis.columns) > 1 or axis.numbered or is_new:
+        if len(axis.columns) > 1 or axis.numbered or is_new or np.isin(old_values, new_values).all():
             continue
-        in_both, _ = match_labels([np.asarray(axis.columns[name])], [old_values])
-        if len(in_both) < old_values.size:
-            new_values = (value for value in axis.columns[name] if value not in old_values.tolist())
-            parsed = InputName.parse(name)
-            values = [parsed.word(value) for value in (*old_values.tolist(), *new_values)]
-            added.append(override_text(parsed.path, values))
+        # a value that differs by rounding from one of the result is that one
+        in_both, _ = match_labels([new_values], [old_values])
+        parsed, values = InputName.parse(name), [*old_values.tolist(), *np.delete(new_values, in_both).tolist()]
+        added.append(override_text(parsed.path, list(map(parsed.word, values))))
     for table, laws, now in (
         ("models", old.models, config.models),
         ("frictions", old.frictions, config.frictions),
