@@ -479,7 +479,9 @@ def test_impacts_without_slip_have_no_tangential_restitution_and_are_equal() -> 
     assert impact.compare(swept, swept, tol=0.0).equal
     # what has no value in both is not a second difference beside that of the statuses
     slow = swept.assign(friction_status=xr.full_like(swept["friction_status"], 4))
-    assert impact.compare(slow, swept).headline == "not equal: values (friction_status)"
+    verdict = impact.compare(slow, swept)
+    assert verdict.headline == "not equal: values (friction_status)"
+    assert verdict.differing[0].text.endswith(": slow_limit, baseline ok")
 
 
 def test_a_friction_law_of_one_result_is_no_difference_of_the_laws_in_both() -> None:

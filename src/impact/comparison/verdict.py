@@ -11,7 +11,7 @@ from typing import Any, Literal, get_args
 import xarray as xr
 
 from ..config.input_names import with_words
-from ..contact.status import Status
+from ..contact.status import FrictionStatus
 from ..contact.units import names_in
 from ..contact.variables import OUTPUTS
 from ..display import Block, Displayed, Table, Wrapped
@@ -114,8 +114,9 @@ class VariableComparison:
 
 def _format_outcome(name: str, value: float) -> str:
     """Write a value that has no size: a status by its name."""
-    if name == "status" and value in set(Status):
-        return Status(int(value)).name.lower()
+    # the numbers of both statuses are shared
+    if name in ("status", "friction_status") and value in set(FrictionStatus):
+        return FrictionStatus(int(value)).name.lower()
     return "NaN" if value != value else number(value, 10)
 
 
