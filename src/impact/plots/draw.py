@@ -126,8 +126,7 @@ def plot(
     kind = kind or default_kind(dataset).name
     check_choice(choice, [find_kind(kind)])
     plot_data = get_plot_data(dataset, kind, choice, plugins)
-    check_log(log, [plot_data])
-    check_labels(look.labels or {}, label_keys(plot_data, look))
+    _check_shown(choice, look, [plot_data])
     return draw(plot_data, look, None if points is None else read_points(points), ax)
 
 
@@ -147,18 +146,15 @@ def get_plot_data(dataset: xr.Dataset, kind: str, choice: Choice, plugins: Plugi
     return found.data(dataset, choice)
 
 
-def check_log(log: str, pictures: Collection[PlotData]) -> None:
-    """Refuse a logarithmic axis that none of some pictures has."""
+def _check_shown(choice: Choice, look: Look, pictures: Collection[PlotData]) -> None:
+    """Refuse a logarithmic axis, and a label of the user, that none of some pictures has."""
     panels = [panel for picture in pictures for panel in (picture, *picture.panels)]
-    for letter in log:
-        if panels and not any(getattr(panel, f"{letter}_log", False) for panel in panels):
+    for letter in choice.log:
+        if not any(getattr(panel, f"{letter}_log", False) for panel in panels):
             why = "it has values <= 0, or this kind of picture has no logarithmic one"
             raise UsageError(f"{argument('log', letter)}: the axis {letter} would stay linear: {why}")
-
-
-def label_keys(plot_data: PlotData, look: Look) -> set[str]:
-    """List the names in a picture whose text a user can replace."""
-    return {*(["title"] if look.title else []), *plot_data.names}
+    titles = {"title"} if look.title else set()
+    check_labels(look.labels or {}, titles.union(*(picture.names for picture in pictures)))
 
 
 def draw(
@@ -234,13 +230,10 @@ def _new_picture(plot_data: PlotData, look: Look, points: Points | None, *, lege
         parameters = parameters_of_laws(plot_data.laws, names) if look.legend not in (None, "full") else ""
         conditions = ", ".join(filter(None, (pretty_conditions(plot_data.conditions), parameters)))
         texts = (names["title"], conditions) if look.title else ()
-        picture = Picture(width, *texts)
+        picture = Picture(width, *(map(with_comma, texts) if look.decimal == "comma" else texts))
         picture.has_legend_rows = legend_rows
         all_axes, panels_height = plot_data.place_panels(picture, width)
         entries = _draw_panels(plot_data, all_axes, names, points, look)
-        if look.decimal == "comma":
-            for text in picture.header:
-                text.set_text(with_comma(text.get_text()))
         picture.panels = all_axes
         picture.add_legend(panels_height, height, [] if look.legend == "none" else entries)
     return picture
@@ -361,9 +354,8 @@ def plot_to_files(
     if output.suffix.lower() == ".gif" and set(kinds) != {"animation"}:
         raise UsageError(f"{output}: a .gif is an animation, expected {argument('kind', 'animation')}")
     plot_data, left_out = _read_kinds(kinds, dataset, choice, plugins)
-    check_log(log, plot_data.values())
     if plot_data:
-        check_labels(look.labels or {}, set().union(*(label_keys(shown, look) for shown in plot_data.values())))
+        _check_shown(choice, look, plot_data.values())
     pictures: dict[str, Path] = {}
     for kind, shown in plot_data.items():
         try:

@@ -175,11 +175,10 @@ def source_of(dataset: xr.Dataset) -> str:
 
 def default_kind(dataset: xr.Dataset) -> Kind:
     """Find the kind of picture that shows what a dataset is for."""
-    from ..results.schema import kind_of
-
-    if kind_of(dataset) == "board":
+    source = source_of(dataset)
+    if source == "board":
         raise UsageError("plot: this is a board, which has no picture; impact report writes its page")
-    return next(kind for kind in map(find_kind, KINDS) if kind.source == source_of(dataset))
+    return next(kind for kind in map(find_kind, KINDS) if kind.source == source)
 
 
 def kinds_of(dataset: xr.Dataset) -> list[Kind]:
