@@ -113,16 +113,15 @@ class Picture(Figure):
         """Add the legend, and choose the height [in] for panels of the height `body` if the user chose none."""
         self.body, self.has_chosen_height = body, height is not None
         width, shown = self.get_figwidth(), list(entries)
-        legend = self.place_legend(shown)
-        if legend > LEGEND_PART * (height or GAP_INCHES + self.place_header() + body + legend):
+        legend, above = self.place_legend(shown), GAP_INCHES + self.place_header()
+        if legend > LEGEND_PART * (height or above + body + legend):
             self.has_small_legend = True
             legend = self.place_legend(shown)
         if height is None and self.has_legend_rows:
-            height = GAP_INCHES + self.place_header() + body + legend
-            height = max(height, min(legend / LEGEND_PART, MAX_HEIGHT_INCHES))
+            height = max(above + body + legend, min(legend / LEGEND_PART, MAX_HEIGHT_INCHES))
         elif height is None:
             most = min(legend, MAX_HEIGHT_INCHES / 2.0)
-            height = GAP_INCHES + self.place_header() + max(body, most) + most
+            height = above + max(body, most) + most
         while legend > LEGEND_SHARE * height and len(shown) > 1:
             # show the entries that fit, and the number of the others
             shown = shown[: max(1, int(0.9 * len(shown)))]

@@ -196,8 +196,7 @@ def _encoded_frames(figure: Figure, style: str | Path | None) -> bytes:
         path = Path(folder) / "frames.gif"
         # the layout of the last frame is that of all; with a layout engine, each frame would be drawn twice
         figure.canvas.draw()
-        with matplotlib.rc_context({"figure.autolayout": False, "figure.constrained_layout.use": False}):
-            figure.set_layout_engine(None)
+        figure.set_layout_engine("none")
         with writer.saving(figure, str(path), figure.dpi):
             for index in range(frame_count):
                 show_frame(index)
