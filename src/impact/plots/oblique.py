@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -20,8 +21,8 @@ from .curves import Curve, CurveData, Panel, curve_of, law_curves
 from .kinds import Choice, Kind
 from .labels import LawPart, NamedLaw, split_by_law
 from .motions import choose_point, curves_over, motion
-from .restitution import complete, read_line
-from .slices import Line, choose_line
+from .restitution import complete
+from .slices import Line, choose_line, read_line
 
 # pairs that are drawn where no friction law is chosen: more curves cannot be told apart
 MAX_PAIRS = 8
@@ -92,7 +93,8 @@ def psi_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     along = np.array([min(shown), max(shown)])
     guides = [_guide(along, along, "smooth"), _guide(along, 0.0, "sticks")]
     panel = Panel("", "Slip after the impact", (*guides, *curves), y_name="psi2")
-    x_axis = {"x_name": "psi1", "x_label": "Slip before the impact", "x_unit": "1", "x_log": False}
+    x_label = "Slip before the impact"
+    x_axis: dict[str, Any] = {"x_name": "psi1", "x_label": x_label, "x_unit": "1", "x_log": False}
     return complete(line, "Slip after over slip before the impact", [panel], choice, **x_axis)
 
 

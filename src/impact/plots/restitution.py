@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -12,11 +12,10 @@ import xarray as xr
 
 from ..errors import UsageError
 from ..formatting import argument, label as number_label, safe_text
-from ..results.selection import require_outputs
 from .curves import Curve, CurveData, Panel, curve_of, law_curves, x_axis_fields
 from .kinds import Choice, Kind
 from .labels import REFERENCE, LawPart, NamedLaw, split_by_law, with_model
-from .slices import Line, choose_line, conditions_of, numeric_axes, read, take_line
+from .slices import Line, choose_line, conditions_of, numeric_axes, read_line
 
 FIGURE_6 = "Final velocities comparison"
 # distances from zero that are shaded, the widest first
@@ -96,7 +95,7 @@ def timestep_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     band_name = "Least to largest over the phase"
     panel = Panel("", "Delivered restitution", tuple(curves), y_name="e_out", band_name=band_name)
     title = f"Restitution at fixed steps, {safe_text(str(dataset.attrs.get('integrator', '')), 40)}"
-    x_axis = {"x_log": True} if line.x in STEP_AXES else {}
+    x_axis: dict[str, Any] = {"x_log": True} if line.x in STEP_AXES else {}
     return complete(line, title, [panel], choice, **x_axis)
 
 
@@ -133,28 +132,26 @@ def _curve_over_phase(law: LawPart, line: Line, values: xr.DataArray) -> Curve:
     return curve_of(law, line.coordinate, by_phase.mean(axis=1), "e_out", band=band)
 
 
-def read_line(dataset: xr.Dataset, choice: Choice, *names: str, keep: Sequence[str] = ()) -> Line:
-    """Cut a line through a result and read some variables; `keep` as in `take_line`."""
-    line = take_line(dataset, choice, keep)
-    require_outputs(dataset, names)
-    return line._replace(data=read(line.data, names))
-
-
 def _without_empty(curves: list[Curve]) -> list[Curve]:
     """Drop the curves without a finite value, such as a reference without a requested restitution."""
     return [curve for curve in curves if np.isfinite(curve.y).any()]
 
 
-def complete(line: Line, title: str, panels: Sequence[Panel], choice: Choice, **x_axis: Any) -> CurveData:
+def complete(
+    line: Line, title: str, panels: Sequence[Panel], choice: Choice, facts: Iterable[str] = (), **x_axis: Any
+) -> CurveData:
     """Complete panels with the x axis of their line, or other fields, and add the title and the conditions."""
     heading = safe_text(str(line.data.attrs.get("title", "")), 140)
-    conditions = with_model(conditions_of(line.data, line.x), line.data, numbered=choice.equations)
+    conditions = ", ".join(filter(None, (*facts, conditions_of(line.data, line.x))))
+    conditions = with_model(conditions, line.data, numbered=choice.equations)
     if heading and title != FIGURE_6:
         heading, conditions = title, ": ".join(filter(None, (heading, conditions)))
     x_axis = {**x_axis_fields(line.coordinate), "joined": line.is_ordered, **x_axis}
     panels = [replace(panel, **x_axis).with_log_axes(choice.log) for panel in panels]
     empty = {c.law: None for panel in panels for c in panel.curves if c.law and not np.isfinite(c.y).any()}
-    without_value = tuple(f"{key}, which has no point here" for key in empty)
+    # unless it is said why
+    silent = [key for key in empty if not any(text.startswith(f"{key}, ") for text in line.not_drawn)]
+    without_value = tuple(f"{key}, which has no point here" for key in silent)
     return CurveData(heading or title, conditions, tuple(panels), (*line.not_drawn, *without_value))
 
 

@@ -16,7 +16,7 @@ from ..contact.units import names_in, with_numbers
 from ..errors import UsageError, did_you_mean
 from ..formatting import NO_BREAK, argument, prefixed, safe_text
 from ..results.schema import exponents_of, plain_unit
-from ..results.selection import select, select_laws
+from ..results.selection import require_outputs, select, select_laws
 from .kinds import Choice
 
 # values in a picture, which are held as Python objects
@@ -84,18 +84,19 @@ def choose_plane(dataset: xr.Dataset, keys: Sequence[str]) -> Choice | None:
     return None
 
 
-def take_line(dataset: xr.Dataset, choice: Choice, keep: Sequence[str] = ()) -> Line:
-    """Cut a line through a result; its data are not read yet.
+def read_line(dataset: xr.Dataset, choice: Choice, *names: str, keep: Sequence[str] = ()) -> Line:
+    """Cut a line through a result, and read some of its variables.
 
     Parameters
     ----------
     dataset : a result
     choice : its x is by default e, else the first numeric axis; an axis without a selected value shows its first
+    names : of the variables
     keep : names of coordinates whose axes, where they vary along a single one, are kept
 
     Raises
     ------
-    UsageError : an axis, a value or a model is not in the result
+    UsageError : an axis, a value, a model or a variable is not in the result
     """
     dataset = _select(dataset, choice)
     x = x_axis(dataset, choice.x)
@@ -103,14 +104,15 @@ def take_line(dataset: xr.Dataset, choice: Choice, keep: Sequence[str] = ()) -> 
     line, not_drawn = _sorted_along(_drop_other_axes(dataset, [dataset[x].dims[0], *kept]), x)
     if not line[x].size:
         raise UsageError(f"{x} has no finite value to draw over")
+    require_outputs(dataset, names)
     # in the order of the result; e of an alpha has one axis only after a selection
-    return Line(line, x, not_drawn, _is_ordered(dataset, x))
+    return Line(read(line, names), x, not_drawn, _is_ordered(dataset, x))
 
 
 def take_plane(
     dataset: xr.Dataset, kind: str, choice: Choice, keep: Sequence[str]
 ) -> tuple[xr.Dataset, str, str, tuple[str, ...]]:
-    """Cut a plane through a result for a kind of picture, as `take_line` does a line, with two coordinates."""
+    """Cut a plane through a result for a kind of picture, as `read_line` does a line, with two coordinates."""
     dataset = _select(dataset, choice)
     along = [x_axis(dataset, name) for name in (choice.x, choice.y) if name is not None]
     dims = [dataset[name].dims[0] for name in along]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -35,8 +36,8 @@ from .labels import (
     with_model,
     words_of,
 )
-from .restitution import read_line, requested_curve
-from .slices import choose_line, conditions_of
+from .restitution import complete, requested_curve
+from .slices import choose_line, conditions_of, read_line
 from .style import is_geometric, tint
 
 # laws that are drawn unless the user names them
@@ -45,9 +46,8 @@ MAX_LAWS = 5
 SHADED_RESIDUAL = 2.0
 # height of the panel of residuals over that of the values
 RESIDUAL_HEIGHT = 0.55
-# bars of an input, and their colours
-BARS = {"first": "First-order index", "total": "Total index"}
-BAR_COLOURS = {"first": "#8cbfdc", "total": "#0072B2"}
+# bars of an input: name and colour
+BARS = {"first": ("First-order index", "#8cbfdc"), "total": ("Total index", "#0072B2")}
 BAR_HEIGHT = 0.38
 # height of an input, and of what else a panel has [in]
 INPUT_INCHES, PANEL_INCHES = 0.34, 0.55
@@ -209,7 +209,7 @@ class BarData(PlotData):
         entries: dict[str, Artist] = {}
         positions = np.arange(len(self.inputs))[::-1]
         for axes, panel in zip(all_axes, self.panels, strict=True):
-            for offset, (index, name) in zip((0.5, -0.5), BARS.items(), strict=True):
+            for offset, (index, (name, colour)) in zip((0.5, -0.5), BARS.items(), strict=True):
                 values = np.asarray(panel.values[index])
                 # an estimate may be outside of its interval, which ends at 0 or 1
                 ends = np.maximum([values - panel.lower[index], panel.upper[index] - values], 0.0)
@@ -218,7 +218,7 @@ class BarData(PlotData):
                     values,
                     BAR_HEIGHT,
                     xerr=ends,
-                    color=BAR_COLOURS[index],
+                    color=colour,
                     error_kw={"ecolor": tint(1.0), "elinewidth": 0.9, "capsize": 2.5, "capthick": 0.9},
                 )
                 entries.setdefault(name, bars.patches[0])
@@ -284,10 +284,11 @@ def uncertainty_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     if x in dataset.coords and dataset[x].dims == (SAMPLE,):
         raise UsageError(f"{argument('x', x)}: is an uncertain input, expected another axis")
     keep = (SAMPLE, "friction") if "friction" in dataset[name].dims else (SAMPLE,)
-    line, x_name, not_drawn, is_ordered = read_line(dataset, replace(choice, x=x or SAMPLE), name, keep=keep)
-    meaning = "Delivered restitution" if name == "e_out" else words_of(line[name].attrs, name).capitalize()
+    line = read_line(dataset, replace(choice, x=x or SAMPLE), name, keep=keep)
+    not_drawn, unit = line.not_drawn, OUTPUTS[name].unit
+    meaning = "Delivered restitution" if name == "e_out" else words_of(line.data[name].attrs, name).capitalize()
     curves: list[Curve] = []
-    for law in split_by_law(line, numbered=choice.equations):
+    for law in split_by_law(line.data, numbered=choice.equations):
         samples = np.asarray(law.data[name].transpose(..., SAMPLE).values, float)
         if x is None:
             # the distribution function
@@ -303,31 +304,20 @@ def uncertainty_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
         not_drawn += (f"{law.law}, where {failed:,} samples have no result",) if failed else ()
     if not any(np.isfinite([curve.x, curve.y]).all(axis=0).any() for curve in curves):
         raise UsageError(f"nothing to draw: {'; '.join(not_drawn)}")
+    x_axis: dict[str, Any] = {}
     if x is None:
-        unit = OUTPUTS[name].unit
-        panel = Panel(meaning, "Share of samples below", tuple(curves), unit, x_name=name, y_name="share")
+        panel = Panel("", "Share of samples below", tuple(curves), y_name="share")
+        x_axis = {"x_name": name, "x_label": meaning, "x_unit": unit, "x_log": False, "joined": True}
     else:
         # the requested restitution, unless it depends on the sample
-        has_e = name == "e_out" and "e" in line.coords and SAMPLE not in line["e"].dims
-        requested = requested_curve(line, line[x]) if has_e and np.isfinite(line["e"].values).all() else []
-        panel = Panel(
-            y_label=meaning,
-            curves=(*requested, *curves),
-            y_unit=OUTPUTS[name].unit,
-            y_name=name,
-            band_name="5 to 95 % of the samples",
-            joined=is_ordered,
-            **x_axis_fields(line[x]),
-        )
-    title = safe_text(str(dataset.attrs.get("title", "")), 140)
-    conditions = ", ".join(filter(None, (*distribution_texts(dataset), conditions_of(line, x_name))))
-    conditions = with_model(conditions, line, numbered=choice.equations)
-    return CurveData(
-        f"Uncertain inputs: {meaning[0].lower()}{meaning[1:]}",
-        ": ".join(filter(None, (title, conditions))),
-        (panel.with_log_axes(choice.log),),
-        not_drawn,
-    )
+        e = line.data.coords["e"] if name == "e_out" and "e" in line.data.coords else None
+        has_e = e is not None and SAMPLE not in e.dims and np.isfinite(e.values).all()
+        requested = requested_curve(line.data, line.coordinate) if has_e else []
+        band_name = "5 to 95 % of the samples"
+        panel = Panel("", meaning, (*requested, *curves), y_unit=unit, y_name=name, band_name=band_name)
+    title = f"Uncertain inputs: {meaning[0].lower()}{meaning[1:]}"
+    line = line._replace(not_drawn=not_drawn)
+    return complete(line, title, [panel], choice, distribution_texts(dataset), **x_axis)
 
 
 def choose_axis(dataset: xr.Dataset, keys: Sequence[str] | None = None) -> Choice:
