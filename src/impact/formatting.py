@@ -96,14 +96,20 @@ def _python_text(value: object) -> str:
     return repr(value)
 
 
-def number(value: object, digits: int = 6) -> str:
+def number(value: object, digits: int | None = 6) -> str:
     """Format a float with `digits` significant digits; NaN is a dash, and other types use `str`.
+
+    None is for the value of an axis: enough digits to identify it, without rounding errors.
 
     >>> number(1 / 3), number(0.5), number(6e9), number(float("nan")), number(12)
     ('0.333333', '0.5', '6e+09', '–', '12')
+    >>> number(0.1 + 0.2, None), number(6e9, None), number(1234567.0, None), number("steel", None)
+    ('0.3', '6e+09', '1234567', 'steel')
     """
     if not isinstance(value, float):
         return str(value)
+    if digits is None:
+        digits = 6 if value != value or float(f"{value:.6g}") == float(f"{value:.12g}") else 12
     return "–" if value != value else f"{value:.{digits}g}"
 
 
@@ -139,16 +145,6 @@ def percentage(share: float) -> str:
     return ">99.9%" if share > 0.999 else f"{share:.1%}"
 
 
-def label(value: object) -> str:
-    """Write the label of an axis value: enough digits to identify it, without rounding errors or trailing zeros.
-
-    >>> label(0.1 + 0.2), label(6e9), label(1234567.0), label("steel")
-    ('0.3', '6e+09', '1234567', 'steel')
-    """
-    short, long = number(value), number(value, 12)
-    return long if isinstance(value, float) and value == value and float(short) != float(long) else short
-
-
 def rounded(value: float, digits: int, *, up: bool) -> float:
     """Round a number to digits, to the side where a bound of it still holds but for rounding errors.
 
@@ -177,15 +173,11 @@ def prefixed(value: object, unit: str = "1", digits: int | None = None) -> str:
     >>> prefixed(math.pi / 6.0, "rad"), prefixed("steel"), prefixed(0.3), prefixed(1.008542975e-4, "m", 4)
     ('30°', 'steel', '0.3', '100.9 µm')
     """
-
-    def write(value: object) -> str:
-        return label(value) if digits is None else number(value, digits)
-
     if not isinstance(value, float) or unit in ("", "1") or value != value:
-        return write(value)
+        return number(value, digits)
     size, shown = scaled_unit(unit, abs(value))
     superscript = re.sub(r"\^(-?\d+)(?![\d.])", lambda power: power[1].translate(SUPERSCRIPTS), shown)
-    return write(value / size) + superscript if unit == "rad" else f"{write(value / size)} {superscript}"
+    return f"{number(value / size, digits)}{'' if unit == 'rad' else ' '}{superscript}"
 
 
 def polynomial(coefficients: Sequence[float], name: str) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from ..errors import UsageError
-from ..formatting import argument, label as number_label, safe_text
+from ..formatting import argument, number, safe_text
 from .curves import Curve, CurveData, Panel, curve_of, law_curves, x_axis_fields
 from .kinds import Choice, Kind
 from .labels import REFERENCE, LawPart, NamedLaw, split_by_law, with_model
@@ -119,7 +119,7 @@ def _split_by_restitution(line: Line) -> list[tuple[str, xr.Dataset]]:
         raise UsageError(f"got {count} values of e, expected at most {MAX_RESTITUTIONS} to draw; use {use}")
     cases = [line.data.isel({dim: index}) for index in range(count)] if dim else [line.data]
     return [
-        (f"e = {number_label(case['e'].item())}" if "e" in case.coords and not case["e"].ndim else "", case)
+        (f"e = {number(case['e'].item(), None)}" if "e" in case.coords and not case["e"].ndim else "", case)
         for case in cases
     ]
 

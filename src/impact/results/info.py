@@ -15,7 +15,7 @@ from ..contact.model import ForceModel
 from ..display import PIPE_WIDTH, Block, Displayed, Table
 from ..engine.law_catalogue import FrictionDescription, ModelDescription
 from ..errors import UsageError
-from ..formatting import label, number
+from ..formatting import number
 from .attributes import read_attribute
 from .board import Board
 from .calibration import Fits
@@ -169,7 +169,7 @@ def _values_text(dataset: xr.Dataset, name: str) -> str:
     distinct = list(dict.fromkeys(array.tolist()))
     if array.dtype.kind in "fi" and len(distinct) > MAX_LISTED_NUMBERS:
         return f"{number(array.min())} … {number(array.max())}, {array.size} values{suffix}"
-    return ", ".join(label(InputName.parse(name).word(value)) for value in distinct) + suffix
+    return ", ".join(number(InputName.parse(name).word(value), None) for value in distinct) + suffix
 
 
 def describe(

@@ -21,7 +21,7 @@ from ..display import Block, Displayed, Table, Wrapped
 from ..engine.inputs import Inputs, input_at, property_at, smaller_radius_at
 from ..engine.trajectories import axes_of_arrays, probe_index
 from ..errors import ModelError, ResultError
-from ..formatting import label, number, prefixed, quantity, safe_text
+from ..formatting import number, prefixed, quantity, safe_text
 from .attributes import SummaryRecord
 from .layouts import read_inputs
 from .provenance import command_start, inputs_at, replay_command
@@ -379,7 +379,7 @@ class SweepOutcome(Displayed):
             yield Wrapped(f"with each friction law: {counts_text(summary.friction_counts)}")
         failures = self.records()
         for failure, (_, status, _, _) in zip(failures, summary.first_failed, strict=True):
-            inputs = ", ".join(f"{name}={label(value)}" for name, value in failure["at"].items())
+            inputs = ", ".join(f"{name}={number(value, None)}" for name, value in failure["at"].items())
             yield Wrapped(f"failed: {inputs}: {status.meaning}")
             if failure["replay"]:
                 yield f"  {failure['replay']}"
