@@ -122,12 +122,11 @@ class Drawing:
     def command(self, number: int, plan: FigurePlan, legend: str | None) -> str:
         """Write the command that draws a figure; empty if a model is a Python value."""
         kind, choice, _ = plan
-        options = {"x": choice.x, "y": choice.y, "variable": choice.variable}
-        words = [f"--{name}={value}" for name, value in options.items() if value is not None]
+        axes = {"x": choice.x, "y": choice.y}
+        words = [f"--{name}={value}" for name, value in axes.items() if value is not None]
         words += [f"--sel={name}={value}" for name, value in (choice.sel or {}).items()]
         if choice.models and len(choice.models) < self.model_count:
             words += [f"--model={key}" for key in choice.models]
-        words += [f"--friction={key}" for key in choice.frictions or ()]
         words += ["--legend=none"] if legend == "none" else []
         words += ["--width=single", "--no-title", f"--output=figure{number}.svg"]
         start = command_start(self.name or "RESULT.h5", self.dataset, "plot")
@@ -144,12 +143,12 @@ class Drawing:
 
 def _plan_at(dataset: xr.Dataset, plan: FigurePlan, index: Position) -> FigurePlan:
     """Return the plan of the same figure at other indices of some axes."""
-    kind, choice, position = plan
-    position = {**position, **index}
-    if kind.source == "history":
-        return FigurePlan(kind, replace(choice, sel=_inputs_at(dataset, position)), position)
-    sel = {str(dim): dataset[dim].values[place].item() for dim, place in position.items()}
-    return FigurePlan(kind, replace(choice, sel={**(choice.sel or {}), **sel}), position)
+    position = {**plan.position, **index}
+    if plan.kind.source == "history":
+        sel = _inputs_at(dataset, position)
+    else:
+        sel = {str(dim): dataset[dim].values[place].item() for dim, place in position.items()}
+    return FigurePlan(plan.kind, replace(plan.choice, sel=sel), position)
 
 
 def _compare_values(
