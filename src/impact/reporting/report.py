@@ -8,14 +8,13 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
 import numpy as np
 import xarray as xr
-from jinja2 import Environment, FunctionLoader, StrictUndefined, Template
+from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 from markupsafe import Markup
 from numpy.typing import NDArray
 
@@ -28,7 +27,6 @@ from ..contact.evidence import Evidence
 from ..contact.frictions import frictions
 from ..contact.model import ForceModel
 from ..contact.models import catalogue
-from ..contact.status import FrictionStatus, Status
 from ..contact.variables import LAW_DIMS
 from ..engine.plan import Plan
 from ..engine.plugins import read_plugins
@@ -40,7 +38,7 @@ from ..results.board import BOARD_HEADINGS, Board, board_rows, check_rows, engin
 from ..results.calibration import FIT_HEADINGS, calibration_title, describe_data, fit_notes, fit_rows
 from ..results.provenance import stored_config
 from ..results.ranking import DEFAULT_TOL, Ranking, rank_laws
-from ..results.schema import FIT_STATUSES, count_points, exponents_of, kind_of, require_axes
+from ..results.schema import FIT_STATUSES, MODEL_METADATA, count_points, exponents_of, kind_of, require_axes
 from ..results.selection import select_laws
 from ..results.sensitivity import INDEX_HEADINGS, describe_design, study_texts
 from ..results.slabs import MAX_SUMMARY_POINTS, is_large
@@ -266,7 +264,7 @@ def template(name: str) -> Template:
         return value if isinstance(value, Markup) else safe_text(str(value), MAX_TEXT_LETTERS)
 
     environment = Environment(
-        loader=FunctionLoader(lambda name: files(__package__).joinpath(name).read_text(encoding="utf-8")),
+        loader=PackageLoader(__package__, ""),
         autoescape=True,
         finalize=text,
         undefined=StrictUndefined,
@@ -391,11 +389,8 @@ def _failures_section(dataset: xr.Dataset, summary: Summary) -> dict[str, Any]:
     sentences = [f"The status of {summary.not_counted:,} points was not evaluated."] if summary.not_counted else []
     if not summary.failed:
         sentences.append("No other point failed." if summary.not_counted else "No point failed.")
-    # as the summary of a sweep: those of models, else of pairs
-    failed_at: Sequence[tuple[Status | FrictionStatus, tuple[int, ...], tuple[int, ...]]] = summary.failed_at
-    failed_at, variable = (failed_at, "status") if failed_at else (summary.friction_failed_at, "friction_status")
     points = []
-    for status, laws, index in failed_at:
+    for variable, status, laws, index in summary.first_failed:
         axes = [dim for dim in dataset[variable].dims if dim not in LAW_DIMS]
         point = dataset.isel(dict(zip((*LAW_DIMS[: len(laws)], *axes), (*laws, *index), strict=True)))
         keys = [str(point[dim].item()) for dim in LAW_DIMS[: len(laws)]]
@@ -426,21 +421,17 @@ def _facts(dataset: xr.Dataset) -> list[tuple[str, str]]:
 
 def _model_section(model_data: xr.Dataset) -> dict[str, Any]:
     """Describe a model: its reference, and its domain and evidence from the catalogue."""
-    key, title, year, equation, reference, doi = (
-        str(model_data[name].item()) for name in ("model", "title", "year", "equation", "reference", "doi")
-    )
+    texts = {name: str(model_data[name].item()) for name in ("model", *MODEL_METADATA)}
+    key, doi = texts["model"], texts["doi"]
     declaration = catalogue().get(key)
     # a plug-in, or another version of the program, may use this key for another law
-    declaration = declaration if declaration is not None and declaration.equation == equation else None
-    evidence = [_evidence_row(key, declaration.evidence)] if declaration else []
+    declaration = declaration if declaration is not None and declaration.equation == texts["equation"] else None
     is_doi = re.fullmatch(r"10\.[0-9]{4,}/\S+", doi)
     return {
+        **texts,
         "key": key,
-        "title": with_year(title, year),
-        "equation": equation,
-        "reference": reference,
-        "doi": doi,
+        "title": with_year(texts["title"], texts["year"]),
         "link": f"https://doi.org/{quote(doi, safe='/', errors='replace')}" if is_doi else "",
         "domain": declaration.domain_text if declaration else "",
-        "evidence": evidence,
+        "evidence": [_evidence_row(key, declaration.evidence)] if declaration else [],
     }
