@@ -245,5 +245,4 @@ def _axis(dataset: xr.Dataset, axis: Axis) -> dict[str, Any]:
 def _first_axis(axes: Sequence[Mapping[str, Any]]) -> int:
     """Choose e to draw over, else the first axis with several numbers."""
     several = [number for number, axis in enumerate(axes) if len(axis["values"]) > 1 and not axis["has_words"]]
-    of_e = [number for number in several if axes[number]["name"] == "e"]
-    return (of_e or several or [0])[0]
+    return min(several, key=lambda number: axes[number]["name"] != "e", default=0)
