@@ -61,6 +61,10 @@ CSV_KEYS = {"separator": SEPARATORS, "decimal": DECIMALS}
 MISSING = ("", "na", "n/a", "n.a.", "k.a.", "nan", "none", "null", "<na>", "-", "–", "—")
 
 
+# a column, or "" for all together; a row of it, or None for its header; and a message
+ColumnProblem = tuple[str, int | None, str]
+
+
 @dataclass(frozen=True)
 class Columns:
     """Columns of values, by name."""
@@ -80,6 +84,10 @@ class Columns:
         line = self.header if row is None else self.lines[row]
         place = f"{self.source}:{line}" if line else self.source
         return ": ".join(part for part in (place, safe_text(column, 60), message) if part)
+
+    def error(self, problems: Iterable[ColumnProblem]) -> ConfigError:
+        """Build the exception with problems."""
+        return ConfigError(*(self.problem(message, column, row) for column, row, message in problems))
 
     def notes(self, text: str, unused: Sequence[str] = ()) -> tuple[str, ...]:
         """Write notes: a text, such as that of `complete_rows`, and the columns without use."""
@@ -105,15 +113,28 @@ class Columns:
 
     def read(
         self, column: str, quantity: Quantity | None, n: float | None, unit: str = ""
-    ) -> tuple[Sequence[Any], Sequence[tuple[int | None, str]]]:
-        """Convert a column, whose header may lack `unit`, and list problems: of a cell, or None for the header."""
+    ) -> tuple[list[float | str], list[ColumnProblem]]:
+        """Convert a column, whose header may lack `unit`, to SI units or to names of materials, and list problems.
+
+        Cells with the same fault are a single problem, that of the first cell.
+        """
         unit = self.units.get(column) or unit
         try:
             if quantity is not None and unit:
                 quantity.factor(unit, n)
         except UnitError as error:
-            return [], [(None, f"got [{safe_text(unit)}], expected {error}")]
-        return read_cells(self.cells[column], quantity, n, unit, is_text=self.is_text)
+            return [], [(column, None, f"got [{safe_text(unit)}], expected {error}")]
+        values: list[float | str] = []
+        problems: dict[str, tuple[int, str]] = {}
+        others: Counter[str] = Counter()
+        for row, cell in enumerate(self.cells[column]):
+            try:
+                values.append(_read_cell(cell, quantity, n, unit, is_text=self.is_text))
+            except PydanticCustomError as error:
+                reason = error.message().partition(", expected ")[2] or error.message()
+                others[reason] += reason in problems
+                problems.setdefault(reason, (row, error.message()))
+        return values, [(column, row, text + also(others[reason])) for reason, (row, text) in problems.items()]
 
     def values(self, column: str, quantity: Quantity | None, n: float | None, unit: str = "") -> list[Any]:
         """Convert a column as `read` does; its problems are a `ConfigError`."""
@@ -121,10 +142,10 @@ class Columns:
             raise ConfigError(self.problem("got no known column, expected such as material1 or v1 [m/s]"))
         values, problems = self.read(column, quantity, n, unit)
         if problems and quantity is not None and not self.is_known:
-            raise ConfigError(self.problem(f"expected {quantity.expected}", row=problems[0][0]))
+            raise ConfigError(self.problem(f"expected {quantity.expected}", row=problems[0][1]))
         if problems:
-            raise ConfigError(*(self.problem(message, column, row) for row, message in problems))
-        return list(values)
+            raise self.error(problems)
+        return values
 
 
 # the values that replace the name of a CSV file in a config, by path, and notes
@@ -132,27 +153,6 @@ CsvValues = tuple[dict[KeyPath, object], Sequence[str]]
 # the name of such a file, what else is `wanted` of it, see `read_csv`, some of the CSV_KEYS, and what reads the
 # values; a KeyError is that of an unknown key
 CsvFile = tuple[str, tuple[str, ...] | None, dict[str, str], Callable[[Columns], CsvValues]]
-
-
-def read_cells(
-    cells: Iterable[object], quantity: Quantity | None, n: float | None, unit: str = "", *, is_text: bool = False
-) -> tuple[list[float | str], list[tuple[int, str]]]:
-    """Convert cells to SI units or to names of materials; text without a unit is a number only with `is_text`.
-
-    Returns also problems: the index of a cell, and a message. Cells with the same fault are a single problem, that
-    of the first cell.
-    """
-    values: list[float | str] = []
-    problems: dict[str, tuple[int, str]] = {}
-    others: Counter[str] = Counter()
-    for index, cell in enumerate(cells):
-        try:
-            values.append(_read_cell(cell, quantity, n, unit, is_text=is_text))
-        except PydanticCustomError as error:
-            reason = error.message().partition(", expected ")[2] or error.message()
-            others[reason] += reason in problems
-            problems.setdefault(reason, (index, error.message()))
-    return values, [(index, message + also(others[reason])) for reason, (index, message) in problems.items()]
 
 
 def also(count: int) -> str:
@@ -390,11 +390,11 @@ def misspelt_column(header: str, known: Iterable[str], models: Mapping[str, Forc
 
 def complete_rows(
     columns: Columns, names: Iterable[str], *, refuse: bool = False
-) -> tuple[list[int], str, list[tuple[str, int, str]]]:
+) -> tuple[list[int], str, list[ColumnProblem]]:
     """Find the rows in which each column has a value.
 
-    Returns them, a note that counts the others, and problems: column, row and message. The others are problems
-    with `refuse`, or if there is no complete row.
+    Returns them, a note that counts the others, and problems: the others are with `refuse`, or if there is no
+    complete row.
     """
     empty = {
         name: [row for row, cell in enumerate(columns.cells[name]) if str(cell).strip().lower() in MISSING]
@@ -494,7 +494,7 @@ def _read_column(draft: Draft, name: InputName, column: str | None, columns: Col
     is_zipped = any(str(name) in group for group in draft.zip_groups)
     rows, count, gaps = complete_rows(columns, [header], refuse=is_zipped)
     if gaps:
-        raise ConfigError(*(columns.problem(message, header, row) for header, row, message in gaps))
+        raise columns.error(gaps)
     values = columns.take(rows).values(header, name.quantity(draft.known_models), draft.exponent, unit)
     return {name.path: {"empirical": values} if column is None else values}, columns.notes(count)
 

@@ -19,6 +19,7 @@ from ..errors import ConfigError
 from ..formatting import law_name, number, quantity, safe_text
 from .columns import (
     CSV_KEYS,
+    ColumnProblem,
     Columns,
     CsvFile,
     CsvValues,
@@ -28,7 +29,6 @@ from .columns import (
     contains_path,
     csv_form,
     misspelt_column,
-    read_cells,
     split_header,
 )
 from .draft import Draft, Measurements
@@ -76,6 +76,22 @@ class _Column:
         return f"{SIGMA}_{self.name}" if self.kind == SIGMA else self.name
 
 
+# columns that are no inputs, by header
+_COLUMNS = {
+    column.header: column
+    for column in (
+        *(_Column("laboratory", name, quantity) for name, (quantity, _) in LABORATORY.items()),
+        *(_Column("output", name, quantity) for name, quantity in MEASURED_OUTPUTS.items()),
+        _Column("specimen", SPECIMEN, Quantity("1", "name of a specimen")),
+        *(
+            _Column("sigma", name, replace(q, meaning="standard deviation", above=True))
+            for name, (q, _) in LABORATORY.items()
+        ),
+        *(_Column("sigma", name, replace(DEVIATION, unit=q.unit)) for name, q in MEASURED_OUTPUTS.items()),
+    )
+}
+
+
 @dataclass(frozen=True)
 class _Points:
     """Measured points as they are stored."""
@@ -88,12 +104,6 @@ class _Points:
         return {column.name: column.values for column in self.columns if column.kind == kind}
 
 
-# the header of a column, or "" for all together; the index of a cell, or None for the whole column; and a message
-_Problem = tuple[str, int | None, str]
-# the index of a cell, or None for the header, and a message
-_CellProblem = tuple[int | None, str]
-
-
 def purpose_problems(data: Mapping[str, Any]) -> list[ConfigProblem]:
     """Refuse measurements and parameters to fit in a sweep."""
     takes = "use impact calibrate, which takes [data] and { fit = [least, most] }"
@@ -102,7 +112,7 @@ def purpose_problems(data: Mapping[str, Any]) -> list[ConfigProblem]:
     return [(path, f"got a fit, expected a value or an axis; {takes}") for path in paths_with(data, ["fit"])][:1]
 
 
-def _read_columns(columns: Columns, draft: Draft) -> tuple[_Points, list[_Problem]]:
+def _read_columns(columns: Columns, draft: Draft) -> tuple[_Points, list[ColumnProblem]]:
     """Read columns of a file, which are text and have units, or lists of a config, and report all problems."""
     kinds, unused, problems = _used_columns(columns, draft)
     rows, count, gaps = complete_rows(columns, kinds, refuse=draft.table("data").get("missing") == "error")
@@ -119,11 +129,11 @@ def _read_columns(columns: Columns, draft: Draft) -> tuple[_Points, list[_Proble
             unit = columns.units[column.name]
             notes += columns.notes(f"{safe_text(header, 60)}: got no unit, read in [{unit}] as {column.name}")
         values, found = _read_column(complete, column, header, unit, n)
-        problems += [(header, None if index is None else rows[index], message) for index, message in found]
+        problems += [(header, None if row is None else rows[row], message) for _, row, message in found]
         read.append(replace(column, values=tuple(values)))
     points = _Points(tuple(read), tuple(complete.lines), tuple(notes))
     if not problems:
-        problems = list(_approach_problems(dict(zip(kinds, read, strict=True)), rows, draft))
+        problems = list(_approach_problems(points, rows, draft))
     if not problems and points.of_kind("laboratory"):
         g = GRAVITY.read_or_nan(draft.table("data").get("g", STANDARD_GRAVITY))
         points, problems = _with_derived(points, rows, STANDARD_GRAVITY if math.isnan(g) else g)
@@ -133,10 +143,10 @@ def _read_columns(columns: Columns, draft: Draft) -> tuple[_Points, list[_Proble
     return points, problems
 
 
-def _used_columns(columns: Columns, draft: Draft) -> tuple[dict[str, _Column], list[str], list[_Problem]]:
+def _used_columns(columns: Columns, draft: Draft) -> tuple[dict[str, _Column], list[str], list[ColumnProblem]]:
     """Find what columns hold, by header; also returns the headers of those without use, and problems."""
     kinds: dict[str, _Column] = {}
-    problems: list[_Problem] = []
+    problems: list[ColumnProblem] = []
     unused: list[str] = []
     derived = {name: header for header in columns.cells for name in LABORATORY.get(header, (None, ()))[1]}
     outputs = list(dict.fromkeys(name for name in (*columns.cells, *derived) if name in MEASURED_OUTPUTS))
@@ -155,10 +165,7 @@ def _used_columns(columns: Columns, draft: Draft) -> tuple[dict[str, _Column], l
             problems.append((header, None, error.message()))
     if not outputs and not problems:
         problems.append(("", None, "got no column of an output, expected one, such as e_out or contact_time"))
-    of_lab = [column.name for column in kinds.values() if column.kind == "laboratory"]
-    if of_lab:
-        problems += _laboratory_problems(of_lab, kinds, draft)
-    return kinds, unused, problems
+    return kinds, unused, [*problems, *_laboratory_problems(kinds, draft)]
 
 
 def _check_conflict(column: _Column, derived: Mapping[str, str], draft: Draft) -> None:
@@ -175,8 +182,11 @@ def _check_conflict(column: _Column, derived: Mapping[str, str], draft: Draft) -
         raise value_error(f"set together with {others[0]}, from which it follows, expected one of the two")
 
 
-def _laboratory_problems(of_lab: Sequence[str], kinds: Mapping[str, _Column], draft: Draft) -> Iterator[_Problem]:
+def _laboratory_problems(kinds: Mapping[str, _Column], draft: Draft) -> Iterator[ColumnProblem]:
     """Check that heights and times are complete, and those of a ball on a body at rest."""
+    of_lab = [column.name for column in kinds.values() if column.kind == "laboratory"]
+    if not of_lab:
+        return
     if "rebound_height" in of_lab and "drop_height" not in of_lab:
         yield "rebound_height", None, "got no column drop_height, expected one next to it"
     deviations = {column.name: header for header, column in kinds.items() if column.kind == SIGMA}
@@ -190,18 +200,18 @@ def _laboratory_problems(of_lab: Sequence[str], kinds: Mapping[str, _Column], dr
             yield of_lab[0], None, f"{got} in [sweep]: heights and times are those of a ball on a body at rest"
 
 
-def _approach_problems(columns: Mapping[str, _Column], rows: Sequence[int], draft: Draft) -> Iterator[_Problem]:
+def _approach_problems(points: _Points, rows: Sequence[int], draft: Draft) -> Iterator[ColumnProblem]:
     """Refuse rows in which the balls do not meet."""
-    inputs = {column.name: (header, column.values) for header, column in columns.items() if column.kind == "input"}
+    inputs = points.of_kind("input")
     if "v1" not in inputs:
         return
-    header, v1 = inputs["v1"]
+    v1 = inputs["v1"]
     at_rest = SWEEP_QUANTITIES["v2"].read_or_nan(draft.table("sweep").get("v2", SWEEP_DEFAULTS["v2"]))
-    v2 = inputs["v2"][1] if "v2" in inputs else (at_rest,) * len(rows)
+    v2 = inputs.get("v2", (at_rest,) * len(rows))
     apart = [index for index in range(len(rows)) if v1[index] <= v2[index]]
     if apart:
         got = f"got {quantity(v1[apart[0]], 'm/s')} with v2 = {quantity(v2[apart[0]], 'm/s')}"
-        yield header, rows[apart[0]], f"{got}, expected v1 > v2{also(len(apart) - 1)}"
+        yield "v1", rows[apart[0]], f"{got}, expected v1 > v2{also(len(apart) - 1)}"
 
 
 def derive_impacts(
@@ -251,12 +261,36 @@ def derive_impacts(
     return {name: array.tolist() for name, array in derived.items()}, before
 
 
-def _with_derived(points: _Points, rows: Sequence[int], g: float) -> tuple[_Points, list[_Problem]]:
-    """Replace heights and times of flight by what follows from them, and report what cannot."""
+def _with_derived(points: _Points, rows: Sequence[int], g: float) -> tuple[_Points, list[ColumnProblem]]:
+    """Replace heights and times of flight by what follows from them, and report what cannot.
+
+    That is a lone flight, a rebound that no noise explains, and a deviation that does not follow.
+    """
     values = {column.header: column.values for column in points.columns if column.name in LABORATORY}
     specimens = points.of_kind(SPECIMEN).get(SPECIMEN, ("",) * len(rows))
     derived, kept = derive_impacts(values, rows, specimens, g)
-    problems = list(_derived_problems(values, derived, kept, rows))
+    problems: list[ColumnProblem] = []
+    is_flight = "flight_time" in values
+    if is_flight and not kept:
+        expected = "expected at least two rows of it"
+        problems.append(("flight_time", rows[0], f"got no two successive flights of one ball, {expected}"))
+    before, after = ("flight_time", "flight_time") if is_flight else ("drop_height", "rebound_height")
+    unit = LABORATORY[before][0].unit
+    most = MEASURED_OUTPUTS["e_out"].most
+    large = [index for index, e in enumerate(derived.get("e_out", ())) if e > most]
+    if large:
+        first = kept[large[0]]
+        second = first + is_flight
+        got = f"got {quantity(values[after][second], unit)} after {quantity(values[before][first], unit)}"
+        # flights of two balls follow each other only without a column that separates them
+        hint = f"; a column {SPECIMEN} separates balls" if is_flight else ""
+        got += f", an e_out of {number(derived['e_out'][large[0]])}"
+        problems.append((after, rows[second], f"{got}, expected at most {most}{hint}{also(len(large) - 1)}"))
+    undefined = [index for index, sigma in enumerate(derived.get(f"{SIGMA}_e_out", ())) if sigma != sigma]
+    if undefined:
+        got = "got 0 next to a standard deviation, from which none of e_out follows"
+        expected = f"expected a column {SIGMA}_e_out in place of those of heights"
+        problems.append((after, rows[kept[undefined[0]]], f"{got}, {expected}{also(len(undefined) - 1)}"))
     if problems:
         return points, problems
     kinds = {header: _column_of(header, ["e_out"], {}) for header in derived}
@@ -269,56 +303,28 @@ def _with_derived(points: _Points, rows: Sequence[int], g: float) -> tuple[_Poin
     return replace(points, columns=tuple(columns), lines=tuple(points.lines[i] for i in kept)), []
 
 
-def _derived_problems(
-    values: Mapping[str, Sequence[float]],
-    derived: Mapping[str, Sequence[float]],
-    kept: Sequence[int],
-    rows: Sequence[int],
-) -> Iterator[_Problem]:
-    """Refuse a lone flight, a rebound that no noise explains, and a deviation that does not follow."""
-    is_flight = "flight_time" in values
-    if is_flight and not kept:
-        yield "flight_time", rows[0], "got no two successive flights of one ball, expected at least two rows of it"
-    before, after = ("flight_time", "flight_time") if is_flight else ("drop_height", "rebound_height")
-    unit = LABORATORY[before][0].unit
-    most = MEASURED_OUTPUTS["e_out"].most
-    large = [index for index, e in enumerate(derived.get("e_out", ())) if e > most]
-    if large:
-        first = kept[large[0]]
-        second = first + is_flight
-        got = f"got {quantity(values[after][second], unit)} after {quantity(values[before][first], unit)}"
-        # flights of two balls follow each other only without a column that separates them
-        hint = f"; a column {SPECIMEN} separates balls" if is_flight else ""
-        got += f", an e_out of {number(derived['e_out'][large[0]])}"
-        yield after, rows[second], f"{got}, expected at most {most}{hint}{also(len(large) - 1)}"
-    undefined = [index for index, sigma in enumerate(derived.get(f"{SIGMA}_e_out", ())) if sigma != sigma]
-    if undefined:
-        got = "got 0 next to a standard deviation, from which none of e_out follows"
-        expected = f"expected a column {SIGMA}_e_out in place of those of heights"
-        yield after, rows[kept[undefined[0]]], f"{got}, {expected}{also(len(undefined) - 1)}"
-
-
 def _read_column(
     columns: Columns, column: _Column, header: str, unit: str, n: float | None
-) -> tuple[Sequence[object], Sequence[_CellProblem]]:
+) -> tuple[Sequence[object], Sequence[ColumnProblem]]:
     cells = columns.cells[header]
     if column.kind == SPECIMEN:
         return [cell if isinstance(cell, str) else number(cell) for cell in cells], []
-    si_unit, name = column.quantity.unit, safe_text(header, 60)
+    si_unit = column.quantity.unit
     if columns.is_text and not unit and si_unit != "1" and any(_as_float(cell) is not None for cell in cells):
-        return (), [(None, f'got no unit, expected one in brackets, such as "{name} [{si_unit}]"')]
-    problem = None if unit else percent_problem(cells, column.quantity, name)
+        example = f'"{safe_text(header, 60)} [{si_unit}]"'
+        return (), [(header, None, f"got no unit, expected one in brackets, such as {example}")]
+    problem = None if unit else percent_problem(cells, column.quantity, header)
     return ((), [problem]) if problem else columns.read(header, column.quantity, n, unit)
 
 
-def percent_problem(cells: Sequence[object], quantity: Quantity | None, header: str) -> _CellProblem | None:
+def percent_problem(cells: Sequence[object], quantity: Quantity | None, header: str) -> ColumnProblem | None:
     """Describe the first value of a fraction without a unit that may be in percent; None if there is none."""
     most = _INTERVALS["fraction"]["most"]
     large = [index for index, cell in enumerate(cells) if (_as_float(cell) or 0.0) > most]
     if quantity is None or quantity.most != most or not large:
         return None
-    hint = f'percent? name the unit, as in "{header} [%]"{also(len(large) - 1)}'
-    return large[0], f"got {as_text(cells[large[0]])}, expected a fraction: {hint}"
+    hint = f'percent? name the unit, as in "{safe_text(header, 60)} [%]"{also(len(large) - 1)}'
+    return header, large[0], f"got {as_text(cells[large[0]])}, expected a fraction: {hint}"
 
 
 def _as_float(cell: object) -> float | None:
@@ -331,31 +337,23 @@ def _as_float(cell: object) -> float | None:
 
 def _column_of(header: str, outputs: Sequence[str], models: Mapping[str, ForceModel]) -> _Column | None:
     """Find what the column with a header holds, None for no use; `outputs` are the outputs that have a column."""
-    if header in LABORATORY:
-        return _Column("laboratory", header, LABORATORY[header][0])
-    if header in MEASURED_OUTPUTS:
-        return _Column("output", header, MEASURED_OUTPUTS[header])
-    if header == SPECIMEN:
-        return _Column("specimen", header, Quantity("1", "name of a specimen"))
-    measured = header.removeprefix(f"{SIGMA}_")
-    if measured in LABORATORY:
-        deviation = replace(LABORATORY[measured][0], meaning="standard deviation", above=True)
-        return _Column("sigma", measured, deviation)
-    if header == SIGMA or measured in MEASURED_OUTPUTS:
-        if header == SIGMA and len(outputs) > 1:
-            expected = " or ".join(f"{SIGMA}_{output}" for output in outputs)
-            raise value_error(f"got {len(outputs)} outputs, expected {expected}")
-        output = measured if header != SIGMA else next(iter(outputs), "e_out")
-        if outputs and output not in outputs:
-            raise value_error(f"got no column {output}, expected one next to its standard deviation")
-        return _Column("sigma", output, replace(DEVIATION, unit=OUTPUTS[output].unit))
+    if header == SIGMA and len(outputs) > 1:
+        expected = " or ".join(f"{SIGMA}_{output}" for output in outputs)
+        raise value_error(f"got {len(outputs)} outputs, expected {expected}")
+    column = _COLUMNS.get(f"{SIGMA}_{next(iter(outputs), 'e_out')}" if header == SIGMA else header)
+    if column is not None:
+        if (
+            column.kind == SIGMA
+            and column.name in MEASURED_OUTPUTS
+            and column.name not in (outputs or [column.name])
+        ):
+            raise value_error(f"got no column {column.name}, expected one next to its standard deviation")
+        return column
     name = InputName.parse(header)
     try:
         quantity = name.quantity(models)
     except KeyError:
-        of_sigma = [*MEASURED_OUTPUTS, *LABORATORY]
-        known = [*of_sigma, SIGMA, SPECIMEN, *SWEEP_QUANTITIES, *(f"{SIGMA}_{output}" for output in of_sigma)]
-        meant = misspelt_column(header, known, models, "input or output")
+        meant = misspelt_column(header, [*_COLUMNS, SIGMA, *SWEEP_QUANTITIES], models, "input or output")
         if meant:
             raise value_error(meant) from None
         return None
@@ -384,7 +382,7 @@ def _read_file(draft: Draft, headers: Mapping[str, str], columns: Columns) -> Cs
     if problems:
         # a row is under the header of the file, which may have another name in [data]
         named = [(name if row is None else headers.get(name, name), row, text) for name, row, text in problems]
-        raise ConfigError(*(columns.problem(text, header, row) for header, row, text in named[:MAX_PROBLEMS]))
+        raise columns.error(named[:MAX_PROBLEMS])
     values = {column.header: list(column.values) for column in points.columns}
     return {("data", "columns"): values, ("data", "lines"): list(points.lines)}, points.notes
 
@@ -525,11 +523,12 @@ def _read_sigma(value: object, output: str, n_points: int) -> tuple[tuple[Any, .
     cells = value if isinstance(value, list) else [value]
     if cells is value and len(cells) != n_points:
         return (), [(path, f"got {len(cells)} values, expected {n_points}, one for each point")]
-    values, problems = read_cells(cells, replace(DEVIATION, unit=OUTPUTS[output].unit), None)
-    texts = [(index, message) for index, message in problems if isinstance(cells[index], str)]
+    quantity = replace(DEVIATION, unit=OUTPUTS[output].unit)
+    values, problems = columns_of_table({SIGMA: cells}, "").read(SIGMA, quantity, None)
+    texts = [(row, message) for _, row, message in problems if row is not None and isinstance(cells[row], str)]
     if cells is not value:
         return tuple(values) * n_points, [(path, message) for _, message in texts]
-    return tuple(values), [((*path, index), message) for index, message in texts]
+    return tuple(values), [((*path, row), message) for row, message in texts]
 
 
 def _noise_problems(

@@ -124,8 +124,7 @@ def read_points(points: str | Path | Mapping[str, Sequence[object]] | pd.DataFra
         if not (columns.units[name] or unit):
             problem = percent_problem(columns.cells[name], MEASURED_OUTPUTS.get(name), name)
             if problem:
-                row, message = problem
-                raise ConfigError(columns.problem(message, name, row))
+                raise columns.error([problem])
         values[name] = tuple(map(float, columns.values(name, quantity, None, unit)))
         variable = name
     if not LABORATORY.keys().isdisjoint(values):
