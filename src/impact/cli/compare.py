@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -40,15 +41,7 @@ def compare(
     plot: PlotOption = None,
 ) -> None:
     """Compare a result with a baseline: exit 0 if equal, 1 if not (the first line says why), 2 on an error."""
-    from ..comparison.verdict import NoVerdict
-
-    _check_plot(plot, new, baseline)
-    try:
-        verdict = options.call(impact.compare, locals())
-    except ImpactError as error:
-        _print_outcome(NoVerdict(str(new), str(baseline), error=str(error)), format)
-        raise
-    _report_verdict(verdict, format, plot)
+    _report_verdict(partial(options.call, impact.compare, locals()), str(new), str(baseline), format, plot)
 
 
 def bless(
@@ -89,30 +82,33 @@ def rerun(
     quiet: options.Quiet = False,
 ) -> None:
     """Repeat a sweep or a calibration from its result alone, and compare the new values with the stored ones."""
-    with execution(quiet) as keywords:
+    words = locals()
+
+    def repeat_sweep() -> Verdict:
         from ..comparison.rerun import rerun as repeat
-        from ..comparison.verdict import NoVerdict
 
-        _check_plot(plot, result)
-        try:
-            verdict = options.call(repeat, locals(), execute=partial(run_in_memory, **keywords))
-        except ImpactError as error:
-            _print_outcome(NoVerdict("the rerun", str(result), error=str(error)), format)
-            raise
-    _report_verdict(verdict, format, plot)
+        with execution(quiet) as keywords:
+            return options.call(repeat, words, execute=partial(run_in_memory, **keywords))
+
+    _report_verdict(repeat_sweep, "the rerun", str(result), format, plot)
 
 
-def _check_plot(plot: Path | None, *sources: Path) -> None:
-    """Refuse a picture that cannot be stored before any work is done."""
+def _report_verdict(
+    judge: Callable[[], Verdict], new: str, baseline: str, format: Format, plot: Path | None
+) -> None:
+    """Print a verdict, or the error that prevented it, draw the verdict, and exit with its code."""
+    from ..comparison.verdict import NoVerdict
+
     if plot is not None:
         from ..plots.style import check_picture
 
         check_picture(plot)
-        check_outputs([plot], sources, overwrite=True)
-
-
-def _report_verdict(verdict: Verdict, format: Format, plot: Path | None) -> None:
-    """Print a verdict, draw it, and exit with its code."""
+        check_outputs([plot], [new, baseline], overwrite=True)
+    try:
+        verdict = judge()
+    except ImpactError as error:
+        _print_outcome(NoVerdict(new, baseline, error=str(error)), format)
+        raise
     with exits.ignore_broken_pipe():
         if format == "table":
             show(verdict)
