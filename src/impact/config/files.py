@@ -377,14 +377,13 @@ def path_text(path: KeyPath) -> str:
     >>> path_text(("materials", "my steel", "E")), path_text(("sweep", "e", 3))
     ('materials."my steel".E', 'sweep.e[3]')
     """
-    shown = ""
-    for part in path:
+
+    def text_of(part: str | int) -> str:
         if isinstance(part, int):
-            shown += f"[{part}]"
-        else:
-            bare = re.fullmatch(BARE_KEY, part)
-            shown += ("." if shown else "") + (safe_text(part, 60) if bare else f'"{safe_text(part, 60)}"')
-    return shown
+            return f"[{part}]"
+        return f".{safe_text(part, 60)}" if re.fullmatch(BARE_KEY, part) else f'."{safe_text(part, 60)}"'
+
+    return "".join(map(text_of, path)).removeprefix(".")
 
 
 def key_lines(text: str) -> dict[KeyPath, int]:

@@ -208,7 +208,11 @@ def build(draft: Draft, max_points: int = MAX_POINTS, purpose: Purpose = "sweep"
             **{name: value for name, value in defaults.items() if name not in values},
         },
         axes=axes,
-        materials={name: _build_material(table) for name, table in document.materials.items()},
+        # without the properties that are axes
+        materials={
+            name: Material(**{"E": math.nan, "nu": math.nan} | _values_by_key(table, float))
+            for name, table in document.materials.items()
+        },
         solver=document.solver,
         output=document.output,
         text=draft.text,
@@ -334,18 +338,13 @@ def _fit_bounds(values: Values, draft: Draft) -> tuple[dict[str, tuple[float, fl
     return fits, problems
 
 
-def _values_by_key(table: quantities.Table | None) -> dict[str, Any]:
-    """List the values that are set in a table, by key, in the order of definition."""
+def _values_by_key(table: quantities.Table | None, kind: type = object) -> dict[str, Any]:
+    """List the values of a kind that are set in a table, by key, in the order of definition."""
     if table is None:
         return {}
-    fields = type(table).model_fields
-    return {fields[name].alias or name: getattr(table, name) for name in fields if name in table.model_fields_set}
-
-
-def _build_material(table: tables.MaterialTable) -> Material:
-    """Build a material without the properties that are axes."""
-    numbers = {name: value for name, value in _values_by_key(table).items() if isinstance(value, float)}
-    return Material(**({"E": math.nan, "nu": math.nan} | numbers))
+    fields, is_set = type(table).model_fields, table.model_fields_set
+    values = {fields[name].alias or name: getattr(table, name) for name in fields if name in is_set}
+    return {key: value for key, value in values.items() if isinstance(value, kind)}
 
 
 def _calibration_problems(

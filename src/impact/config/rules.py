@@ -100,8 +100,7 @@ def check_rules(draft: Draft) -> Draft:
     """Add the problems of all rules."""
     if not isinstance(draft.data.get("sweep"), dict):
         return draft
-    for rule in RULES:
-        draft = draft.with_problems(tuple(rule(draft)))
+    draft = draft.with_problems(problem for rule in RULES for problem in rule(draft))
     if "cases" in draft.table("sweep") or ("data" in draft.data and draft.measurements is None):
         # cases and measurements that cannot be read may contain the inputs that seem to be missing
         problems = tuple(problem for problem in draft.problems if not problem[1].startswith("missing"))
