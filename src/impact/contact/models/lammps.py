@@ -6,7 +6,7 @@ By default the force pulls until the indentation is zero; with limit_damping the
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -41,24 +41,24 @@ LIMIT_YEAR = 2021
 MASS_VELOCITY = LEE_HERRMANN_1993.parameters
 VISCOELASTIC = (damping("eta", "1/m/s", "damping η per effective mass and contact radius"),)
 
-# (key, release="gap" or "force", fields of ForceModel) -> law that ends at zero indentation or at zero force
-MakeLaw = Callable[..., ForceModel]
+# make a law, from fields of ForceModel, that ends at zero indentation, and one that ends at zero force
+MakeLaws = Iterable[Callable[..., ForceModel]]
 
 
-def renamed(pulling: ForceModel, limited: ForceModel) -> MakeLaw:
-    """Makes one of two laws of the catalogue under another name; the formulas stay the same."""
-    laws = {"gap": pulling, "force": limited}
+def renamed(*laws: ForceModel) -> MakeLaws:
+    """Make laws of the catalogue under another name; the formulas stay the same."""
+    return [partial(same_law, law) for law in laws]
 
-    def make(key: str, *, release: str, **about: Any) -> ForceModel:
-        return same_law(laws[release], key, **about)
 
-    return make
+def with_releases(make: Callable[..., ForceModel], **about: Any) -> MakeLaws:
+    """Make laws that differ in where the contact ends."""
+    return [partial(make, release=release, **about) for release in ("gap", "force")]
 
 
 def with_and_without_limit(
     option: str,
     damping: str,
-    make: MakeLaw,
+    laws: MakeLaws,
     *,
     key: str = "",
     since: str = "since March 2019",
@@ -68,20 +68,19 @@ def with_and_without_limit(
 ) -> Iterator[ForceModel]:
     """Make the laws of one option of LAMMPS: the default, and the one with limit_damping.
 
-    `since` names the releases that have it, `year` is that of the first; `make` gets the key and the release. By
-    default the key is that of the option.
+    `since` names the releases that have it, `year` is that of the first. By default the key is that of the option.
     """
     key = key or re.sub("[_, ]+", "-", f"lammps-{option}")
     spring = "F = K δ" if option.endswith("hooke") else "F = K δ^(3/2)"
     # limit_damping is newer than the oldest of these options
     limited = re.sub(r"(March )?2019", f"April {LIMIT_YEAR}", since)
-    for release, suffix, keywords, end, releases, first_year in (
-        ("gap", "", option, "δ = 0", since, year),
-        ("force", "-limit", f"{option}, limit_damping", "F = 0", limited, max(year, LIMIT_YEAR)),
-    ):
+    of_release = (
+        ("", option, "δ = 0", since, year),
+        ("-limit", f"{option}, limit_damping", "F = 0", limited, max(year, LIMIT_YEAR)),
+    )
+    for make, (suffix, keywords, end, releases, first_year) in zip(laws, of_release, strict=True):
         yield make(
-            key + suffix,
-            release=release,
+            key=key + suffix,
             title=f"LAMMPS {keywords} ({releases})",
             year=first_year,
             equation=f"{spring} + {damping}, to {end}",
@@ -91,22 +90,15 @@ def with_and_without_limit(
         )
 
 
-def mass_velocity_hertz(key: str, *, release: str, **about: Any) -> ForceModel:
-    """Make the law F = K δ^(3/2) + γ m δ̇; with release "force" it is that of Lee and Herrmann."""
-    if release == "force":
-        return same_law(LEE_HERRMANN_1993, key, **about)
-    return replace(LEE_HERRMANN_1993, key=key, release="gap", doi="", **about)
-
-
-def tsuji(root: float, exponent: float) -> MakeLaw:
-    """Makes the dashpot α √(m K) δ^((n−1)/2) δ̇ with α = root p(e)."""
+def tsuji(root: float, exponent: float) -> MakeLaws:
+    """Make the dashpot α √(m K) δ^((n−1)/2) δ̇ with α = root p(e)."""
     scale = root / np.sqrt(2 * (exponent + 1))
-    return partial(dashpot, zeta=lambda e: scale * np.polyval(TSUJI_POLYNOMIAL[::-1], e), exponent=exponent)
+    return with_releases(dashpot, zeta=lambda e: scale * np.polyval(TSUJI_POLYNOMIAL[::-1], e), exponent=exponent)
 
 
-def viscoelastic(exponent: float) -> MakeLaw:
-    """Makes the damping η m a δ̇ with the contact radius a = √(R* δ), which LAMMPS also has for a linear spring."""
-    return partial(
+def viscoelastic(exponent: float) -> MakeLaws:
+    """Make the damping η m a δ̇ with the contact radius a = √(R* δ), which LAMMPS also has for a linear spring."""
+    return with_releases(
         drag,
         c=lambda eta, m, R_eff: eta * m * np.sqrt(R_eff),
         q=0.5,
@@ -154,13 +146,17 @@ LAMMPS_MODELS: tuple[ForceModel, ...] = (
         key="lammps-tsuji-hooke-without-root", **WITHOUT_ROOT,
     ),
     *with_and_without_limit(
-        "velocity, hertz", "C δ̇", partial(drag, c=lambda C: C, q=0.0, parameters=DASHPOT_CONSTANT),
+        "velocity, hertz", "C δ̇", with_releases(drag, c=lambda C: C, q=0.0, parameters=DASHPOT_CONSTANT),
     ),
     *with_and_without_limit("velocity, hooke", "C δ̇", renamed(KELVIN_VOIGT, KELVIN_VOIGT_NO_TENSION)),
-    *with_and_without_limit("mass_velocity, hertz", "γ m δ̇", mass_velocity_hertz, since="since 2019"),
+    *with_and_without_limit(
+        "mass_velocity, hertz", "γ m δ̇",
+        (partial(replace, LEE_HERRMANN_1993, release="gap", doi=""), partial(same_law, LEE_HERRMANN_1993)),
+        since="since 2019",
+    ),
     *with_and_without_limit(
         "mass_velocity, hooke", "γ m δ̇",
-        partial(
+        with_releases(
             dashpot, zeta=lambda gamma, m, K: 0.5 * gamma * np.sqrt(m / K), parameters=MASS_VELOCITY, exponent=1.0
         ),
         since="since 2019",
