@@ -25,7 +25,7 @@ from ..inverse.timestep import FixedStepLaw, first_values_line, law_at_point
 from ..results.calibration import position_of_law, unidentified_notes
 from ..results.single_impact import Calibration, ConfigSource, PointSource, open_source
 from .code import Code, Collision
-from .registry import first_law, has_law, is_written_as, law_of_code
+from .registry import first_law, has_law, law_of_code
 
 # phases over which the mean, the least and the largest restitution are taken
 PHASES = 400
@@ -179,7 +179,7 @@ def _with_parameters(source: PointSource, key: str, code: Code, version: str) ->
     draft = source.config_draft
     tables = draft.table("model")
     same = original_key(key)
-    others = [name for name in tables if original_key(name) == same or is_written_as(code, name, version, key)]
+    others = [name for name in tables if original_key(name) == same or has_law(code, key, version, name)]
     # a calibration renames the laws that were fitted
     if source.calibration is not None or key in others or not others:
         return source

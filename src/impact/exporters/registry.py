@@ -93,25 +93,16 @@ def law_of_code(code: Code, model: str, version: str) -> str:
     return code.law_for_version(model, version)
 
 
-def has_law(code: Code, key: str, version: str) -> bool:
-    """Whether a version of a code has a law as it is: it may have another one under the same name.
+def has_law(code: Code, key: str, version: str, model: str | None = None) -> bool:
+    """Whether a version of a code has a law as it is, or writes it for another `model` of the catalogue.
 
     >>> [has_law(find_code("lammps"), "lammps-tsuji", version) for version in ("20260901", "20250722")]
     [True, False]
-    """
-    with contextlib.suppress(UsageError):
-        return original_key(law_of_code(code, key, version)) == original_key(key)
-    return False
-
-
-def is_written_as(code: Code, model: str, version: str, key: str) -> bool:
-    """Whether the law of a version of a code for a key of the catalogue is the one of another key.
-
-    >>> is_written_as(find_code("yade"), "kelvin-voigt", "2023.02a", "yade-viscoelastic")
+    >>> has_law(find_code("yade"), "yade-viscoelastic", "2023.02a", "kelvin-voigt")
     True
     """
     with contextlib.suppress(UsageError):
-        return law_of_code(code, model, version) == key
+        return original_key(law_of_code(code, model or key, version)) == original_key(key)
     return False
 
 
