@@ -10,7 +10,7 @@ import pytest
 import impact
 from impact.config.load import Config, read_config
 from impact.config.tables import expand_laws
-from impact.contact.models import built_in, catalogue, find
+from impact.contact.models import catalogue, find
 from impact.errors import ModelError
 from impact.results.single_impact import Impact
 
@@ -238,7 +238,7 @@ def test_a_missing_parameter_of_a_law_chosen_by_name_is_reported_without_the_exc
     assert problems_of_choice(choice) == [f"config: model.kelvin-voigt.C: {missing}"]
 
 
-@pytest.mark.parametrize("key", sorted(built_in()))
+@pytest.mark.parametrize("key", sorted(catalogue()))
 def test_a_law_states_its_equation_reference_and_year(key):
     law = find(key)
     assert re.search(r"\bF = ", law.equation)
@@ -298,7 +298,7 @@ SOURCE_LOCATION = re.compile(
 )
 
 
-@pytest.mark.parametrize("key", sorted(built_in()))
+@pytest.mark.parametrize("key", sorted(catalogue()))
 def test_evidence_names_where_the_law_and_its_doi_were_read(key):
     law = find(key)
     if law.evidence.state != "not verified":

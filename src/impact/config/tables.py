@@ -30,7 +30,7 @@ from ..contact.fixed_step import EXACT, MAX_STEPS_PER_CONTACT, SCHEMES
 from ..contact.friction import FrictionLaw
 from ..contact.frictions import frictions
 from ..contact.model import ForceModel
-from ..contact.models import built_in, catalogue
+from ..contact.models import catalogue
 from ..contact.variables import OUTPUTS
 from ..errors import did_you_mean
 from .quantities import (
@@ -610,7 +610,8 @@ def _laws_matching(word: object, laws: Mapping[str, L], what: str) -> dict[str, 
     # a law with two names is not run twice
     distinct = {key: law for key, law in laws.items() if not law.same_as and not getattr(law, "scheme", "")}
     if word == "all":
-        return {key: law for key, law in distinct.items() if isinstance(law, FrictionLaw) or key in built_in()}
+        built_in = catalogue()
+        return {key: law for key, law in distinct.items() if isinstance(law, FrictionLaw) or key in built_in}
     if word.startswith("family:") and what == "model":
         family = word.removeprefix("family:")
         members = {key: law for key, law in distinct.items() if getattr(law, "family", "") == family}

@@ -29,11 +29,6 @@ def _built_in() -> tuple[ForceModel, ...]:
     return tuple(sorted(models, key=lambda m: (rank.get(m.family, len(rank)), m.year, m.key)))
 
 
-def built_in() -> frozenset[str]:
-    """Find the keys of the models that are built in."""
-    return frozenset(model.key for model in _built_in())
-
-
 def catalogue(plugins: Sequence[ForceModel] = ()) -> Mapping[str, ForceModel]:
     """Collect all models by key: the built-in ones, then the plug-ins.
 
