@@ -354,13 +354,12 @@ class ExtendedPlan(Plan):
     def _not_needed(self, trajectory_range: TrajectoryRange) -> ReusedPart:
         """Mark the trajectories of a range that only points need which the old result holds in full."""
         trajectory_map = self.maps[trajectory_range.model]
-        others = [axis for axis in range(len(self.positions)) if axis not in trajectory_map.axes]
-        is_new_along = [(self.positions[axis].positions < 0).any() for axis in others]
+        others = (axis for number, axis in enumerate(self.positions) if number not in trajectory_map.axes)
         # a pair needs the trajectories of its model
         law = self.laws[trajectory_range.model]
         needed = zip(self.laws, self.old_laws, strict=True)
         is_new = any(number is None and law in (other, model_of(other)) for other, number in needed)
-        if is_new or any(is_new_along):
+        if is_new or any((axis.positions < 0).any() for axis in others):
             return super().reused(trajectory_range)
         of_cell, is_old_cell, _ = self._old_cells(trajectory_range)
         is_old = np.ones(trajectory_range.size, bool)

@@ -734,7 +734,7 @@ def _without_axes(
     for axis in (axis for axis in config.axes if axis not in kept):
         position = _position_on_axis(axis, at)
         scalars |= {name: values[position] for name, values in axis.columns.items()}
-        if axis.size > 1 and at.keys().isdisjoint(_selectable_columns(axis)):
+        if axis.size > 1 and at.keys().isdisjoint({axis.name, *axis.columns}):
             first += axis.columns
     others = {name for name in scalars.keys() - at.keys() if not InputName.parse(name).applies_to(*keys)}
     scalars = {name: value for name, value in scalars.items() if name not in others}
@@ -742,14 +742,9 @@ def _without_axes(
     return config, tuple(name for name in first if name not in others)
 
 
-def _selectable_columns(axis: Axis) -> dict[str, Sequence[float | str]]:
-    """List the values that can select a point of an axis: its columns, and the number of a case."""
-    return {**({axis.numbered: axis.labels} if axis.numbered else {}), **axis.columns}
-
-
 def _position_on_axis(axis: Axis, at: Mapping[str, float | str]) -> int:
-    """Find the first position on an axis at which its columns have the values of `at`."""
-    columns = _selectable_columns(axis)
+    """Find the first position on an axis at which its columns, or its numbers, have the values of `at`."""
+    columns: dict[str, Sequence[float | str]] = {axis.name: axis.labels, **axis.columns}
     selected = with_words({name: value for name, value in at.items() if name in columns})
     for position in range(axis.size):
         if with_words({name: columns[name][position] for name in selected}) == selected:
