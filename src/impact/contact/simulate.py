@@ -333,16 +333,13 @@ def integrate_collisions(
     integrates the phases that have a form for it compiled, unless they are recorded: `recorded` receives the
     motion of impacts that are all equal.
     """
-    back = motion.restitution_law(law)
-    forms: tuple[dispatch.Form | None, dispatch.Form | None] = (None, None)
-    if core == "numba" and recorded is None:
-        forms = dispatch.approach_form(law), dispatch.restitution_form(back)
     run = partial(integrate, rtol=rtol, max_steps=max_steps, record=recorded is not None)
 
     def solve(
         law: motion.MotionLaw, problem: Problem, start: Array, params: Params, recovery: Recovery | None
     ) -> Solution:
-        form = forms[0 if recovery is None else 1]
+        form_of = dispatch.approach_form if recovery is None else dispatch.restitution_form
+        form = form_of(law) if core == "numba" and recorded is None else None
         if form is not None:
             return dispatch.integrate_compiled(form, law, problem, start, params, rtol=rtol, max_steps=max_steps)
         residual = None if recovery is None else recovery[1]
