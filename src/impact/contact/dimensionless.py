@@ -12,7 +12,7 @@ import numpy as np
 
 from ..array_types import Array
 from ..errors import ModelError
-from .formula_calls import argument_names, call_by_name
+from .formula_calls import Formula, argument_names, call_by_name
 from .impacts import Impacts
 from .model import QUANTITIES, ForceModel
 from .units import names_in
@@ -55,23 +55,21 @@ def with_coefficients(model: ForceModel, values: Mapping[str, Array | float], co
     extended = dict(values)
     for name, formula in model.coefficients.items():
         # adding zero turns -0.0 into 0.0, which is the same physics
-        extended[name] = np.broadcast_to(_checked_shape(call_by_name(formula, extended), count), count) + 0.0
+        extended[name] = _evaluated(formula, extended, count) + 0.0
     return extended
 
 
 def exact_restitution(model: ForceModel, values: LawValues, count: int) -> Array:
     """Compute the delivered restitution by the law's closed form, NaN where it has none; shape (count,)."""
-    exact = np.full(count, np.nan)
-    if model.oracle is not None:
-        exact[:] = _checked_shape(call_by_name(model.oracle, values), count)
-    return exact
+    return np.full(count, np.nan) if model.oracle is None else _evaluated(model.oracle, values, count).copy()
 
 
-def _checked_shape(value: Array, count: int) -> Array:
-    """Return the value, if it is a number for all impacts or has one for each."""
+def _evaluated(formula: Formula, values: LawValues, count: int) -> Array:
+    """Compute a formula, whose value is a number for all impacts or has one for each; shape (count,)."""
+    value = call_by_name(formula, values)
     if value.shape not in ((), (count,)):
         raise ModelError(f"a formula returned shape {value.shape}, expected ({count},)")
-    return value
+    return np.broadcast_to(value, count)
 
 
 def chi_of(values: LawValues, count: int) -> Array:
