@@ -41,7 +41,8 @@ def compare(
     plot: PlotOption = None,
 ) -> None:
     """Compare a result with a baseline: exit 0 if equal, 1 if not (the first line says why), 2 on an error."""
-    _report_verdict(partial(options.call, impact.compare, locals()), str(new), str(baseline), format, plot)
+    words = locals()
+    _report_verdict(lambda: options.call(impact.compare, words), str(new), str(baseline), format, plot)
 
 
 def bless(
