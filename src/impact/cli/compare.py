@@ -111,10 +111,7 @@ def _report_verdict(
         _print_outcome(NoVerdict(new, baseline, error=str(error)), format)
         raise
     with exits.ignore_broken_pipe():
-        if format == "table":
-            show(verdict)
-        else:
-            _print_outcome(verdict, format)
+        _print_outcome(verdict, format)
     if plot is not None and not verdict.worst_along:
         # a missing picture does not change the verdict
         exits.print_line("nothing to draw: no variable was compared along an axis")
@@ -132,6 +129,8 @@ def _print_outcome(outcome: Verdict, format: Format) -> None:
     from ..comparison import verdict
 
     match format:
+        case "table" if not isinstance(outcome, verdict.NoVerdict):
+            show(outcome)
         case "json":
             print(dump(outcome.as_dict()))
         case "junit":

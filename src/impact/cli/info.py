@@ -31,8 +31,7 @@ def schema(
     json_schema = impact.schema(output, overwrite=overwrite)
     if output is None:
         print(json.dumps(json_schema, indent=2))
-    else:
-        exits.print_written(output)
+    exits.print_written(output)
 
 
 def info(

@@ -62,14 +62,11 @@ def models(
                 raise UsageError(f"{name}: got it with {other}, expected one of the two")
     if check is not None:
         others = impact.models()
-        if not check.suffix:
-            if key is not None:
-                raise UsageError(f"--check: got {check} with {key}, expected one of the two")
-            _check_contract([others.find(str(check))], as_json=as_json)
-            return
-        with_file = impact.models([check])
-        of_file = [model for name, model in with_file.items() if name not in others and key in (None, name)]
-        _check_contract(of_file or [with_file.find(str(key))], as_json=as_json)
+        if not check.suffix and key is not None:
+            raise UsageError(f"--check: got {check} with {key}, expected one of the two")
+        known = impact.models([check]) if check.suffix else others
+        of_file = [model for name, model in known.items() if name not in others and key in (None, name)]
+        _check_contract(of_file or [known.find(str(key if check.suffix else check))], as_json=as_json)
         return
     shown: Displayed
     if key is not None and is_law:
