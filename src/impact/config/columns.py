@@ -136,17 +136,6 @@ class Columns:
                 problems.setdefault(reason, (row, error.message()))
         return values, [(column, row, text + also(others[reason])) for reason, (row, text) in problems.items()]
 
-    def values(self, column: str, quantity: Quantity | None, n: float | None, unit: str = "") -> list[Any]:
-        """Convert a column as `read` does; its problems are a `ConfigError`."""
-        if quantity is None and not self.is_known:
-            raise ConfigError(self.problem("got no known column, expected such as material1 or v1 [m/s]"))
-        values, problems = self.read(column, quantity, n, unit)
-        if problems and quantity is not None and not self.is_known:
-            raise ConfigError(self.problem(f"expected {quantity.expected}", row=problems[0][1]))
-        if problems:
-            raise self.error(problems)
-        return values
-
 
 # the values that replace the name of a CSV file in a config, by path, and notes
 CsvValues = tuple[dict[KeyPath, object], Sequence[str]]
@@ -495,7 +484,14 @@ def _read_column(draft: Draft, name: InputName, column: str | None, columns: Col
     rows, count, gaps = complete_rows(columns, [header], refuse=is_zipped)
     if gaps:
         raise columns.error(gaps)
-    values = columns.take(rows).values(header, name.quantity(draft.known_models), draft.exponent, unit)
+    quantity, complete = name.quantity(draft.known_models), columns.take(rows)
+    if quantity is None and not columns.is_known:
+        raise ConfigError(columns.problem("got no known column, expected such as material1 or v1 [m/s]"))
+    values, problems = complete.read(header, quantity, draft.exponent, unit)
+    if problems and quantity is not None and not columns.is_known:
+        problems = [("", problems[0][1], f"expected {quantity.expected}")]
+    if problems:
+        raise complete.error(problems)
     return {name.path: {"empirical": values} if column is None else values}, columns.notes(count)
 
 
@@ -519,10 +515,8 @@ def _read_cases(draft: Draft, columns: Columns) -> CsvValues:
     # n may be one of the columns
     n = None if "n" in columns.units else draft.exponent
     for name, quantity in quantities.items():
-        try:
-            values[name] = complete.values(name, quantity, n)
-        except ConfigError as error:
-            problems += error.problems
+        values[name], found = complete.read(name, quantity, n)
+        problems += complete.error(found).problems
     if problems:
         raise ConfigError(*problems)
     return {("sweep", "cases"): values}, columns.notes(count, unused)

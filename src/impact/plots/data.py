@@ -121,11 +121,12 @@ def read_points(points: str | Path | Mapping[str, Sequence[object]] | pd.DataFra
             measured = name.removeprefix(f"{SIGMA}_") if name != SIGMA else variable
             unit = columns.units.get(measured, "")
             quantity = replace(quantity, unit=quantities[measured].unit) if measured else quantity
-        if not (columns.units[name] or unit):
-            problem = percent_problem(columns.cells[name], MEASURED_OUTPUTS.get(name), name)
-            if problem:
-                raise columns.error([problem])
-        values[name] = tuple(map(float, columns.values(name, quantity, None, unit)))
+        has_unit, measured_as = columns.units[name] or unit, MEASURED_OUTPUTS.get(name)
+        problem = None if has_unit else percent_problem(columns.cells[name], measured_as, name)
+        numbers, wrong = ([], [problem]) if problem else columns.read(name, quantity, None, unit)
+        if wrong:
+            raise columns.error(wrong)
+        values[name] = tuple(map(float, numbers))
         variable = name
     if not LABORATORY.keys().isdisjoint(values):
         specimens = list(map(str, columns.cells.get(SPECIMEN, [""] * len(rows))))
