@@ -50,7 +50,7 @@ def renamed(*laws: ForceModel) -> MakeLaws:
     return [partial(same_law, law) for law in laws]
 
 
-def with_releases(make: Callable[..., ForceModel], **about: Any) -> MakeLaws:
+def both_releases(make: Callable[..., ForceModel], **about: Any) -> MakeLaws:
     """Make laws that differ in where the contact ends."""
     return [partial(make, release=release, **about) for release in ("gap", "force")]
 
@@ -93,12 +93,12 @@ def with_and_without_limit(
 def tsuji(root: float, exponent: float) -> MakeLaws:
     """Make the dashpot α √(m K) δ^((n−1)/2) δ̇ with α = root p(e)."""
     scale = root / np.sqrt(2 * (exponent + 1))
-    return with_releases(dashpot, zeta=lambda e: scale * np.polyval(TSUJI_POLYNOMIAL[::-1], e), exponent=exponent)
+    return both_releases(dashpot, zeta=lambda e: scale * np.polyval(TSUJI_POLYNOMIAL[::-1], e), exponent=exponent)
 
 
 def viscoelastic(exponent: float) -> MakeLaws:
     """Make the damping η m a δ̇ with the contact radius a = √(R* δ), which LAMMPS also has for a linear spring."""
-    return with_releases(
+    return both_releases(
         drag,
         c=lambda eta, m, R_eff: eta * m * np.sqrt(R_eff),
         q=0.5,
@@ -146,7 +146,7 @@ LAMMPS_MODELS: tuple[ForceModel, ...] = (
         key="lammps-tsuji-hooke-without-root", **WITHOUT_ROOT,
     ),
     *with_and_without_limit(
-        "velocity, hertz", "C δ̇", with_releases(drag, c=lambda C: C, q=0.0, parameters=DASHPOT_CONSTANT),
+        "velocity, hertz", "C δ̇", both_releases(drag, c=lambda C: C, q=0.0, parameters=DASHPOT_CONSTANT),
     ),
     *with_and_without_limit("velocity, hooke", "C δ̇", renamed(KELVIN_VOIGT, KELVIN_VOIGT_NO_TENSION)),
     *with_and_without_limit(
@@ -156,7 +156,7 @@ LAMMPS_MODELS: tuple[ForceModel, ...] = (
     ),
     *with_and_without_limit(
         "mass_velocity, hooke", "γ m δ̇",
-        with_releases(
+        both_releases(
             dashpot, zeta=lambda gamma, m, K: 0.5 * gamma * np.sqrt(m / K), parameters=MASS_VELOCITY, exponent=1.0
         ),
         since="since 2019",
