@@ -5,7 +5,6 @@ from __future__ import annotations
 import ctypes
 import math
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -34,39 +33,34 @@ create_atoms 1 single {0!r} {1!r} 0
 set atom {ball.number} diameter {2!r} mass {ball.m!r}
 set atom {ball.number} vx {ball.v!r} vy {ball.u!r} vz 0 omega 0 0 {ball.omega!r}
 """
+# of two balls, and of a ball and a wall; the damping gamma is per effective mass [1/s], and none is tangential
+GRANULAR = "hooke {k!r} {e!r} damping coeff_restitution tangential linear_history {k_t!r} 0.0 {mu!r}"
+GRANULAR_CONTACTS = (
+    f"pair_style granular\npair_coeff * * {GRANULAR}",
+    f"fix wall all wall/gran granular {GRANULAR} xplane NULL 0.0",
+)
+HOOKE_HISTORY = "hooke/history {k!r} {k_t!r} {gamma!r} 0.0 {mu!r} 0"
+HOOKE_HISTORY_CONTACTS = (
+    f"pair_style gran/{HOOKE_HISTORY}\npair_coeff * *",
+    f"fix wall all wall/gran {HOOKE_HISTORY} xplane NULL 0.0",
+)
 # over that of the normal spring: both have the same period for solid balls
 TANGENTIAL_STIFFNESS = 2.0 / 7.0
 
 
 def collide(c: dict[str, Any]) -> dict[str, Any]:
     """Run a collision with pair style granular and fix wall/gran granular."""
-
-    def contact(k: float, k_t: float, is_wall: bool) -> str:
-        model = (
-            f"hooke {k!r} {c['e']!r} damping coeff_restitution tangential linear_history {k_t!r} 0.0 {c['mu']!r}"
-        )
-        if is_wall:
-            return f"fix wall all wall/gran granular {model} xplane NULL 0.0"
-        return f"pair_style granular\npair_coeff * * {model}"
-
     law = {"law": "lammps-linear-history", "model": "lammps-coeff-restitution-hooke"}
-    return run(c, contact, **law, parameters={"kt_over_kn": TANGENTIAL_STIFFNESS, "xt": 0.0})
+    return run(c, GRANULAR_CONTACTS, **law, parameters={"kt_over_kn": TANGENTIAL_STIFFNESS, "xt": 0.0})
 
 
 def collide_hooke_history(c: dict[str, Any]) -> dict[str, Any]:
     """Run a collision with pair style gran/hooke/history and fix wall/gran hooke/history."""
-
-    def contact(k: float, k_t: float, is_wall: bool) -> str:
-        # the damping is per effective mass [1/s]; the last number is no tangential damping
-        values = f"{k!r} {k_t!r} {-2.0 * math.log(c['e']) / c['contact_time']!r} 0.0 {c['mu']!r} 0"
-        if is_wall:
-            return f"fix wall all wall/gran hooke/history {values} xplane NULL 0.0"
-        return f"pair_style gran/hooke/history {values}\npair_coeff * *"
-
-    return run(c, contact, law="cundall-strack-1979", parameters={"kt_over_kn": TANGENTIAL_STIFFNESS})
+    law = "cundall-strack-1979"
+    return run(c, HOOKE_HISTORY_CONTACTS, law=law, parameters={"kt_over_kn": TANGENTIAL_STIFFNESS})
 
 
-def run(c: dict[str, Any], contact: Callable[[float, float, bool], str], **law: Any) -> dict[str, Any]:
+def run(c: dict[str, Any], contacts: tuple[str, str], **law: Any) -> dict[str, Any]:
     """Run a collision, with the lines of a contact of springs k and k_t [N/m]."""
     # the wheel needs an MPI library, which the wheel of MPICH installs where the loader does not look
     for path in Path(sys.prefix, "lib").glob("libmpi.so.12"):
@@ -78,7 +72,8 @@ def run(c: dict[str, Any], contact: Callable[[float, float, bool], str], **law: 
     if not all(ball.is_solid for ball in balls):
         return answer_of(c, (), "compliant", error="atoms are solid spheres", **facts)
     k = harmonic(ball.m for ball in balls) * (math.pi**2 + math.log(c["e"]) ** 2) / c["contact_time"] ** 2
-    lines = contact(k, TANGENTIAL_STIFFNESS * k, len(balls) == 1)
+    gamma = -2.0 * math.log(c["e"]) / c["contact_time"]
+    lines = contacts[len(balls) == 1].format(k=k, k_t=TANGENTIAL_STIFFNESS * k, gamma=gamma, **c)
     program = lammps.lammps(cmdargs=["-log", "none", "-screen", "none"])
     program.commands_string(granular_script(SCRIPT, ATOM, c, contact=lines))
     order = program.numpy.extract_atom("id")[: len(balls)].argsort()
