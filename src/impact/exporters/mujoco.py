@@ -106,7 +106,7 @@ def lines(collision: Collision, parameters: Parameters) -> Lines:
     yield "</default>"
     if collision.friction:
         yield "<contact>"
-        yield '  <pair geom1="ball1" geom2="ball2"/>'
+        yield f'  <pair geom1="ball1" geom2="{"wall" if collision.has_wall else "ball2"}"/>'
         yield "</contact>"
 
 
