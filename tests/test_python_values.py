@@ -227,6 +227,24 @@ def test_a_result_of_which_no_values_are_left_is_refused() -> None:
         impact.describe(fits.isel(model=slice(0, 0)))
 
 
+def test_one_law_of_a_calibration_or_of_a_study_may_be_selected() -> None:
+    models = ["anagnostopoulos-1988-no-tension", "kelvin-voigt-no-tension"]
+    law = {"models": models, "model": {"kelvin-voigt-no-tension": {"C": 30.0}}}
+    sweep = {"n": 1.0, "K": 1e6, "m1": 1.0, "m2": 1.0, "e": 0.8}
+    pairs = {"frictions": ["coulomb-1785"], "sweep": {**sweep, "R1": 0.01, "R2": 0.01, "mu": {"fit": [0.01, 1.0]}}}
+    columns = {"v1": [1.0, 2.0, 3.0], "u1": [2.0, 4.0, 7.0], "beta": [-0.5, -0.5, -0.6]}
+    study = {"sweep": {**sweep, "v1": 1.0, "e": {"uniform": [0.5, 0.9]}}, "design": {"n": 16}}
+    fits = impact.calibrate(law | pairs | {"data": {"columns": columns, "sigma": 0.1}})
+    for result in (fits, impact.sensitivity(law | study)):
+        text = str(impact.describe(result.isel(model=[0])))
+        one = result.isel(model=0)
+        assert str(impact.describe(one)) == text
+        assert impact.report(one) == impact.report(result.isel(model=[0]))
+        assert str(impact.info(one)) == str(impact.info(result.isel(model=[0])))
+        assert len(impact.plot(one).axes) == len(impact.plot(result.isel(model=[0])).axes)
+    assert str(impact.run(fits.isel(model=0))) == str(impact.run(fits.isel(model=[0])))
+
+
 @pytest.mark.parametrize("name", ["run", "prepare", "solve", "timestep", "export"])
 def test_a_result_is_a_source_to_type_checkers_too(name: str) -> None:
     assert xr.Dataset in get_args(get_type_hints(getattr(impact, name))["source"])

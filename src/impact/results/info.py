@@ -19,7 +19,7 @@ from ..formatting import number
 from .attributes import read_attribute
 from .board import Board
 from .calibration import Fits
-from .schema import MODEL_METADATA, count_points, exponents_of, kind_of, plain_unit, require_result
+from .schema import MODEL_METADATA, count_points, exponents_of, kind_of, plain_unit
 from .sensitivity import Studies
 from .slabs import is_large
 from .summary import Extremes, Summary, error_table, extremes_of, summarize
@@ -87,8 +87,7 @@ def info(result: xr.Dataset | str | Path) -> Info:
         # not loaded, so that a summary in the file is used
         with open_result(result) as opened:
             return _describe(opened, str(result))
-    require_result(result)
-    return _describe(result)
+    return _describe(result_of(result))
 
 
 def _describe(result: xr.Dataset, name: str = "") -> Info:

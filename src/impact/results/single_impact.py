@@ -53,11 +53,11 @@ from ..errors import ConfigError, UsageError, did_you_mean, warn
 from ..formatting import argument, law_keys, law_name, number, prefixed, safe_text
 from .calibration import fitted_config, position_of_law
 from .provenance import changed_plugins, stored_config, stored_draft, unknown_plugins
-from .schema import DEFAULT_RTOL_FACTOR, history_dataset, is_case, kind_of, require_result, require_sweep, scale_of
+from .schema import DEFAULT_RTOL_FACTOR, history_dataset, is_case, kind_of, require_sweep, scale_of
 from .seal import is_result
 from .selection import chosen_laws
 from .summary import depth_notes, input_notes, turn_notes
-from .xarray_backend import open_result
+from .xarray_backend import open_result, result_of
 
 ConfigSource = str | Path | Mapping[str, object] | xr.Dataset | None
 # name, unit and meaning of the quantities that are derived from the inputs of one impact, and from its motion
@@ -573,7 +573,7 @@ def open_source(source: ConfigSource, overrides: Overrides, plugins: Plugins) ->
 
 
 def _open_stored(dataset: xr.Dataset, overrides: Overrides, plugins: Plugins, name: str) -> PointSource:
-    require_result(dataset)
+    dataset = result_of(dataset)
     calibration, settings = None, tuple(settings_of(overrides))
     if kind_of(dataset) == "calibration":
         config = stored_config(dataset.attrs, (), plugins, name, allow_changed_plugins=True, purpose="calibrate")

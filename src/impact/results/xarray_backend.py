@@ -18,12 +18,11 @@ from ..atomic import Sink, atomic_write, check_output, check_outputs, check_resu
 from ..config.files import RESULT_MAGIC
 from ..config.grid import MAX_POINTS
 from ..config.tables import Output
-from ..contact.variables import OUTPUTS
 from ..errors import ResultError, UnfinishedError, UsageError, warn
 from ..formatting import argument, safe_text, type_of
 from .layouts import read_layout
 from .netcdf import RegionValues, encode_attribute, read_variables, write_dataset
-from .schema import MODEL_METADATA, kind_of, require_result, require_sweep
+from .schema import MODEL_METADATA, SCHEMA, STUDIES, kind_of, require_result, require_sweep
 from .seal import byte_reader, check_root, check_seal, digest, is_result, write_seal
 from .selection import select, select_laws
 from .slabs import slabs
@@ -206,11 +205,14 @@ def result_of(result: xr.Dataset | str | Path) -> xr.Dataset:
         # the public function names its argument
         raise TypeError(f"got {type_of(result)}, expected a dataset, or the file of a result")
     require_result(result)
-    for dim in ("friction", "model"):
-        if dim in result.coords and result[dim].ndim == 0 and kind_of(result) == "sweep":
-            metadata = ("exponent", *MODEL_METADATA) if dim == "model" else ()
-            along = [name for name, output in OUTPUTS.items() if dim in output.dims and name in result]
-            names = [dim, *along, *(name for name in metadata if name in result.coords)]
+    kind = kind_of(result)
+    # a calibration has the friction laws of its pairs along the models
+    for dim in ("friction", "model") if kind == "sweep" else ("model",) if kind in STUDIES else ():
+        if dim in result.coords and result[dim].ndim == 0:
+            along = [name for name, variable in SCHEMA[kind].items() if dim in variable.dims]
+            along += ["exponent", *MODEL_METADATA] if dim == "model" else []
+            along += ["friction", "determined"] if kind == "calibration" else []
+            names = [dim, *(name for name in along if name in result.variables)]
             result = result.assign({name: result[name].expand_dims(dim) for name in names})
     return result
 
