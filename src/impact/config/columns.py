@@ -516,7 +516,7 @@ def _read_cases(draft: Draft, columns: Columns) -> CsvValues:
     n = None if "n" in columns.units else draft.exponent
     for name, quantity in quantities.items():
         values[name], found = complete.read(name, quantity, n)
-        problems += complete.error(found).problems
+        problems += [complete.problem(message, name, row) for _, row, message in found]
     if problems:
         raise ConfigError(*problems)
     return {("sweep", "cases"): values}, columns.notes(count, unused)
