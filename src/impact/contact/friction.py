@@ -52,10 +52,17 @@ class FrictionLaw:
 
     Parameters
     ----------
-    key, title, year, equation, reference, doi, evidence, same_as : see `impact.contact.model.ForceModel`
+    key : kebab-case name, unique in the catalogue
+    title : the authors, or the name of the law in its code
+    year : with which the law is named
+    reference : sources of the law, separated by semicolons
+    doi : of the first source
+    equation : the law in one line of Unicode
     kind : "coulomb", f = mu N; "spring", a spring and a dashpot limited by mu N; "dashpot", limited by mu N;
         "regularized", f = mu(g) N; or "cone", a dashpot limited by mu N, where N grows with what exceeds the limit
+    evidence : where the law and the DOI were read or derived, or that they were not verified
     parameters : parameters that the user sets in `[friction.KEY]`
+    same_as : key of the law that this one is another name for, or ""
     stiffness, damping : how the stiffness of the spring, and the damping, are chosen; "" for none
     memory, cap, coefficient : see `impact.contact.slip_motion.TangentialForm`
     scheme : the only scheme that it is of, see `impact.contact.fixed_step.SCHEMES`; "" for a continuous law
