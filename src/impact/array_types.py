@@ -10,6 +10,6 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Indices = NDArray[np.intp]
-# of statuses, modes and regimes
-Flags = NDArray[np.int8]
+# statuses, modes and regimes
+Int8Array = NDArray[np.int8]
 AnyArray = NDArray[Any]

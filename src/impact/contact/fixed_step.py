@@ -15,7 +15,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..array_types import AnyArray, Array, Flags, Mask
+from ..array_types import AnyArray, Array, Int8Array, Mask
 from ..errors import ModelError, UsageError, require_known
 from .dimensionless import with_coefficients, with_units
 from .formula_calls import Formula, argument_names
@@ -383,7 +383,7 @@ class FixedStepSlip:
     memory: Array
     last_power: Array
     impulse: Array
-    regime: Flags
+    regime: Int8Array
     slipped: Mask
     changes: NDArray[np.int32]
 

@@ -15,7 +15,7 @@ from typing import Literal
 
 import numpy as np
 
-from ..array_types import Array, Flags, Mask
+from ..array_types import Array, Int8Array, Mask
 from ..errors import ModelError
 from ..formatting import law_name, number
 from . import fixed_step
@@ -180,7 +180,7 @@ def friction_values(pair: Pair, oblique: ObliqueImpacts) -> dict[str, Array]:
     return values
 
 
-def check_friction(pair: Pair, oblique: ObliqueImpacts) -> Flags:
+def check_friction(pair: Pair, oblique: ObliqueImpacts) -> Int8Array:
     """Check what a pair and the inputs of friction need; the normal motion is checked by `check_inputs`.
 
     Returns the status before integration, of a shape that broadcasts to that of the impacts: NOT_COMBINABLE for

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..array_types import Array, Flags, Indices
+from ..array_types import Array, Indices, Int8Array
 from ..ode.problem import Params, Problem, Step
 from . import motion
 from .impacts import Impacts
@@ -57,7 +57,7 @@ class History:
     e_energetic: float
     slip: Array | None = None
     f: Array | None = None
-    mode: Flags | None = None
+    mode: Int8Array | None = None
 
 
 def history_of(

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..array_types import Array, Flags, Indices, Mask
+from ..array_types import Array, Indices, Int8Array, Mask
 from .closed_forms.hysteresis import peak_indentation
 from .materials import effective_compliance, effective_mass, effective_radius
 from .model import ForceModel, Law
@@ -166,7 +166,7 @@ def stiffness(n: Array, hertz: Array, m: Array, v0: Array) -> Array:
     return np.where(n == 1.5, hertz, hertz * powers(peak, np.asarray(1.5)) / powers(peak, n))
 
 
-def check_inputs(model: Law, impacts: Impacts, checks: frozenset[str] = CHECKS) -> Flags:
+def check_inputs(model: Law, impacts: Impacts, checks: frozenset[str] = CHECKS) -> Int8Array:
     """Check "e" (the restitution), "v0" (the closing speed) or "length" (the derived m, K, length, energy, time).
 
     Returns the status before integration, of a shape that broadcasts to that of the impacts.

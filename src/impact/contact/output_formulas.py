@@ -8,7 +8,7 @@ from typing import Any, Unpack
 
 import numpy as np
 
-from ..array_types import AnyArray, Array, Flags, Mask
+from ..array_types import AnyArray, Array, Int8Array, Mask
 from .dimensionless import dimensionless_values
 from .fixed_step import MUJOCO_CONE
 from .formula_calls import argument_names
@@ -35,7 +35,7 @@ def outputs(
     impacts: Impacts,
     result: CollisionResult,
     names: Iterable[str],
-    checked: Flags | None = None,
+    checked: Int8Array | None = None,
     friction: Friction | None = None,
 ) -> Outputs:
     """Compute outputs of collisions by name; only what they need is computed.
@@ -125,7 +125,7 @@ def _energetic(result: CollisionResult, undefined: Mask) -> Array:
     return replace_where(replace_where(e, result.status == LIMIT, 0.0), undefined, np.nan)
 
 
-def _in_domain(law: Law, impacts: Impacts, damping_ratio: Array) -> Flags:
+def _in_domain(law: Law, impacts: Impacts, damping_ratio: Array) -> Int8Array:
     inside = np.ones((1,) * max(1, len(impacts.shape)), bool)
     for name, (low, high) in law.domain.items():
         value = damping_ratio if name == "chi" else impacts.quantity(name)
@@ -166,7 +166,7 @@ def _share(friction: Friction, friction_status: Array, missed: Mask, name: str) 
     return replace_where(replace_where(share, unknown, np.nan), missed, 1.0)
 
 
-def _contact_regime(friction: Friction, friction_status: Flags, missed: Mask, without_slip: Mask) -> Flags:
+def _contact_regime(friction: Friction, friction_status: Int8Array, missed: Mask, without_slip: Mask) -> Int8Array:
     """Whether the contact sticks (1), slides (2) or does both (3); 0 where that is not defined."""
     oblique, tangential, kind = friction
     regime = tangential.regime

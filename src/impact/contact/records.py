@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from ..array_types import AnyArray, Array, Flags, Indices, Mask
+from ..array_types import AnyArray, Array, Indices, Int8Array, Mask
 from .status import Status, StatusWithMeaning
 
 # positions of trajectories; a slice for all of them, so that nothing is copied
@@ -32,7 +32,7 @@ class Record:
 
     if TYPE_CHECKING:
         # every record has it, among its own fields
-        status: Flags
+        status: Int8Array
     # what the status may be
     statuses: ClassVar[type[StatusWithMeaning]]
 
@@ -70,7 +70,7 @@ class Record:
             getattr(self, name)[rows] = getattr(part, name)
 
     @classmethod
-    def joined(cls, n: int, status: Flags | int, parts: Sequence[tuple[Positions, Self]]) -> Self:
+    def joined(cls, n: int, status: Int8Array | int, parts: Sequence[tuple[Positions, Self]]) -> Self:
         """n trajectories, composed of parts at their positions; those in no part have only a status."""
         if parts and isinstance(parts[0][0], slice):
             return parts[0][1]
@@ -104,7 +104,7 @@ class CollisionResult(Record):
     approach_work: Array
     restitution_work: Array
     steps: NDArray[np.int32]
-    status: Flags
+    status: Int8Array
     chi: Array
     exact: Array
 

@@ -15,7 +15,7 @@ from typing import NamedTuple, NotRequired, TypedDict, TypeVar
 
 import numpy as np
 
-from ..array_types import Array, Flags, Indices, Mask
+from ..array_types import Array, Indices, Int8Array, Mask
 from ..errors import ModelError
 from ..ode.problem import Params, Problem, Solution, Termination
 from ..ode.rk45 import integrate
@@ -81,7 +81,7 @@ def simulate(
     model: ForceModel,
     n: Array,
     values: ValueArrays,
-    status: Flags,
+    status: Int8Array,
     *,
     rtol: float,
     max_steps: int,
@@ -120,7 +120,7 @@ def simulate_parts(
     key: str,
     n: Array,
     values: ValueArrays,
-    status: Flags,
+    status: Int8Array,
     simulate_part: Callable[[Part], T],
     collapse: bool,
     errors: dict[str, str] | None,
@@ -253,7 +253,7 @@ def collide_at_fixed_steps(
     of_scheme = (STEPS_PER_CONTACT, STEP, PHASE, PREFIX)
     of_law = part._replace(values={name: a for name, a in values.items() if not name.startswith(of_scheme)})
 
-    def contact_times(rows: Positions, size: int) -> tuple[Array, Flags]:
+    def contact_times(rows: Positions, size: int) -> tuple[Array, Int8Array]:
         """Compute the contact times of the continuous law, and statuses that are OK where there is one."""
         continuous = _simulate_distinct(model, of_law.at(rows, size), compute=compute)
         never_ends = continuous.status == LIMIT
@@ -301,7 +301,7 @@ def collide_at_fixed_steps(
     return replace(result, chi=chi_of(law_values, count), exact=exact_restitution(model, law_values, count))
 
 
-def check_coefficients(model: ForceModel, law_values: LawValues, count: int) -> Flags:
+def check_coefficients(model: ForceModel, law_values: LawValues, count: int) -> Int8Array:
     """Compute the status of impacts by the coefficients of their law, before integration; shape (count,)."""
     status = np.full(count, Status.OK, np.int8)
     coefficients = np.array([law_values[name] for name in model.coefficients]).reshape(-1, count)
@@ -385,7 +385,7 @@ class Phases(NamedTuple):
     force_at_peak: Array
     residual: Array
     e_out: Array
-    status: Flags
+    status: Int8Array
 
 
 # the impacts that enter the restitution phase, and their permanent indentation

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..array_types import AnyArray, Array, Flags, Mask
+from ..array_types import AnyArray, Array, Int8Array, Mask
 from ..ode.problem import Params, Problem, Solution, Step
 from ..ode.rk45 import integrate
 from . import motion, simulate
@@ -71,12 +71,12 @@ class TangentialResult(Record):
     damping_work: Array
     memory_work: Array
     elastic_left: Array
-    regime: Flags
+    regime: Int8Array
     slip_changes: NDArray[np.int32]
     exact: Array
     stiffness: Array
     steps: NDArray[np.int32]
-    status: Flags
+    status: Int8Array
 
 
 class RecordedSlip(NamedTuple):
@@ -90,7 +90,7 @@ def simulate_friction(
     pair: Pair,
     n: Array,
     values: simulate.ValueArrays,
-    status: Flags,
+    status: Int8Array,
     *,
     rtol: float,
     max_steps: int,

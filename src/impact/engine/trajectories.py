@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..array_types import AnyArray, Flags, Indices, Mask
+from ..array_types import AnyArray, Indices, Int8Array, Mask
 from ..contact.dimensionless import dimensionless_values, exponent_names
 from ..contact.friction import Pair, check_friction, friction_values
 from ..contact.frictions.multibody_codes import MUJOCO_ELLIPTIC
@@ -169,7 +169,7 @@ def columns_at(inputs: Inputs, law: PlanLaw, axes: Sequence[int], index: Index) 
     return {"n": values.pop("n"), "status": np.where(status == STATUS_OK, own_status, status), **values}
 
 
-def _values_at(inputs: Inputs, law: PlanLaw, index: Index) -> tuple[Impacts, Columns, Flags]:
+def _values_at(inputs: Inputs, law: PlanLaw, index: Index) -> tuple[Impacts, Columns, Int8Array]:
     """Build the impacts of a law at cells, with their problems, and the status by friction alone."""
     model = model_of(law)
     impacts, status = build_impacts(inputs, model, index), np.full((1,) * dimensions(index), STATUS_OK, np.int8)

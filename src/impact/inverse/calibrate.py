@@ -14,7 +14,7 @@ import numpy as np
 import xarray as xr
 
 from ..arguments import require_counts
-from ..array_types import Array, Flags
+from ..array_types import Array, Int8Array
 from ..atomic import check_outputs, check_result_name, write_file
 from ..config.files import override_text
 from ..config.input_names import InputName
@@ -401,7 +401,7 @@ def _calibration_dataset(config: Config, plugins: Plugins, fits: Mapping[str, Fi
         identifiable[row, columns] = fit.identifiable
         groups.append("; ".join(determined_groups(config, model_of(law), names, fit)))
     weights = akaike_weights({key: fit.aicc for key, fit in fits.items()})
-    values: dict[str, Array | Flags] = {
+    values: dict[str, Array | Int8Array] = {
         **arrays,
         "covariance": covariance,
         "identifiable": identifiable,

@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ..array_types import Array, Flags, Indices, Mask
+from ..array_types import Array, Indices, Int8Array, Mask
 from .tableau import DENSE_WEIGHTS
 
 Params = tuple[Array, ...]
@@ -140,7 +140,7 @@ class Solution:
     state: Array
     maximum: Array
     steps: NDArray[np.int32]
-    termination: Flags
+    termination: Int8Array
     recorded: tuple[Step, ...] = ()
 
     @classmethod

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..array_types import Array, Flags, Indices, Mask
+from ..array_types import Array, Indices, Int8Array, Mask
 from .problem import Margins, Params, Problem, Solution, Termination
 
 RUNNING, EVENT_REACHED = int(Termination.RUNNING), int(Termination.EVENT_REACHED)
@@ -76,9 +76,9 @@ class State:
     k: Array
     h: Array
     h_last: Array
-    halvings: Flags
+    halvings: Int8Array
     steps: NDArray[np.int32]
-    termination: Flags
+    termination: Int8Array
     best: Array
     peak: PeakCandidate
     workspace: Workspace
