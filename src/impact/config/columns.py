@@ -556,7 +556,7 @@ def expand_cases(draft: Draft) -> Draft:
             continue
         if is_word and header_of[column] != column:
             problems.append((path, f'got a unit, expected "{column}"'))
-        if contains_path(draft.data, name.path):
+        if str(name) in draft.input_names:
             problems.append((path, f"set together with {name.config_key}, expected one of the two"))
         if len(values) != n_cases or not values:
             expected = f"{n_cases or 'at least one'}, as in the first column"
@@ -600,10 +600,3 @@ def without_replaced_inputs(draft: Draft, fixed: Mapping[str, object]) -> Draft:
         tables = draft.table("materials").items()
         data["materials"] = {name: {key: table[key] for key in table if key != "rho"} for name, table in tables}
     return replace(draft, data=data, text=text)
-
-
-def contains_path(data: Mapping[str, Any], path: KeyPath) -> bool:
-    """Check whether the data has a value at a path."""
-    for key in path[:-1]:
-        data = as_table(data.get(str(key)))
-    return path[-1] in data

@@ -180,7 +180,7 @@ class Draft:
         """The parameters of the selected laws that have neither a default nor a value."""
         for name, parameter in self.parameters:
             is_required = parameter.default is None and not parameter.optional
-            if is_required and name.key not in as_table(self.table(name.table).get(name.owner)):
+            if is_required and str(name) not in self.input_names:
                 yield name
 
     @cached_property

@@ -26,7 +26,6 @@ from .columns import (
     also,
     columns_of_table,
     complete_rows,
-    contains_path,
     csv_form,
     misspelt_column,
     split_header,
@@ -171,7 +170,7 @@ def _used_columns(columns: Columns, draft: Draft) -> tuple[dict[str, _Column], l
 def _check_conflict(column: _Column, derived: Mapping[str, str], draft: Draft) -> None:
     """Check that what a column holds is given once; `derived` has what follows from heights and times."""
     name = InputName.parse(column.name)
-    if column.kind == "input" and contains_path(draft.data, name.path):
+    if column.kind == "input" and column.name in draft.input_names:
         hint = "; a measured restitution is e_out" if column.name == "e" else ""
         raise value_error(f"set together with {name.config_key}, expected one of the two{hint}")
     follows = LABORATORY[column.name][1] if column.kind == "laboratory" else ()
@@ -593,7 +592,7 @@ def count_problems(draft: Draft, fits: Mapping[str, tuple[float, float]]) -> Ite
     if draft.measurements is None:
         return
     n_values = len(draft.measurements.lines) * len(draft.measurements.outputs)
-    own_K = {model.key for model in draft.models if contains_path(draft.data, ("model", model.key, "K"))}
+    own_K = {model.key for model in draft.models if f"{model.key}.K" in draft.input_names}
     counts = {
         law_name(*(law.key for law in (model, friction) if law)): len(
             fitted_parameters(fits, model, friction, has_own_K=model.key in own_K)

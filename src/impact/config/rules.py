@@ -23,14 +23,9 @@ from .tables import FIXED_STEP_INPUTS, MATERIAL_QUANTITIES, OBLIQUE_INPUTS, SWEE
 MAX_LAWS = 3
 
 
-def _sets_stiffness(draft: Draft, model: ForceModel) -> bool:
-    """Whether [model.KEY] has a K."""
-    return "K" in as_table(draft.table("model").get(model.key))
-
-
 def has_other_stiffness(draft: Draft, model: ForceModel) -> bool:
     """Whether K of [sweep] has another unit than that of a model, because the model has its own exponent."""
-    return model.exponent not in (None, draft.exponent) and not _sets_stiffness(draft, model)
+    return model.exponent not in (None, draft.exponent) and f"{model.key}.K" not in draft.input_names
 
 
 def materials_of(draft: Draft, ball: str) -> list[str]:
@@ -161,7 +156,7 @@ def _material_problems(draft: Draft) -> Iterable[ConfigProblem]:
         users = _models_using(draft, *of_material)
         # the stiffness of some models needs no material
         by_material = [model for model in draft.models if of_material & _stiffness_arguments(model)]
-        has_stiffness = draft.models and all(_sets_stiffness(draft, model) for model in by_material)
+        has_stiffness = draft.models and all(_has_stiffness(draft, model) for model in by_material)
         if "K" not in sweep and not has_stiffness:
             yield ("sweep", "material"), "missing, expected a material of [materials], or K"
         elif users:
@@ -340,7 +335,7 @@ def _exponents(draft: Draft, model: ForceModel) -> Sequence[float]:
 
 def _has_stiffness(draft: Draft, model: ForceModel) -> bool:
     """Whether the config has the K of a model."""
-    return "K" in draft.table("sweep") or _sets_stiffness(draft, model)
+    return not {"K", f"{model.key}.K"}.isdisjoint(draft.input_names)
 
 
 def _stiffness_arguments(model: ForceModel) -> frozenset[str]:
