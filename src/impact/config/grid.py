@@ -77,7 +77,7 @@ def build_grid(
 
     Without `max_points`, where not every point is stored, the number of trajectories is limited later.
     """
-    cases = [str(InputName.of_path(path)) for path in draft.columns]
+    cases = [str(name) for name, _ in input_values(draft.data) if name.path in draft.columns]
     sizes = {name: value.size for name, value in values.items() if isinstance(value, Range)}
     sizes |= {name: len(value) for name, value in values.items() if isinstance(value, tuple)}
     # also properties of a material, and parameters of laws that are not selected: these are no inputs of the grid

@@ -40,12 +40,6 @@ class InputName:
                 return cls(table, owner.removeprefix(f"{table}."), key)
         return cls("model", owner, key) if owner else cls("sweep", "", str(text))
 
-    @classmethod
-    def of_path(cls, path: KeyPath) -> InputName:
-        """Read a path such as ("sweep", "v1"), ("materials", "steel", "E") or ("model", "bilinear", "K")."""
-        table, *owner, key = map(str, path)
-        return cls(table, ".".join(owner), key)
-
     def __str__(self) -> str:
         prefix = f"{self.table}." if self.table in ("materials", "friction") else ""
         return f"{prefix}{self.owner}.{self.key}" if self.owner else self.key

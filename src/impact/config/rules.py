@@ -15,7 +15,7 @@ from ..contact.materials import hertz_stiffness
 from ..contact.model import ForceModel, with_base_quantities
 from .draft import Draft, listed_names
 from .files import as_table
-from .input_names import InputName
+from .input_names import input_values
 from .quantities import ConfigProblem, KeyPath, Quantity
 from .tables import FIXED_STEP_INPUTS, MATERIAL_QUANTITIES, OBLIQUE_INPUTS, SWEEP_DEFAULTS, SWEEP_QUANTITIES
 
@@ -73,7 +73,7 @@ def _models_without(draft: Draft, keys: Sequence[str]) -> str:
 
 def _vary_together(draft: Draft, *names: str) -> bool:
     """Whether inputs of [sweep] are members of one zip group, of the cases or of the measurements."""
-    columns = [str(InputName.of_path(path)) for path in draft.columns]
+    columns = [str(name) for name, _ in input_values(draft.data) if name.path in draft.columns]
     groups = (*draft.zip_groups, columns, as_table(draft.table("sweep").get("cases")))
     return any({*names} <= {*group} for group in groups)
 
