@@ -111,6 +111,11 @@ def test_unloading_stiffness(key: str) -> None:
     assert impact.run(model=key, at={"e": 0.0}).derived["K_r"] == math.inf
 
 
+def test_unloading_stiffness_of_a_force_that_jumps_at_the_peak() -> None:
+    shot = impact.run(model="kelvin-voigt-hysteretic", at={"e": 0.4})
+    assert shot.derived["K_r"] == pytest.approx(0.4 * shot.values["stiffness"], rel=1e-12)
+
+
 @pytest.mark.parametrize("e", [0.1, 0.5, 1.0])
 def test_the_rebound_is_slower_than_its_bound(e: float) -> None:
     collision = impact.run(model="gharib-hurmuzlu-2012", at={"e": e, "v1": 2.0})

@@ -30,6 +30,7 @@ from ..config.tables import (
     expand_laws,
     law_quantities,
 )
+from ..contact.dimensionless import dimensionless_values, with_coefficients, with_units
 from ..contact.fixed_step import EXACT
 from ..contact.force_expressions import unload_to_residual, unload_with_stiffness
 from ..contact.friction import FrictionLaw, Pair
@@ -410,9 +411,15 @@ def _derived_quantities(
     """Compute DERIVED_QUANTITIES."""
     quantities = {name: getattr(impacts, name)[0].item() for name, *_ in INPUT_QUANTITIES}
     has_rebound = values["status"] in (Status.OK, Status.LIMIT)
-    if has_rebound and law.unloading in (unload_to_residual, unload_with_stiffness):
+    n = impacts.n[0].item()
+    if has_rebound and law.unloading is unload_with_stiffness:
+        # the force may jump at the peak
+        with np.errstate(all="ignore"):
+            of_law = with_coefficients(law, with_units(dimensionless_values(law, impacts), n), 1)
+            quantities["K_r"] = (of_law["Kr"] * impacts.K).item()
+    elif has_rebound and law.unloading is unload_to_residual:
         recovered = values["peak_indentation"] - values["permanent_indentation"]
-        quantities["K_r"] = values["peak_force"] / recovered ** impacts.n[0].item() if recovered else math.inf
+        quantities["K_r"] = values["peak_force"] / recovered**n if recovered else math.inf
     if history is not None:
         quantities |= {name: getattr(history, name) for name in ("tau_c", "tau_r", "W_c", "W_r")}
     elif values["status"] == Status.LIMIT:
