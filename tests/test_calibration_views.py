@@ -79,9 +79,20 @@ def test_without_a_varied_input_the_values_are_over_their_number() -> None:
     assert residuals.get_xlabel() == "Number of the measured value"
     (bars,) = values.containers
     assert bars.lines[0].get_xdata().tolist() == [1, 2, 3]
+    assert {tick % 1.0 for tick in residuals.get_xticks()} == {0.0}
     # with noise "scale" and no sigma, the standard deviation is that of the values
     lengths = np.diff([segment[:, 1] for segment in bars.lines[2][0].get_segments()]).ravel()
     np.testing.assert_allclose(lengths, 2.0 * fit["measured"].values.std(ddof=1), rtol=1e-6)
+
+
+def test_inputs_that_differ_between_the_values_are_no_conditions_of_the_picture() -> None:
+    sweep = {"m1": 1.0, "K": 1e6, "n": 1.0, "e": {"fit": [0.1, 1.0]}}
+    data = {"columns": {"v1": [1.0, 2.0, 3.0], "m2": [1.0, 2.0, 2.0], "v2": [0.5] * 3, "e_out": [0.49, 0.5, 0.52]}}
+    fit = impact.calibrate({"models": "anagnostopoulos-1988", "sweep": sweep, "data": data}, overrides=QUICK)
+    conditions = impact.plot(fit).header[1].get_text()
+    assert "m_1" in conditions
+    assert "v_2" in conditions
+    assert not re.search("v_1|m_2", conditions)
 
 
 @pytest.mark.slow

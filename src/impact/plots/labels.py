@@ -32,6 +32,7 @@ from ..formatting import (
     typographic,
     with_year,
 )
+from ..results.schema import is_case
 from .slices import Inputs, parameter_text, scalars_of
 from .style import SOFT, tint
 
@@ -296,10 +297,10 @@ def label_axis(
     if words := InputName.parse(name).words:
         axis.set_ticks(range(len(words)), words)
     else:
-        number_axis(axis, size, log=log)
+        number_axis(axis, size, log=log, whole=name == "point" or is_case(name))
 
 
-def number_axis(axis: Axis, size: float = 1.0, *, log: bool = False) -> None:
+def number_axis(axis: Axis, size: float = 1.0, *, log: bool = False, whole: bool = False) -> None:
     """Write the numbers of an axis, in multiples of `size`; logarithmic ones are few, and never between powers."""
     low, high = sorted(axis.get_view_interval())
     # one style for all numbers of an axis
@@ -312,7 +313,8 @@ def number_axis(axis: Axis, size: float = 1.0, *, log: bool = False) -> None:
         axis.set_minor_formatter(NullFormatter())
     else:
         locator = DegreeLocator if size == math.radians(1.0) else MaxNLocator
-        axis.set_major_locator(locator("auto", steps=[1, 2, 2.5, 5, 10], min_n_ticks=3))
+        steps, least = ([1, 2, 5, 10], 2) if whole else ([1, 2, 2.5, 5, 10], 3)
+        axis.set_major_locator(locator("auto", steps=steps, min_n_ticks=least, integer=whole))
 
 
 def _tick_text(value: float, position: int, *, size: float, powers: bool) -> str:

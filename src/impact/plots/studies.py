@@ -76,7 +76,9 @@ def calibration_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
         panels += _panels(output_data, name, varied, choice)
         points += [_measured_points(output_data, name, varied or "point"), Points("", {})]
     title = safe_text(calibration_title(dataset), 140)
-    conditions = conditions_of(data.drop_vars(["grid", varied], errors="ignore").isel(point=0), "grid")
+    along = [name for name, each in data.coords.items() if each.dims == ("point",)]
+    differing = [name for name in along if len({*data[name].values.tolist()}) > 1]
+    conditions = conditions_of(data.drop_vars(differing).isel(point=0), "grid")
     return CurveData(
         "Calibration", ": ".join(filter(None, (title, conditions))), tuple(panels), not_drawn, tuple(points)
     )
