@@ -78,6 +78,7 @@ class TrajectoryTable:
     summary: SummaryRecord | None = None
     frictions: Mapping[str, FrictionKind] = field(default_factory=dict)
     pick: Callable[[int, NDArray[np.intp]], Record] | None = None
+    segment: int = RANGE_TRAJECTORIES
     # of each type, the map whose trajectories were read last, and all of them, if its cells share them
     _whole: dict[type[Record], tuple[int, Record]] = field(default_factory=dict, init=False)
 
@@ -119,7 +120,7 @@ class TrajectoryTable:
 
     def _segments(self, number: int, rows: NDArray[np.intp]) -> Record:
         count = self.maps[number].count
-        size = even_size(count, RANGE_TRAJECTORIES)
+        size = even_size(count, self.segment)
         trajectories, segments = self.maps[number].record.blank(rows.size), rows // size
         for segment in np.unique(segments).tolist():
             positions, start = np.flatnonzero(segments == segment), segment * size
