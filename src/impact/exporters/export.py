@@ -220,7 +220,7 @@ def export(
         (at_dt,) = timestep.timestep_rows(problem.law, [dt])
     advised = None
     # with friction that changes e, no step delivers the e that is asked for
-    if code.scheme is not None and problem.requested_e > 0.0 and not problem.law.is_coupled:
+    if code.scheme is not None and problem.law.target_e > 0.0 and not problem.law.is_coupled:
         advised = timestep.needed_steps(problem.law, ADVISED_TOL)
     if parameter is not None and code.scheme is None:
         raise UsageError(f"{argument('parameter')}: what {code.title} delivers at a time step is not predicted")
@@ -291,8 +291,8 @@ def _warnings(problem: ExportProblem, collision: Collision, row: timestep.Timest
     yield from problem.code.warnings(collision)
     if problem.better_fit:
         yield problem.better_fit
-    if abs(problem.e_continuous - problem.requested_e) > ASKED_TOL:
-        key, requested = problem.model.key, number(problem.requested_e)
+    if abs(problem.e_continuous - problem.law.target_e) > ASKED_TOL:
+        key, requested = problem.model.key, number(problem.law.target_e)
         yield (
             f"{key} delivers {number(problem.e_continuous)} where e = {requested} is asked for; impact solve "
             f"--model {key} --for e --target e_out={requested} finds the e to enter"
@@ -341,9 +341,9 @@ def _header(
             delivered = f"mean beta {decimals(row.beta_mean)}, {spread}" if has_slip else "no beta without slip"
             yield f"friction: {law.friction}, {delivered}"
         if row.e_to_ask == row.e_to_ask:
-            yield f"a mean of {number(problem.requested_e)} at this dt: enter e = {decimals(row.e_to_ask)}"
+            yield f"a mean of {number(problem.law.target_e)} at this dt: enter e = {decimals(row.e_to_ask)}"
         if advised is not None:
-            within = f"within {number(100.0 * ADVISED_TOL)} % of {number(problem.requested_e)}"
+            within = f"within {number(100.0 * ADVISED_TOL)} % of {number(problem.law.target_e)}"
             dt = quantity(rounded(advised.dt, 3, up=False), "s", 3)
             yield f"recommended: dt <= {dt} keeps e {within} whatever the phase"
             yield from timestep.packing_notes(advised.dt, law.rayleigh_time)

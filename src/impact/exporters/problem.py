@@ -69,11 +69,6 @@ class ExportProblem:
     def e_continuous(self) -> float:
         return self.law.continuous["e_out"]
 
-    @property
-    def requested_e(self) -> float:
-        """The e that was requested, or that of the continuous law where none can be."""
-        return self.law.e if self.law.has_e else self.e_continuous
-
     def collision(self, dt: float, phase: float) -> Collision:
         """Make the collision whose contact begins at a phase of a step dt [s]."""
         values = input_values(self.law.impact)

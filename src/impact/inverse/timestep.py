@@ -445,6 +445,11 @@ class FixedStepLaw:
         return float(self.impact.e[0]) if self.has_e else math.nan
 
     @property
+    def target_e(self) -> float:
+        """The e that steps are to deliver: the requested one, or that of the continuous law where none can be."""
+        return self.e if self.has_e else self.continuous["e_out"]
+
+    @property
     def wanted_e(self) -> float:
         """The requested e, also of a law without one whose damping was solved for."""
         return self.e if self.solved is None else float(self.config.scalars["e"])
@@ -531,7 +536,7 @@ def needed_steps(
     The search begins at the number that a similar law needs. That every larger number is enough is tried for many.
     """
     e_continuous = law.continuous["e_out"]
-    target = law.e if law.has_e else e_continuous
+    target = law.target_e
     if not target > 0.0:
         raise UsageError(f"{argument('tol')} is relative to e, expected e > 0")
     # the surfaces of an overdamped contact part later than a collision at a step is followed
