@@ -237,6 +237,19 @@ def test_a_force_of_the_wrong_shape_is_an_error_of_the_model() -> None:
     assert status.tolist() == [[Status.MODEL_ERROR, Status.MODEL_ERROR]]
 
 
+def test_errors_of_a_law_are_reported_in_the_order_of_the_impacts() -> None:
+    kinds = [ValueError, KeyError, TypeError, IndexError, OSError, ArithmeticError, LookupError, RuntimeError]
+
+    def force(elastic: Any, e: Any) -> Any:
+        raise kinds[round(10 * e[0])]
+
+    law = impact.ForceModel(key="raises", title="", year=1, equation="", reference="", force=force)
+    sweep = {**SWEEP, "e": [0.1 * number for number in range(len(kinds))]}
+    with pytest.warns(UserWarning, match="^.*model raises: ") as warned:
+        impact.sweep({"models": "raises", "sweep": sweep, "solver": COARSE}, plugins=[law])
+    assert [str(warning.message).split(": ")[-2] for warning in warned] == [kind.__name__ for kind in kinds]
+
+
 def _in_place(e: Any) -> Any:
     e *= 0.999
     return e

@@ -121,7 +121,7 @@ def integrate_ranges(
                     for trajectory_range, (collisions, errors) in _submit_and_collect(
                         plan, spec, executor, remaining, running, run.should_stop
                     ):
-                        warn(*(errors[error] for error in errors.keys() - reported))
+                        warn(*(line for error, line in errors.items() if error not in reported))
                         reported |= errors.keys()
                         yield trajectory_range, collisions
                     return
