@@ -23,7 +23,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..array_types import Array, Mask
+from ..array_types import Array, Indices, Int8Array, Mask
 from ..ode.problem import Margins, Params, Problem
 from . import motion
 from .formula_calls import Formula, argument_names, call_by_name
@@ -197,7 +197,7 @@ class Track:
     held_memory: Array
     order: Array
     touches: Mask
-    regime: NDArray[np.int8]
+    regime: Int8Array
     changes: NDArray[np.int32]
     is_slow: Mask
 
@@ -515,7 +515,7 @@ class SlipPhase:
         crosses = self._crosses(beside, params).reshape(2, -1).any(axis=0)
         return np.where((y[0] > 2.0 * small) & ~crosses, (ahead - behind) / (2.0 * small), np.nan)
 
-    def change(self, which: NDArray[np.intp], y: Array, k: Array, params: Params) -> tuple[Array, Params]:
+    def change(self, which: Indices, y: Array, k: Array, params: Params) -> tuple[Array, Params]:
         """Change the modes and signs of trajectories where margins vanish, see `Switch`."""
         y, columns = self._released(y, params), self.columns(params)
         old = columns.mode
@@ -767,7 +767,7 @@ class SlipPhase:
         self.track.add_impulse(columns, k[0], y[SLIP_ROW])
 
 
-def _taken(params: Params, rows: NDArray[np.intp]) -> Params:
+def _taken(params: Params, rows: Indices) -> Params:
     return tuple(column.take(rows) for column in params)
 
 

@@ -193,7 +193,7 @@ def probe_index(inputs: Inputs, swept_names: Iterable[str] = ()) -> Index:
     names = (*swept_names, "inertia_factor1", "inertia_factor2")
     full_axes = {axis for name in names for axis in inputs.axes_of(name)}
 
-    def positions_on(axis: int, size: int) -> NDArray[np.intp]:
+    def positions_on(axis: int, size: int) -> Indices:
         if axis in full_axes:
             return np.arange(size)
         # beside a wall, a plane or another factor of inertia the masses may or may not change m_t/m
