@@ -32,8 +32,8 @@ class Rebound:
     ----------
     trial : the collision
     answer : the velocities and spins after the impact, those of ball 2 only if it is no wall
-    m, R, inertia : of the balls, shape (balls,)
-    before, after : their velocities and spins, shape (3, balls)
+    m, R, inertia : masses [kg], radii [m] and moments of inertia [kg m^2] of the balls, shape (balls,)
+    before, after : their velocities v and u [m/s] and spins omega [rad/s], shape (3, balls)
     """
 
     trial: Trial
@@ -137,11 +137,11 @@ def angular_momentum(rebound: Rebound) -> Delivered:
 
     L = I1 omega1 - m1 R1 u1 + I2 omega2 + m2 R2 u2; the scale is the sum of I |omega| + m R (|v| + |u|).
     """
-    m, R, inertia, (v, u, omega) = rebound.m, rebound.R, rebound.inertia, np.abs(rebound.before)
+    m, R, inertia = rebound.m, rebound.R, rebound.inertia
     before, after = (
-        sum(inertia * motion[2] - rebound.m * (rebound.sides * R) * motion[1])
-        for motion in (rebound.before, rebound.after)
+        sum(inertia * omega - m * (rebound.sides * R) * u) for _, u, omega in (rebound.before, rebound.after)
     )
+    v, u, omega = np.abs(rebound.before)
     scale = sum(inertia * omega + R * (m * (v + u))) or R[0] * rebound.m_n * rebound.speed
     return 0.0, abs(after - before) / scale
 

