@@ -48,7 +48,8 @@ def outputs(
     if checked is not None:
         computed["checked"] = checked
     if friction is not None:
-        computed |= dict(zip(("oblique", "tangential", "kind"), friction, strict=True), friction=friction)
+        oblique, tangential, kind = friction
+        computed |= {"friction": friction, "oblique": oblique, "tangential": tangential, "kind": kind}
 
     with np.errstate(all="ignore"):
         values = {name: _compute(name, computed) for name in names}
@@ -198,7 +199,8 @@ def _work(friction: Friction, friction_loss: Array, has_works: Mask, name: str) 
     return np.where(has_works, getattr(tangential, name) * unit, without)
 
 
-# formulas by the names of their values; their arguments are names of this dict, or law, impacts and result
+# formulas by the names of their values; their arguments are names of this dict, or law, impacts and result, and of
+# those of friction also friction as a whole, oblique, tangential and kind
 FORMULAS: dict[str, Callable[..., Any]] = {
     "checked": lambda law, impacts: check_inputs(law, impacts),
     "not_integrated": lambda checked: checked != STATUS_OK,

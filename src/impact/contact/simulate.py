@@ -342,7 +342,7 @@ def integrate_collisions(
         form = form_of(law) if core == "numba" and recorded is None else None
         if form is not None:
             return dispatch.integrate_compiled(form, law, problem, start, params, rtol=rtol, max_steps=max_steps)
-        residual = None if recovery is None else recovery[1]
+        _, residual = recovery or (None, None)
         params, breakpoints = motion.breakpoints(law, params, start, residual)
         return in_parts(run, problem, breakpoints, start, params)
 
@@ -374,7 +374,10 @@ def integrate_collisions(
 
 
 class Phases(NamedTuple):
-    """The motion through both phases, with the params of each; `rows` are the impacts that enter restitution."""
+    """The motion through both phases; `rows` are the impacts that enter restitution.
+
+    `params` are those of the approach, of all impacts, and those of restitution, of the impacts at `rows`.
+    """
 
     law: motion.MotionLaw
     params: tuple[Params, Params]

@@ -33,7 +33,7 @@ from .fixed_step import (
 from .formula_calls import argument_names
 from .friction import Pair
 from .piecewise import in_parts
-from .records import Record
+from .records import CollisionResult, Record
 from .slip_motion import (
     ORDER_TOLERANCE,
     SLIDES,
@@ -121,8 +121,10 @@ def simulate_friction(
     simulate_part = partial(_simulate_distinct, pair, integrate_slip)
     if integrator != EXACT:
         compute = partial(simulate.integrate_collisions, rtol=rtol, max_steps=max_steps, core=core)
-        collide = partial(simulate.collide_at_fixed_steps, pair.model, scheme=integrator, compute=compute)
-        simulate_part = partial(_slip_at_fixed_steps, pair, partial(collide, max_steps=max_steps))
+        collide = partial(
+            simulate.collide_at_fixed_steps, pair.model, scheme=integrator, compute=compute, max_steps=max_steps
+        )
+        simulate_part = partial(_slip_at_fixed_steps, pair, collide)
     return simulate.simulate_parts(TangentialResult, pair.key, n, values, status, simulate_part, collapse, errors)
 
 
@@ -173,7 +175,9 @@ def _simulate_distinct(
     return result
 
 
-def _slip_at_fixed_steps(pair: Pair, collide: simulate.ComputeCollisions, part: simulate.Part) -> TangentialResult:
+def _slip_at_fixed_steps(
+    pair: Pair, collide: Callable[..., CollisionResult], part: simulate.Part
+) -> TangentialResult:
     """Integrate slips at a fixed step; those without slip or friction as contacts without slip."""
     n, values, count, _ = part
     form = pair.form(n)
