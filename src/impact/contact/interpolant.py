@@ -180,6 +180,7 @@ class Interpolant:
         intervals, is_divided = self.intervals, True
         while is_divided:
             edges = [intervals[0].lower, *(interval.upper for interval in intervals)]
+            # of the interval of each value; -1 outside
             number = np.where((x >= edges[0]) & (x <= edges[-1]), np.searchsorted(edges[1:-1], x), -1)
             intervals, is_divided = self._refined(intervals, np.unique(number[number >= 0]))
         values: Array = np.full((x.size, self.floors.size), np.nan)
