@@ -166,7 +166,7 @@ class ImpactRegression:
         if is_study:
             # the next run would refuse it
             calibration_tolerances(tol)
-        # bless reports the same error and how to proceed
+        # bless, which no study needs, reports the same error and how to proceed
         with nullcontext() if is_study else suppress(impact.ImpactError):
             if baseline.exists():
                 verdict = impact.compare(new, baseline, tol=tol, subset=subset)
