@@ -335,6 +335,7 @@ class _Contacts:
         """Begin the unloading branch of some collisions at the largest indentation that they reached."""
         peak = self.peak[turned]
         s = power(peak, 1.0 / self.law.model.coordinate_power)
+        # the first is the peak again, with the rounding errors of s
         _, *others = unloading_arguments(self.law, s, tuple(self.params[:, turned]))
         self.branch[:, turned] = peak, *others
         self.unloads |= turned
