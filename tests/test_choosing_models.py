@@ -238,6 +238,12 @@ def test_a_missing_parameter_of_a_law_chosen_by_name_is_reported_without_the_exc
     assert problems_of_choice(choice) == [f"config: model.kelvin-voigt.C: {missing}"]
 
 
+def test_a_parameter_under_sweep_is_an_unknown_key_and_still_missing():
+    unknown, missing = problems_of_choice("kelvin-voigt", {"kelvin-voigt.C": 10.0})
+    assert unknown.startswith('config: sweep."kelvin-voigt.C": unknown key')
+    assert missing.startswith("config: model.kelvin-voigt.C: missing")
+
+
 @pytest.mark.parametrize("key", sorted(catalogue()))
 def test_a_law_states_its_equation_reference_and_year(key):
     law = find(key)

@@ -186,7 +186,9 @@ class Draft:
     @cached_property
     def input_names(self) -> list[str]:
         """The config names of all inputs, whether or not their values are valid."""
-        return [str(name) for name, _ in input_values(self.data) if name.path not in NO_INPUTS]
+        names = [name for name, _ in input_values(self.data) if name.path not in NO_INPUTS]
+        # an unknown key of [sweep], such as "hertz.K", is not the input of that name
+        return [str(name) for name in names if InputName.parse(name) == name]
 
     def with_problems(self, problems: Iterable[ConfigProblem]) -> Draft:
         return replace(self, problems=tuple(dict.fromkeys((*self.problems, *problems))))
