@@ -171,6 +171,12 @@ def test_a_model_is_named_with_its_best_parameters_and_their_units() -> None:
     assert row.row[5].startswith("e=0.5, kuwabara-kono-1987.K=7 GN/m^1.5: ")
 
 
+@pytest.mark.parametrize("unit", ["m^(1+)", "m^2.5.1", "m^(2/0)"])
+def test_a_text_that_is_no_unit_does_not_prevent_a_ranking(figure6: xr.Dataset, unit: str) -> None:
+    foreign = figure6.assign_coords(e=figure6["e"].assign_attrs(units=unit))
+    assert len(impact.recommend(foreign)) == len(impact.recommend(figure6))
+
+
 def test_with_a_target_of_e_out_the_table_lists_the_e_to_ask_for(figure6: xr.Dataset) -> None:
     laws = ["lankarani-nikravesh-1994", "lankarani-nikravesh-1990"]
     ranking = impact.recommend(figure6, target={"e_out": 0.8}, models=laws, tol=0.011)

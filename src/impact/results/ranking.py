@@ -558,12 +558,14 @@ def _rank_law(law_data: xr.Dataset, tol: float, criterion: Criterion) -> Ranked:
     parameters = {
         name.config_key: chosen[str(name)] for name in map(InputName.parse, chosen) if _is_parameter(name)
     }
-    units = {
-        InputName.parse(name).config_key: plain_unit(str(law_data.variables[name].attrs.get("units", "1")))
-        for name in {**chosen, **at}
-    }
     exponent = law_data.variables.get("exponent")
     numbers = {"n": float(exponent.values)} if exponent is not None and exponent.ndim == 0 else {}
+    units: dict[str, str] = {}
+    for name in {**chosen, **at}:
+        unit = plain_unit(str(law_data.variables[name].attrs.get("units", "1")))
+        if names_in(unit) <= numbers.keys():
+            # what a user or a file has as a unit may be none
+            units[InputName.parse(name).config_key] = with_numbers(unit, numbers) if names_in(unit) else unit
     served = _served_ranges(served_input.values, judged > 0, within < judged) if along_one else None
     crossings = _crossings(served_input.values, side, within > 0) if along_one else ()
     model, friction = _keys(law_data)
@@ -581,7 +583,7 @@ def _rank_law(law_data: xr.Dataset, tol: float, criterion: Criterion) -> Ranked:
         crossings,
         friction,
         criterion,
-        {path: with_numbers(unit, numbers) for path, unit in units.items() if names_in(unit) <= numbers.keys()},
+        units,
     )
 
 
