@@ -10,10 +10,12 @@ from matplotlib.patches import Circle
 from PIL import Image
 
 import impact
+from impact.plots import motions
 from impact.plots.draw import get_plot_data
 from impact.plots.kinds import Choice
 from impact.plots.layout import Picture
 from impact.plots.motions import FRAMES, animation_data
+from impact.plots.style import encoded
 
 from .conftest import Run
 from .fork_server import ForkServer
@@ -75,6 +77,16 @@ def test_the_command_writes_an_animation_of_a_history(
     assert done.returncode == 0, done.stderr
     with Image.open(tmp_path / f"a.{suffix}") as picture:
         assert getattr(picture, "n_frames", 1) == (4 if suffix == "gif" else 1)
+
+
+def test_a_style_with_a_layout_engine_leaves_frames_the_layout_of_the_picture(
+    single: impact.Impact, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(motions, "FRAMES", 3)
+    style = tmp_path / "tight.mplstyle"
+    style.write_text("figure.autolayout: True\n", encoding="utf-8")
+    gifs = [encoded(impact.plot(single, kind="animation", style=s), "gif", s) for s in (None, style)]
+    assert gifs[0] == gifs[1]
 
 
 @pytest.mark.slow
