@@ -62,11 +62,15 @@ def models(
                 raise UsageError(f"{name}: got it with {other}, expected one of the two")
     if check is not None:
         others = impact.models()
-        if not check.suffix and key is not None:
+        if check.suffix:
+            known = impact.models([check])
+            checked = [model for name, model in known.items() if name not in others and key in (None, name)]
+            checked = checked or [known.find(str(key))]
+        elif key is not None:
             raise UsageError(f"--check: got {check} with {key}, expected one of the two")
-        known = impact.models([check]) if check.suffix else others
-        of_file = [model for name, model in known.items() if name not in others and key in (None, name)]
-        _check_contract(of_file or [known.find(str(key if check.suffix else check))], as_json=as_json)
+        else:
+            checked = [others.find(str(check))]
+        _check_contract(checked, as_json=as_json)
         return
     shown: Displayed
     if key is not None and is_law:

@@ -341,11 +341,8 @@ def _column_of(header: str, outputs: Sequence[str], models: Mapping[str, ForceMo
         raise value_error(f"got {len(outputs)} outputs, expected {expected}")
     column = _COLUMNS.get(f"{SIGMA}_{next(iter(outputs), 'e_out')}" if header == SIGMA else header)
     if column is not None:
-        if (
-            column.kind == SIGMA
-            and column.name in MEASURED_OUTPUTS
-            and column.name not in (outputs or [column.name])
-        ):
+        is_of_output = column.kind == SIGMA and column.name in MEASURED_OUTPUTS
+        if is_of_output and outputs and column.name not in outputs:
             raise value_error(f"got no column {column.name}, expected one next to its standard deviation")
         return column
     name = InputName.parse(header)
