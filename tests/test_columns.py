@@ -142,6 +142,10 @@ def test_every_reader_of_columns_knows_the_dialects(folder: Path) -> None:
     assert read_config({"models": "hertz", "sweep": sweep}).axes[0].columns == expected
     assert read_points("cases.csv").columns == expected
     assert read_points({"v1 (cm/s)": [12.5, 25.0], "m1 [g]": [2.5, 5]}).columns == expected
+    with pytest.raises(
+        impact.ConfigError, match="points: e_out: got 1 values, expected 2, as in the first column"
+    ):
+        read_points({"v1": [1.0, 2.0], "e_out": [0.5]})
 
 
 def test_a_column_of_a_file_leaves_out_rows_without_a_value_and_counts_them(folder: Path) -> None:

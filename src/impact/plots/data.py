@@ -99,6 +99,11 @@ def read_points(points: str | Path | Mapping[str, Sequence[object]] | pd.DataFra
         columns = read_csv(Path(points), quantities.__contains__)
     else:
         columns = columns_of_table(points, "points")
+    size = len(next(iter(columns.cells.values()), ()))
+    for name, cells in columns.cells.items():
+        if len(cells) != size:
+            message = f"got {len(cells)} values, expected {size}, as in the first column"
+            raise ConfigError(columns.problem(message, name))
     used = [name for name in columns.cells if name in quantities]
     unused = [name for name in columns.cells if name not in quantities and name != SPECIMEN]
     problems = [
