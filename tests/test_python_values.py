@@ -237,11 +237,11 @@ def test_one_law_of_a_calibration_or_of_a_study_may_be_selected() -> None:
     fits = impact.calibrate(law | pairs | {"data": {"columns": columns, "sigma": 0.1}})
     for result in (fits, impact.sensitivity(law | study)):
         text = str(impact.describe(result.isel(model=[0])))
-        one = result.isel(model=0)
-        assert str(impact.describe(one)) == text
-        assert impact.report(one) == impact.report(result.isel(model=[0]))
-        assert str(impact.info(one)) == str(impact.info(result.isel(model=[0])))
-        assert len(impact.plot(one).axes) == len(impact.plot(result.isel(model=[0])).axes)
+        law_alone = result.isel(model=0)
+        assert str(impact.describe(law_alone)) == text
+        assert impact.report(law_alone) == impact.report(result.isel(model=[0]))
+        assert str(impact.info(law_alone)) == str(impact.info(result.isel(model=[0])))
+        assert len(impact.plot(law_alone).axes) == len(impact.plot(result.isel(model=[0])).axes)
     assert str(impact.run(fits.isel(model=0))) == str(impact.run(fits.isel(model=[0])))
 
 

@@ -41,8 +41,8 @@ def compare(
     plot: PlotOption = None,
 ) -> None:
     """Compare a result with a baseline: exit 0 if equal, 1 if not (the first line says why), 2 on an error."""
-    words = locals()
-    _report_verdict(lambda: options.call(impact.compare, words), str(new), str(baseline), format, plot)
+    arguments = locals()
+    _report_verdict(lambda: options.call(impact.compare, arguments), str(new), str(baseline), format, plot)
 
 
 def bless(
@@ -83,13 +83,13 @@ def rerun(
     quiet: options.Quiet = False,
 ) -> None:
     """Repeat a sweep or a calibration from its result alone, and compare the new values with the stored ones."""
-    words = locals()
+    arguments = locals()
 
     def repeat_sweep() -> Verdict:
         from ..comparison.rerun import rerun as repeat
 
         with execution(quiet) as keywords:
-            return options.call(repeat, words, execute=partial(run_in_memory, **keywords))
+            return options.call(repeat, arguments, execute=partial(run_in_memory, **keywords))
 
     _report_verdict(repeat_sweep, "the rerun", str(result), format, plot)
 

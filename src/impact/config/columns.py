@@ -515,8 +515,8 @@ def _read_cases(draft: Draft, columns: Columns) -> CsvValues:
     # n may be one of the columns
     n = None if "n" in columns.units else draft.exponent
     for name, quantity in quantities.items():
-        values[name], found = complete.read(name, quantity, n)
-        problems += [complete.problem(message, name, row) for _, row, message in found]
+        values[name], of_column = complete.read(name, quantity, n)
+        problems += [complete.problem(message, name, row) for _, row, message in of_column]
     if problems:
         raise ConfigError(*problems)
     return {("sweep", "cases"): values}, columns.notes(count, unused)

@@ -239,9 +239,8 @@ def split_by_law(data: xr.Dataset, *, numbered: bool) -> Iterator[LawPart]:
             friction = str(part.variables["friction"].values.item()) if has_frictions or has_pairs else ""
             # a single model is not named beside every friction law
             model = "" if has_frictions and data.sizes["model"] == 1 else label
-            shown = law_name(
-                model, friction and friction_text(friction, scalars_of(part, f"friction.{friction}."))
-            )
+            parameters = scalars_of(part, f"friction.{friction}.")
+            shown = law_name(model, friction_text(friction, parameters) if friction else "")
             yield LawPart(shown, key, data=part, friction=friction if has_frictions else "")
 
 
