@@ -22,7 +22,7 @@ from ..errors import ResultError, UnfinishedError, UsageError, warn
 from ..formatting import argument, safe_text, type_of
 from .layouts import read_layout
 from .netcdf import RegionValues, encode_attribute, read_variables, write_dataset
-from .schema import MODEL_METADATA, SCHEMA, STUDIES, kind_of, require_result, require_sweep
+from .schema import MODEL_METADATA, SCHEMA, kind_of, require_result, require_sweep
 from .seal import byte_reader, check_root, check_seal, digest, is_result, write_seal
 from .selection import select, select_laws
 from .slabs import slabs
@@ -206,8 +206,8 @@ def result_of(result: xr.Dataset | str | Path) -> xr.Dataset:
         raise TypeError(f"got {type_of(result)}, expected a dataset, or the file of a result")
     require_result(result)
     kind = kind_of(result)
-    # a calibration has the friction laws of its pairs along the models
-    for dim in ("friction", "model") if kind == "sweep" else ("model",) if kind in STUDIES else ():
+    # a calibration has the friction laws of its pairs along the models, and a history is of a single law
+    for dim in {"sweep": ("friction", "model"), "history": ()}.get(kind, ("model",)):
         if dim in result.coords and result[dim].ndim == 0:
             along = [name for name, variable in SCHEMA[kind].items() if dim in variable.dims]
             along += ["exponent", *MODEL_METADATA] if dim == "model" else []
