@@ -243,6 +243,8 @@ def test_one_law_of_a_calibration_or_of_a_study_may_be_selected() -> None:
         assert str(impact.info(law_alone)) == str(impact.info(result.isel(model=[0])))
         assert len(impact.plot(law_alone).axes) == len(impact.plot(result.isel(model=[0])).axes)
     assert str(impact.run(fits.isel(model=0))) == str(impact.run(fits.isel(model=[0])))
+    assert impact.compare(fits.isel(model=0), fits.isel(model=[0])).equal
+    assert impact.compare(fits.isel(model=0), fits).headline == "not equal: labels (model)"
 
 
 @pytest.mark.parametrize("name", ["run", "prepare", "solve", "timestep", "export"])

@@ -24,7 +24,7 @@ from ..formatting import argument, number, safe_text
 from ..results.attributes import read_attribute
 from ..results.provenance import command_start
 from ..results.schema import DEFAULT_RTOL_FACTOR, MODEL_METADATA, SCHEMA, SCHEMA_VERSION, kind_of, require_sweep
-from ..results.xarray_backend import load
+from ..results.xarray_backend import load, result_of
 from .align import Alignment, align_boards, align_calibrations, align_sweeps, changed_config, unknown_variables
 from .values import compare_values, group_size, representative_regions
 from .verdict import DIFFERENCE_KINDS, Difference, Verdict
@@ -93,6 +93,7 @@ def compare(
     kind = kind_of(b)
     is_study = kind_of(a) == kind and kind in ("calibration", "board")
     if is_study:
+        a, b = map(result_of, (a, b))
         tolerances = calibration_tolerances(tol)
         align = align_calibrations if kind == "calibration" else align_boards
         aligned = align(a, b, subset=subset)
