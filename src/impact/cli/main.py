@@ -121,9 +121,9 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
     context_settings={"help_option_names": ["-h", "--help"]},
-    help="Sweep contact force models over restitution, speeds, masses and materials, and compare them with the "
-    "impulse-momentum solution: which model, with which damping, delivers the requested restitution, and how "
-    "large is the error otherwise?",
+    help="Sweep contact force models, with friction or without, over restitution, speeds, angles, masses and "
+    "materials, and compare them with the impulse-momentum solution: which model, with which damping, delivers "
+    "the requested restitution, and how large is the error otherwise?",
     epilog="Start with: impact init, impact sweep config.toml, impact plot results.h5",
 )
 
