@@ -249,6 +249,75 @@ def test_balls_that_miss_each_other_have_an_answer_and_two_walls_have_none(brows
         np.testing.assert_allclose(theirs, ours, rtol=2e-14, atol=1e-14, err_msg=output)
 
 
+OF_PAIRS = ("beta", "e_t", "rebound_angle", "impulse_ratio", "u1_post", "u2_post", "omega1_post", "omega2_post")
+OBLIQUE: dict[str, Any] = {
+    "models": ["tsuji-1992", "hertz"],
+    "frictions": ["coulomb-1785", "lammps-mindlin"],
+    "sweep": {
+        "e": 0.7,
+        "speed": 1.5,
+        "angle": ["5 deg", "40 deg", "80 deg"],
+        "mu": [0.1, 0.4],
+        "omega1": ["0 rad/s", "30 rad/s"],
+        "m1": 0.1,
+        "R1": 0.02,
+        "m2": [0.1, math.inf],
+        "K": 1e8,
+    },
+    "friction": {"lammps-mindlin": {"kt_over_kn": 0.8, "xt": 0.5}},
+}
+
+
+@pytest.mark.parametrize("layout", ["full", "factored"])
+def test_pairs_of_a_page_have_the_values_of_the_result(layout: str, tmp_path: Path) -> None:
+    impact.sweep_to_file({**OBLIQUE, "output": {"layout": layout}}, tmp_path / "oblique.h5")
+    result = impact.load(tmp_path / "oblique.h5")
+    content = content_of(impact.page(tmp_path / "oblique.h5"))
+    axes = [axis["name"] for axis in content["axes"]]
+    pairs = [law for law in content["laws"] if law["is_pair"]]
+    names = [f"{model} with {friction}" for model in OBLIQUE["models"] for friction in OBLIQUE["frictions"]]
+    assert [law["key"] for law in pairs] == names
+    assert [law["key"] for law in content["laws"] if not law["is_pair"]] == OBLIQUE["models"]
+    assert [output["name"] for output in content["outputs"] if output["of_friction"]] == [*OF_PAIRS]
+    for pair in pairs:
+        model, friction = pair["key"].split(" with ")
+        for name, column in pair["columns"].items():
+            expected = result[name].sel(model=model, friction=friction).transpose(*axes, missing_dims="ignore")
+            assert [axes[number] for number in column["axes"]] == [*expected.dims]
+            values = np.frombuffer(base64.b64decode(column["base64"]), column["type"])
+            unit = np.degrees(1.0) if name == "rebound_angle" else 1.0
+            np.testing.assert_allclose(values, expected.values.ravel() * unit, rtol=1e-15, err_msg=name)
+
+
+def test_a_result_without_outputs_of_friction_has_a_page_of_its_models() -> None:
+    result = impact.sweep({**OBLIQUE, "output": {"variables": ["e_out"]}})
+    content = content_of(impact.page(result))
+    assert [law["key"] for law in content["laws"]] == OBLIQUE["models"]
+    assert [output["name"] for output in content["outputs"]] == ["e_out"]
+
+
+@pytest.mark.slow
+def test_pairs_are_drawn_where_friction_has_a_meaning(browser: Page, tmp_path: Path) -> None:
+    result = impact.sweep(OBLIQUE)
+    show(browser, result, tmp_path / "page.html")
+    visible = "laws.filter(law => !byId(`law-${law.key}`).parentNode.hidden).map(law => law.key)"
+    assert browser.evaluate(visible) == OBLIQUE["models"]
+    browser.evaluate("document.getElementById('law-hertz').click()")
+    choose(browser, "variable", "beta")
+    assert [key.split(" with ")[1] for key in browser.evaluate(visible)] == 2 * OBLIQUE["frictions"]
+    # there is no reference, and a model that is left out has its pairs
+    assert len(browser.evaluate("curves()")) == 4
+    choose(browser, "variable", "rebound_angle")
+    part = result["rebound_angle"].isel(mu=0, omega1=0, m2=0).sel(model="hertz", friction="lammps-mindlin")
+    columns = [line.split(",") for line in browser.evaluate("csv()").splitlines() if not line.startswith("#")]
+    number = columns[0].index('"rebound_angle of hertz with lammps-mindlin [°]"')
+    degrees = [float(row[number]) for row in columns[1:]]
+    np.testing.assert_allclose(degrees, np.degrees(part.values), rtol=1e-15)
+    choose(browser, "variable", "e_out")
+    assert browser.evaluate(visible) == OBLIQUE["models"]
+    assert len(browser.evaluate("curves()")) == 2
+
+
 @pytest.mark.slow
 def test_sliders_laws_the_cursor_and_the_numbers_follow_the_controls(
     results: dict[str, xr.Dataset], browser: Page, tmp_path: Path
@@ -316,6 +385,18 @@ def test_the_unit_of_a_horizontal_axis_has_the_prefix_that_its_slider_has(browse
     for number, text in enumerate(["m1 = 20 g", "rho, soft = 2000 kg/m^3"]):
         choose(browser, "x", number)
         assert browser.evaluate("document.getElementById('note').textContent") == f"at {text}"
+
+
+@pytest.mark.slow
+def test_the_name_of_an_output_stands_beside_numbers_of_many_digits(browser: Page, tmp_path: Path) -> None:
+    sweep = {"e": 0.8, "v1": [1.0, 2.0, 3.0], "m1": 1.0, "m2": 1.0, "K": 1e9}
+    show(browser, impact.sweep({"models": "lammps-tsuji", "sweep": sweep}), tmp_path / "page.html")
+    texts = "[...document.querySelectorAll('svg text')]"
+    numbers = f"{texts}.filter(text => text.getAttribute('text-anchor') === 'end')"
+    assert "0.7996" in browser.evaluate(f"{numbers}.map(text => text.textContent)")
+    left = browser.evaluate(f"Math.min(...{numbers}.map(text => text.getBoundingClientRect().left))")
+    name = browser.evaluate(f"{texts}.find(text => text.getAttribute('transform')).getBoundingClientRect().right")
+    assert name < left
 
 
 CONTRASTS = """

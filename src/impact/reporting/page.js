@@ -33,6 +33,7 @@ function column(law, name, at) {
 
 // an output of a law, or of the impulse-momentum solution for no law, at positions along all axes
 function value(output, law, at) {
+  if (law?.is_pair) return column(law, output, at);
   const [v1, v2, m1, m2, e] = ["v1", "v2", "m1", "m2", "e"].map(name => read(inputs[name], at));
   const v0 = v1 - v2, m = 1 / (1 / m1 + 1 / m2), asked = e >= 0 && e <= 1 ? e : NaN, isMissed = !(v0 > 0);
   const after = restitution => {
@@ -68,7 +69,7 @@ const digits = number => Number.isFinite(number) ? String(+number.toPrecision(6)
 
 // a factor, and the unit of an output with its prefix, for values up to `largest`
 function scale(unit, largest) {
-  if (unit === "1") return [1, ""];
+  if (unit === "1" || unit === "°") return [1, unit === "1" ? "" : unit];
   const power = largest > 0 ? 3 * Math.floor(Math.log10(largest) / 3 + 1e-4) : 0;
   const limited = Math.min(9, Math.max(-9, power));
   return [10 ** -limited, PREFIXES[limited] + unit];
@@ -79,8 +80,10 @@ const heading = (name, unit) => unit ? `${name} [${unit}]` : name;
 // ---- state: the output, the axis to draw over, the positions along all axes, the laws, and the cursor
 
 const state = {output: page.outputs[0].name, x: page.first_axis, at: page.axes.map(() => 0), cursor: null};
-const shown = () => laws.filter(law => byId(`law-${law.key}`).checked);
 const outputNow = () => page.outputs.find(output => output.name === state.output);
+// the friction of a pair has other outputs than the normal motion of a model
+const isChoice = law => law.is_pair === outputNow().of_friction;
+const shown = () => laws.filter(law => isChoice(law) && byId(`law-${law.key}`).checked);
 const along = position => state.at.map((at, axis) => axis === state.x ? position : at);
 
 // the positions of the axis in the order of its values, which are drawn
@@ -147,12 +150,13 @@ function draw() {
   const height = Math.round(Math.min(560, Math.max(280, 0.62 * width)));
   const axis = page.axes[state.x], {is_log: isLog, has_words: hasWords} = axis;
   const output = outputNow(), drawn = curves();
-  const left = 64, right = width - 14, top = 12, bottom = height - 46, warp = isLog ? Math.log : number => number;
+  const right = width - 14, top = 12, bottom = height - 46, warp = isLog ? Math.log : number => number;
   const x = drawn[0]?.x ?? [], numbers = drawn.flatMap(curve => curve.y).filter(Number.isFinite);
   svg.replaceChildren();
   svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
   svg.setAttribute("height", height);
   picture = null;
+  for (const law of laws) byId(`law-${law.key}`).parentNode.hidden = !isChoice(law);
   if (!numbers.length) {
     add(svg, "text", {x: width / 2, y: height / 2, "text-anchor": "middle"}, "no values to draw here");
     return list();
@@ -163,13 +167,16 @@ function draw() {
   const room = 0.05 * (high - low > FLAT * size ? high - low : size || 1);
   [low, high] = [low - room, high + room];
   const [factor, unit] = scale(output.unit, Math.max(Math.abs(low), Math.abs(high)));
+  const heights = ticks(low * factor, high * factor, false, height / 60);
+  // the numbers stand between the name of the output and the frame
+  const left = 34 + 7.5 * Math.max(4, ...heights.map(number => digits(number).length));
   const [xSize, xUnit] = axis.scaled, xFactor = 1 / xSize;
   const first = x[0], last = x[x.length - 1];
   const share = number => (warp(number) - warp(first)) / (warp(last) - warp(first));
   const toX = number => last > first ? left + share(number) * (right - left) : (left + right) / 2;
   const toY = number => bottom - (number - low) / (high - low) * (bottom - top);
 
-  for (const number of ticks(low * factor, high * factor, false, height / 60)) {
+  for (const number of heights) {
     const y = toY(number / factor);
     add(svg, "line", {x1: left, x2: right, y1: y, y2: y, class: "grid"});
     add(svg, "text", {x: left - 8, y: y + 4, "text-anchor": "end"}, digits(number));

@@ -27,9 +27,10 @@ from ..contact.status import FIRST_FAILURE
 from ..contact.variables import OUTPUTS
 from ..engine.inputs import Inputs, build_impacts, input_at
 from ..errors import UsageError
-from ..formatting import argument, scaled_unit, with_year
+from ..formatting import argument, scaled_unit
 from ..plots.explore import axes_of, axis_label, shown_values
-from ..plots.slices import conditions_of, parameter_text, scalars_of, unit_of
+from ..plots.labels import LawPart, split_by_law, with_model
+from ..plots.slices import conditions_of, unit_of
 from ..plots.style import is_geometric, model_styles
 from ..results.layouts import read_inputs
 from ..results.schema import require_axes
@@ -39,6 +40,10 @@ from ..results.xarray_backend import open_result, result_of
 from .report import check_page_path, page_title, template
 
 SHOWN = ("e_out", "e_error", "v1_post", "v2_post", "v1_error", "v2_error", "peak_force", "contact_time")
+SHOWN_OF_PAIRS = (
+    *("beta", "e_t", "rebound_angle", "impulse_ratio"),
+    *("u1_post", "u2_post", "omega1_post", "omega2_post"),
+)
 # columns of a trajectory, in the contact's own units, by the names of the outputs that follow from them
 TRAJECTORY = {"e_out": "e_out", "peak_force": "force", "contact_time": "contact_time", "status": "status"}
 # inputs that the outputs depend on besides the trajectory
@@ -59,7 +64,8 @@ def page(
     """Write a result as one page of HTML with controls, which needs neither Python nor a network.
 
     It draws the restitution, velocities after the impact, their errors, the peak force and the contact time over
-    any axis, with a slider for each other one. Values at points of the grid are those of the result.
+    any axis, with a slider for each other one; of pairs with friction the tangential restitution, the angle of the
+    rebound and the tangential velocities. Values at points of the grid are those of the result.
 
     Parameters
     ----------
@@ -101,12 +107,22 @@ def _page_of(dataset: xr.Dataset, models: Sequence[str] | None) -> str:
     dataset = dataset.isel(model=positions)
     if table is None:
         inputs = read_inputs(dataset, axes_of(dataset))
-        arrays = _stored_values(dataset, inputs)
+        arrays = [*_stored_values(dataset, inputs)]
     else:
         inputs = table.inputs
-        arrays = _trajectories(table, positions)
-    laws = [{**law, **columns} for law, columns in zip(_laws(dataset), arrays, strict=True)]
+        arrays = [*_trajectories(table, positions)]
+    names = [name for name in SHOWN if name in dataset]
+    parts = [*split_by_law(dataset[names], numbered=False)]
+    of_pairs = [name for name in SHOWN_OF_PAIRS if name in dataset]
+    if of_pairs:
+        # before they are computed
+        _check_size(sum(dataset[name].size for name in of_pairs) * VALUE_BYTES)
+        pairs = [*split_by_law(dataset[of_pairs], numbered=False)]
+        arrays += [_values(pair.data, of_pairs, inputs) for pair in pairs]
+        parts, names = [*parts, *pairs], [*names, *of_pairs]
+    laws = [{**law, **columns} for law, columns in zip(_laws(parts), arrays, strict=True)]
     axes = [_axis(dataset, axis) for axis in inputs.axes]
+    swept = [name for axis in inputs.axes for name in axis.columns]
     content = {
         # one line, which is a comment of the CSV
         "title": " ".join(page_title(dataset).split()),
@@ -115,7 +131,7 @@ def _page_of(dataset: xr.Dataset, models: Sequence[str] | None) -> str:
         "first_axis": _first_axis(axes),
         "axes": axes,
         "inputs": {name: _array(input_at(inputs, name, inputs.index())) for name in INPUTS},
-        "outputs": [_output(name) for name in SHOWN if name in dataset],
+        "outputs": [_output(name) for name in names],
         "laws": laws,
     }
     # no text of a result ends the script
@@ -123,22 +139,22 @@ def _page_of(dataset: xr.Dataset, models: Sequence[str] | None) -> str:
     _check_size(len(data))
     return template("page.html.j2").render(
         title=content["title"],
-        summary=conditions_of(dataset, *(name for axis in inputs.axes for name in axis.columns)),
+        summary=with_model(conditions_of(dataset, *swept), dataset, numbered=False),
         data=Markup(data),
         version=__version__,
     )
 
 
-def _laws(dataset: xr.Dataset) -> Iterator[dict[str, Any]]:
-    """Name the laws with parameters of one value, and their style in pictures."""
-    keys = [str(key) for key in dataset["model"].values]
-    styles, scalars = model_styles(keys), scalars_of(dataset)
-    for key, title, year in zip(keys, dataset["title"].values, dataset["year"].values, strict=True):
-        style = styles[key]
+def _laws(parts: Sequence[LawPart]) -> Iterator[dict[str, Any]]:
+    """Name models and pairs, and their style in pictures."""
+    styles = model_styles([part.law for part in parts])
+    for part in parts:
+        style = styles[part.law]
         dashes = [DASH_PIXELS * length for length in style["linestyle"][1]] if style["linestyle"] != "-" else []
         yield {
-            "key": key,
-            "label": ", ".join(filter(None, (with_year(str(title), int(year)), parameter_text(key, scalars)))),
+            "key": part.law,
+            "label": part.label,
+            "is_pair": bool(part.friction),
             "color": style["color"],
             "marker": style["marker"],
             "dashes": " ".join(map("{:g}".format, dashes)) or "none",
@@ -182,8 +198,7 @@ def _stored_values(dataset: xr.Dataset, inputs: Inputs) -> Iterator[dict[str, An
     if "e_out" not in dataset:
         raise UsageError("e_out is not in this result; sweep with it in output.variables")
     names = [name for name in TRAJECTORY if name in dataset and name != "status"]
-    dims = [axis.name for axis in inputs.axes]
-    others = {*dataset["e_out"].dims} - {"model", *dims}
+    others = {*dataset["e_out"].dims} - {"model", *(axis.name for axis in inputs.axes)}
     if others:
         raise UsageError(f"e_out depends on {', '.join(map(str, others))} in this result; select one value of it")
     _check_size(dataset["e_out"].size * len(names) * VALUE_BYTES)
@@ -192,12 +207,18 @@ def _stored_values(dataset: xr.Dataset, inputs: Inputs) -> Iterator[dict[str, An
         exact = (dataset["e"] + dataset["e_error"].astype(float)).fillna(dataset["e_out"])
         dataset = dataset.assign(e_out=exact)
     for position in range(dataset.sizes["model"]):
-        columns = {}
-        for name in names:
-            values = dataset[name].isel(model=position).transpose(*dims, missing_dims="ignore")
-            axes = [dims.index(str(dim)) for dim in values.dims]
-            columns[name] = {**_encoded(np.asarray(values.values, float)), "axes": axes}
-        yield {"is_table": False, "cells": None, "columns": columns}
+        yield _values(dataset.isel(model=position), names, inputs)
+
+
+def _values(of_law: xr.Dataset, names: Sequence[str], inputs: Inputs) -> dict[str, Any]:
+    """Collect outputs of a law, or of a pair, over the grid; angles in degrees."""
+    dims, columns = [axis.name for axis in inputs.axes], {}
+    for name in names:
+        values = of_law[name].transpose(*dims, missing_dims="ignore")
+        numbers = np.asarray(values.values, float)
+        encoded = _encoded(np.degrees(numbers) if OUTPUTS[name].unit == "rad" else numbers)
+        columns[name] = {**encoded, "axes": [dims.index(str(dim)) for dim in values.dims]}
+    return {"is_table": False, "cells": None, "columns": columns}
 
 
 def _array(values: Array) -> dict[str, Any]:
@@ -212,9 +233,11 @@ def _encoded(values: NDArray[Any]) -> dict[str, Any]:
     return {"type": little.dtype.str[1:], "base64": base64.b64encode(little.tobytes()).decode()}
 
 
-def _output(name: str) -> dict[str, str]:
-    meaning = OUTPUTS[name].short_meaning
-    return {"name": name, "label": meaning[:1].upper() + meaning[1:], "unit": OUTPUTS[name].unit}
+def _output(name: str) -> dict[str, Any]:
+    output, meaning = OUTPUTS[name], OUTPUTS[name].short_meaning
+    unit = "°" if output.unit == "rad" else output.unit
+    label = meaning[:1].upper() + meaning[1:]
+    return {"name": name, "label": label, "unit": unit, "of_friction": output.of_friction}
 
 
 def _axis(dataset: xr.Dataset, axis: Axis) -> dict[str, Any]:
