@@ -302,6 +302,27 @@ def test_momentum_and_angular_momentum_are_kept(whole: xr.Dataset) -> None:
     assert moves.values[ok].sum() == 5 * 12
 
 
+def test_a_sweep_says_what_a_slow_limit_is(cli: Run, tmp_path: Path) -> None:
+    inputs = (
+        "e=0.8",
+        "speed=1",
+        'angle=["10 deg", "60 deg"]',
+        "mu=0.3",
+        "m1=1",
+        "m2=1",
+        "R1=0.01",
+        "R2=0.01",
+        "K=1e9",
+    )
+    settings = ['models=["tsuji-1992"]', 'frictions=["lammps-mindlin"]', "friction.lammps-mindlin.kt_over_kn=0.8"]
+    settings += [f"sweep.{setting}" for setting in inputs]
+    (tmp_path / "config.toml").write_text("[sweep]\n")
+    overrides = [word for setting in settings for word in ("--set", setting)]
+    done = cli("sweep", "config.toml", "-o", "result.h5", *overrides, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "slow_limit: the limit of small steps, which a code with fixed steps reaches slowly" in done.stderr
+
+
 @pytest.mark.slow
 def test_pairs_that_cannot_be_combined_are_marked_and_named(folder: Path, whole: xr.Dataset) -> None:
     marked = whole.friction_status == FrictionStatus.NOT_COMBINABLE

@@ -377,6 +377,8 @@ class SweepOutcome(Displayed):
         yield Wrapped(f"{self.output}: {summary.points:,} points{distinct} ({counts_text(summary.counts)})")
         if summary.friction_counts:
             yield Wrapped(f"with each friction law: {counts_text(summary.friction_counts)}")
+            if FrictionStatus.SLOW_LIMIT in summary.friction_counts:
+                yield Wrapped(f"slow_limit: {FrictionStatus.SLOW_LIMIT.meaning}; see impact timestep")
         failures = self.records()
         for failure, (_, status, _, _) in zip(failures, summary.first_failed, strict=True):
             inputs = ", ".join(f"{name}={number(value, None)}" for name, value in failure["at"].items())
