@@ -87,6 +87,15 @@ def of_pairs(data: CurveData, variable: str = "") -> list[Curve]:
     return [curve for curve in panel.curves if curve.friction and variable in ("", curve.variable)]
 
 
+def test_the_limit_of_small_steps_is_named_beside_the_law_that_reaches_it_slowly() -> None:
+    laws = ["coulomb-1785", "lammps-mindlin"]
+    result = sweep(models=TSUJI, frictions=laws, friction={"lammps-mindlin": {"kt_over_kn": 0.8}})
+    for kind in SHOWN:
+        labels = {curve.friction: curve.label for curve in curves_of(result, kind).panels[0].curves}
+        assert labels["lammps-mindlin"].endswith(", limit of small steps")
+        assert "limit" not in labels["coulomb-1785"]
+
+
 @pytest.mark.parametrize("kind", SHOWN)
 def test_a_curve_of_a_pair_has_the_values_of_the_result(beads: xr.Dataset, kind: str) -> None:
     curves = of_pairs(curves_of(beads, kind, sel={"mu": 0.3}), SHOWN[kind])

@@ -128,7 +128,9 @@ def _pairs_along(dataset: xr.Dataset, choice: Choice, *names: str) -> tuple[Line
         # the spin of a wall is a number whatever becomes of the ball
         has_failed = statuses.size > 0 and (statuses >= FIRST_FAILURE).all()
         if not has_failed and any(np.isfinite(pair.data.variables[name].values).any() for name in names):
-            pairs.append(pair)
+            # what a code with fixed steps delivers is far from it
+            is_slow = FrictionStatus.SLOW_LIMIT in statuses
+            pairs.append(replace(pair, label=f"{pair.label}, limit of small steps") if is_slow else pair)
         else:
             failures = [FrictionStatus(int(status)).meaning for status in statuses if status >= FIRST_FAILURE]
             not_drawn.append(f"{pair.law}: {'; '.join(failures) or 'not defined'}")
