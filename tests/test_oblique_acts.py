@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -231,6 +232,31 @@ def test_each_root_has_the_target_variable_beside_e_out() -> None:
     expected = {"value": math.tan(ANGLE) / 14.0, "e_out": 1.0, "beta": -0.5}
     assert root == pytest.approx(expected, rel=1e-8)
     assert list(result.to_dataframe()) == ["value", "e_out", "beta"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("xt", [0.0, 1.0])
+def test_solve_warns_of_a_limit_that_no_time_step_delivers(xt: float) -> None:
+    source = {
+        "models": "tsuji-1992",
+        "frictions": "lammps-mindlin",
+        "sweep": {
+            "e": 0.8,
+            "speed": 1.0,
+            "angle": "30 deg",
+            "m1": 1.0,
+            "m2": 1.0,
+            "R1": 0.01,
+            "R2": 0.01,
+            "K": 1e9,
+        },
+        "friction": {"lammps-mindlin": {"kt_over_kn": 0.8, "xt": xt}},
+    }
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        assert impact.solve("tsuji-1992", "mu", {"beta": 0.1}, source=source).roots
+    expected = ["tsuji-1992 with lammps-mindlin: beta is the limit of small steps, "] if xt else []
+    assert [str(warning.message)[:66] for warning in caught] == expected
 
 
 def test_solve_writes_a_target_with_its_unit() -> None:

@@ -351,6 +351,14 @@ class SolveProblem:
         shape = (values.size, *(axis.size for axis in self.config.axes))
         return {name: array.reshape(shape).copy() for name, array in outputs.items()}
 
+    def answers(self, values: Array) -> dict[str, AnyArray]:
+        """Compute the same where the target is reached; warn if no code with a fixed step delivers it."""
+        outputs, variable = self.evaluate(values), OUTPUTS[self.variable]
+        if variable.of_friction and (outputs[variable.status] == FrictionStatus.SLOW_LIMIT).any():
+            laws = law_name(self.model.key, self.friction)
+            warn(f"{laws}: {self.variable} is {FrictionStatus.SLOW_LIMIT.meaning}; see impact timestep")
+        return outputs
+
     def raise_failure(self) -> NoReturn:
         """Raise a UsageError with the most frequent status of the integrations of the scan that fail."""
         outputs = self.evaluate(self.scan_values(), is_scan=True)
@@ -473,7 +481,7 @@ def _all_roots(problem: SolveProblem, target: float) -> SolveResult:
     if not values.size:
         problem.raise_failure()
     names = ("e_out", problem.variable)
-    outputs = problem.evaluate(np.array(roots)) if roots else dict.fromkeys(names, np.zeros(0))
+    outputs = problem.answers(np.array(roots)) if roots else dict.fromkeys(names, np.zeros(0))
     status: SolveStatus = "no_root" if not roots else "several_roots" if len(roots) > 1 else "ok"
     if status == "ok" and roots[0] in (problem.unknown.least, problem.unknown.most):
         status = "at_bound"
@@ -640,7 +648,7 @@ def _best_over_axis(problem: SolveProblem, target: float) -> SolveResult:
         candidates.append((float(distances[position]), float(scan[position])))
         candidates.append((float(refined.fun), float(refined.x)))
     value = min(candidates)[1]
-    outputs = {name: array[0] for name, array in problem.evaluate(np.array([value])).items()}
+    outputs = {name: array[0] for name, array in problem.answers(np.array([value])).items()}
     over = tuple(
         {name: column[condition] for name, column in axis.columns.items()}
         | {name: float(outputs[name][condition]) for name in dict.fromkeys((problem.variable, "e_out"))}
