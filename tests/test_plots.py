@@ -321,6 +321,17 @@ def test_an_axis_label_has_one_prefix_of_its_unit(coarse: xr.Dataset) -> None:
     assert {"0", "20", "100"} <= set(ticks)
 
 
+def test_numbers_of_a_narrow_axis_are_those_of_its_ticks() -> None:
+    """Nearly elastic impacts have restitutions that differ in the sixth digit."""
+    result = impact.sweep(models=["hunt-crossley-1975"], e=[0.99999, 0.999993], v1=[1000.001, 1000.002, 1000.003])
+    for name in ("e", "v1"):
+        axes = impact.plot(result, kind="restitution", x=name).axes[0]
+        axes.figure.draw_without_rendering()
+        for axis, size in ((axes.xaxis, 1e3 if name == "v1" else 1.0), (axes.yaxis, 1.0)):
+            numbers = [float(label.get_text()) * size for label in axis.get_ticklabels()]
+            assert numbers == pytest.approx(axis.get_majorticklocs(), rel=1e-11)
+
+
 # a width of 3.5 in is hardly more than 84 mm
 @pytest.mark.slow
 @pytest.mark.parametrize("width", ["84mm", 7.1, "single"], ids=str)

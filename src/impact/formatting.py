@@ -206,8 +206,10 @@ def typographic(value: float, *, powers: bool = False) -> str:
 
     >>> [typographic(value) for value in (0.25, -3.0, -1e-9, 2.5e10, 1e-4)], typographic(1.0, powers=True)
     (['0.25', '−3', '−10⁻⁹', '2.5·10¹⁰', '0.0001'], '10⁰')
+    >>> typographic(0.9999925)
+    '0.9999925'
     """
-    text = number(float(value))
+    text = number(float(value), None)
     if powers and value:
         digits, _, exponent = f"{value:.5e}".partition("e")
         text = f"{float(digits):g}e{exponent}"
