@@ -332,6 +332,18 @@ def test_numbers_of_a_narrow_axis_are_those_of_its_ticks() -> None:
             assert numbers == pytest.approx(axis.get_majorticklocs(), rel=1e-11)
 
 
+def test_a_stiffness_is_stated_with_the_unit_of_the_laws_that_use_it() -> None:
+    """A linear law first, with a K of its own, beside a K of the sweep in N/m^1.5."""
+    own = {"model.kelvin-voigt": {"K": 1e5, "C": 1.0}}
+    result = impact.sweep(models=["kelvin-voigt", "hertz"], K=2e6, m1=1.0, m2=1.0, overrides=own)
+    loop, alone = (
+        get_curve_data(result, "loop", **law).conditions.replace("\N{NO-BREAK SPACE}", " ")
+        for law in ({}, {"models": ["kelvin-voigt"]})
+    )
+    assert "K = 2 MN/m^1.5" in loop
+    assert "K = " not in alone
+
+
 # a width of 3.5 in is hardly more than 84 mm
 @pytest.mark.slow
 @pytest.mark.parametrize("width", ["84mm", 7.1, "single"], ids=str)

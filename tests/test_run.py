@@ -254,6 +254,16 @@ def test_selecting_a_parameter_changes_only_the_loop_of_its_model() -> None:
 # ---- e and alpha
 
 
+def test_a_stiffness_that_a_law_replaces_keeps_the_exponent_of_the_others() -> None:
+    """The K of the sweep is that of laws with another n than this one has."""
+    own = {"model.kelvin-voigt": {"K": 1e5, "C": 1.0}}
+    result = impact.sweep(models=["kelvin-voigt", "hertz"], K=2e6, m1=1.0, m2=1.0, overrides=own)
+    rows = {key: impact.run(result, model=key).groups()["Inputs"] for key in ("kelvin-voigt", "hertz")}
+    units = {key: {name: value for name, value, _ in row} for key, row in rows.items()}
+    assert (units["kelvin-voigt"]["K"], units["kelvin-voigt"]["kelvin-voigt.K"]) == ("2 MN/m^n", "100 kN/m")
+    assert units["hertz"]["K"] == "2 MN/m^1.5"
+
+
 def test_the_inputs_of_the_first_law_are_not_those_of_the_others() -> None:
     sweep = {"e": 0.5, "v1": 1.0, "m1": 1.0, "m2": 1.0, "n": 1.0, "K": 1e6}
     models = ["anagnostopoulos-1988", "kelvin-voigt", "walton-braun-variable"]

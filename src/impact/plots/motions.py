@@ -248,7 +248,10 @@ def _conditions_text(histories: Sequence[xr.Dataset]) -> str:
     by_model = {str(history["model"].item()): impact_inputs(history).get("n") for history in histories}
     exponents = {key: n for key, n in by_model.items() if isinstance(n, float)}
     text = exponent_text(exponents) if len(exponents) == len(by_model) else None
-    return described_inputs(_with_units(histories[0]), text)
+    # a law with a K of its own does not use that of the sweep, whose unit follows from n
+    users = [history for history in histories if f"{history['model'].item()}.K" not in impact_inputs(history)]
+    inputs = _with_units((users or histories)[0])
+    return described_inputs({name: each for name, each in inputs.items() if users or name != "K"}, text)
 
 
 def _with_units(history: xr.Dataset) -> Inputs:

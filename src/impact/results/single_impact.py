@@ -169,6 +169,9 @@ class Impact(Displayed):
         for name, value in {**self.point, **materials}.items():
             rule = InputName.parse(name).quantity({self.model.key: self.model})
             unit, meaning = ("1", "") if rule is None else (self._with_numbers(rule.unit), rule.meaning)
+            if name == "K" and rule and f"{self.model.key}.K" in self.point:
+                # not used; its n is that of other laws
+                unit = rule.unit
             note = "first value of its axis" if name in self.first else ""
             inputs.append((name, prefixed(value, unit, INPUT_DIGITS), "; ".join(filter(None, (meaning, note)))))
         inputs += self._derived_rows((*INPUT_QUANTITIES, *OBLIQUE_QUANTITIES), INPUT_DIGITS)
