@@ -597,6 +597,18 @@ def test_a_part_of_a_study_is_described_and_drawn() -> None:
     assert [label.get_text() for label in axes.get_yticklabels()] == ["$m_1$"]
 
 
+def test_intervals_of_a_picture_end_where_the_study_says() -> None:
+    """An index of few samples is above 1, where its interval ends."""
+    sweep = {"e": {"uniform": [0.4, 0.8]}, "v1": {"normal": [1.0, 0.1]}, "K": 1e6, "m1": 1.0, "m2": 1.0}
+    config = {"models": ["hunt-crossley-1975"], "design": {"n": 128}, "sweep": sweep}
+    study = impact.sensitivity(config).isel(model=0)
+    assert study["first"].max() > study["first_upper"].max() == 1.0
+    (axes,) = impact.plot(study).axes
+    drawn = [segment[:, 0] for lines in axes.collections for segment in lines.get_segments()]
+    ends = [np.stack([study[f"{index}_lower"], study[f"{index}_upper"]], axis=1) for index in ("first", "total")]
+    assert np.array(drawn) == pytest.approx(np.concatenate(ends))
+
+
 def test_a_law_has_no_studies_along_parameters_of_other_laws() -> None:
     config = {
         "models": ["kelvin-voigt", "kuwabara-kono-1987"],

@@ -212,16 +212,19 @@ class BarData(PlotData):
         positions = np.arange(len(self.inputs))[::-1]
         for axes, panel in zip(all_axes, self.panels, strict=True):
             for offset, (index, (name, colour)) in zip((0.5, -0.5), BARS.items(), strict=True):
-                values = np.asarray(panel.values[index])
+                lower, upper = np.asarray(panel.lower[index]), np.asarray(panel.upper[index])
+                places = positions + offset * BAR_HEIGHT
+                bars = axes.barh(places, panel.values[index], BAR_HEIGHT, color=colour)
                 # an estimate may be outside of its interval, which ends at 0 or 1
-                ends = np.maximum([values - panel.lower[index], panel.upper[index] - values], 0.0)
-                bars = axes.barh(
-                    positions + offset * BAR_HEIGHT,
-                    values,
-                    BAR_HEIGHT,
-                    xerr=ends,
-                    color=colour,
-                    error_kw={"ecolor": tint(1.0), "elinewidth": 0.9, "capsize": 2.5, "capthick": 0.9},
+                axes.errorbar(
+                    (lower + upper) / 2.0,
+                    places,
+                    xerr=(upper - lower) / 2.0,
+                    fmt="none",
+                    ecolor=tint(1.0),
+                    elinewidth=0.9,
+                    capsize=2.5,
+                    capthick=0.9,
                 )
                 entries.setdefault(name, bars.patches[0])
             axes.set_title(labels.get(panel.law) or pretty_conditions(panel.label), loc="left", fontsize="medium")
