@@ -342,6 +342,28 @@ def test_numbers_have_few_digits_and_materials_of_the_library_are_no_change() ->
     assert re.findall("--set (.*?)<", text) == ["sweep.v1=2.0"]
 
 
+def test_a_stiffness_of_a_law_has_the_unit_of_its_exponent() -> None:
+    """A linear law beside Hertz' law: K of its table is in N/m, that of the sweep in N/m^1.5."""
+    sweep = {"e": [0.5, 0.9], "v1": 1.0, "K": [1e6, 2e6], "m1": 1.0, "m2": 1.0}
+    for stiffness in (1e5, [1e5, 2e5]):
+        law = {"K": stiffness, "C": 20.0}
+        result = impact.sweep(
+            {"models": ["hertz", "kelvin-voigt"], "sweep": sweep, "model": {"kelvin-voigt": law}}
+        )
+        page = html.unescape(build(result)).replace("\N{NO-BREAK SPACE}", " ")
+        axes = {row[0]: row for row in table(page, "Swept inputs")}
+        assert axes["K"][2] == "MN/m^1.5"
+        if stiffness == 1e5:
+            assert dict(row[:2] for row in table(page, "Single values"))["kelvin-voigt.K"] == "100 kN/m"
+        else:
+            assert axes["kelvin-voigt.K"][2] == "kN/m"
+            assert "kelvin-voigt.K = 100 kN/m." in page
+        worst = {row[0].partition(" ")[0]: row[5] for row in table(page, "Models, the best first")}
+        assert "K=1 MN/m^1.5" in worst["hertz"]
+        # not used, and of the n of other laws
+        assert "K=1 MN/m^n" in worst["kelvin-voigt"]
+
+
 def drawn_elements(svg: bytes) -> Counter[tuple[str, ...]]:
     """What a picture draws: each element with its form, place and look."""
     about = ("d", "x", "y", "transform", "style")

@@ -293,7 +293,7 @@ def _changes_text(dataset: xr.Dataset, index: Position) -> str:
 
 def at_text(point: xr.Dataset, names: Sequence[str]) -> str:
     """Write the inputs that have a single value at a point; no line break separates a name from its value."""
-    values = (f"{name} = {coordinate_text(point[name])}" for name in names if point[name].ndim == 0)
+    values = (f"{name} = {coordinate_text(point, name)}" for name in names if point[name].ndim == 0)
     return ", ".join(value.replace(" ", "\u00a0") for value in values)
 
 
@@ -365,15 +365,17 @@ def _first_answered_of_model(model_data: xr.Dataset, axes: Sequence[Hashable]) -
     return None
 
 
-def coordinate_text(coordinate: xr.DataArray) -> str:
+def coordinate_text(dataset: xr.Dataset, name: str) -> str:
     """Write the value of a scalar coordinate with its unit."""
-    value = InputName.parse(str(coordinate.name)).word(coordinate.values.item())
-    return "∞" if value == math.inf else prefixed(value, numbered_unit(coordinate), 6)
+    value = InputName.parse(name).word(dataset[name].values.item())
+    return "∞" if value == math.inf else prefixed(value, numbered_unit(dataset, name), 6)
 
 
-def numbered_unit(coordinate: xr.DataArray) -> str:
-    """Read the unit of a coordinate, with the number of the exponent n if that has a single value."""
-    unit, n = unit_of(coordinate), coordinate.coords.get("n")
-    return (
-        with_numbers(unit, {"n": float(n)}) if n is not None and n.ndim == 0 and names_in(unit) == {"n"} else unit
-    )
+def numbered_unit(dataset: xr.Dataset, name: str) -> str:
+    """Read the unit of a coordinate, with the number of the exponent n, of its law, if that has a single value."""
+    unit, law = unit_of(dataset[name]), InputName.parse(name).model
+    n = dataset.coords.get("exponent" if law else "n")
+    if n is not None and "model" in n.dims:
+        n = n.isel(model=dataset["model"].values == law)
+    numbers = np.unique([] if n is None else n)
+    return with_numbers(unit, {"n": float(numbers[0])}) if names_in(unit) == {"n"} and numbers.size == 1 else unit

@@ -165,7 +165,7 @@ def _report_of(
             *result_notes(summary),
         ],
         outcomes=list(_outcomes(summary)),
-        axes=[_axis_row(dataset[name]) for name in varying_inputs(dataset)],
+        axes=[_axis_row(dataset, name) for name in varying_inputs(dataset)],
         single_values=list(_single_values(dataset)),
         ranking=ranked,
         headline=headline,
@@ -318,7 +318,7 @@ def _single_values(dataset: xr.Dataset) -> Iterator[tuple[str, str, str]]:
     """List name, value and meaning of the inputs and materials that have a single value."""
     for name, coordinate in dataset.coords.items():
         if coordinate.ndim == 0 and is_input(name):
-            value = (exponents_of(dataset) if name == "n" else None) or coordinate_text(coordinate)
+            value = (exponents_of(dataset) if name == "n" else None) or coordinate_text(dataset, str(name))
             yield str(name), value, str(coordinate.attrs.get("long_name", ""))
     units = {key: rule.unit for key, rule in MATERIAL_QUANTITIES.items()}
     for name, material in read_attribute(dataset.attrs, "materials").items():
@@ -330,9 +330,10 @@ def _single_values(dataset: xr.Dataset) -> Iterator[tuple[str, str, str]]:
         yield name, ", ".join(values), "material"
 
 
-def _axis_row(coordinate: xr.DataArray) -> tuple[str, ...]:
+def _axis_row(dataset: xr.Dataset, name: str) -> tuple[str, ...]:
     """Describe a coordinate: name, meaning, unit, ends, number of values, and how they are spaced."""
-    name, unit, attributes = str(coordinate.name), numbered_unit(coordinate), coordinate.attrs
+    coordinate, unit = dataset[name], numbered_unit(dataset, name)
+    attributes = coordinate.attrs
     ends: Sequence[object] = ()
     if is_large(coordinate.variable):
         extremes = extremes_of(coordinate.to_dataset(name="values"), "values")

@@ -560,15 +560,16 @@ def _rank_law(law_data: xr.Dataset, tol: float, criterion: Criterion) -> Ranked:
     }
     exponent = law_data.variables.get("exponent")
     numbers = {"n": float(exponent.values)} if exponent is not None and exponent.ndim == 0 else {}
+    model, friction = _keys(law_data)
     units: dict[str, str] = {}
     for name in {**chosen, **at}:
         unit = plain_unit(str(law_data.variables[name].attrs.get("units", "1")))
         if names_in(unit) <= numbers.keys():
-            # what a user or a file has as a unit may be none
-            units[InputName.parse(name).config_key] = with_numbers(unit, numbers) if names_in(unit) else unit
+            # what a user or a file has as a unit may be none; a K that the law replaces is that of another n
+            has_number = names_in(unit) and not (name == "K" and f"{model}.K" in law_data.variables)
+            units[InputName.parse(name).config_key] = with_numbers(unit, numbers) if has_number else unit
     served = _served_ranges(served_input.values, judged > 0, within < judged) if along_one else None
     crossings = _crossings(served_input.values, side, within > 0) if along_one else ()
-    model, friction = _keys(law_data)
     return Ranked(
         model,
         parameters,
