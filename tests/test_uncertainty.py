@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 import xarray as xr
 from scipy import stats
@@ -584,6 +585,20 @@ def test_without_another_axis_the_picture_is_the_distribution_function(samples: 
     values = np.sort(samples["peak_force"].sel(model="gonthier-2004", e=0.6))
     np.testing.assert_allclose(axes.lines[0].get_xdata(), values)
     np.testing.assert_allclose(axes.lines[0].get_ydata(), (np.arange(64) + 0.5) / 64)
+
+
+def test_the_table_of_a_distribution_function_has_the_values_and_their_shares(
+    samples: xr.Dataset, tmp_path: Path
+) -> None:
+    impact.save(samples, tmp_path / "s.h5")
+    impact.plot_to_files(tmp_path / "s.h5", kinds=["uncertainty"], sel={"e": 0.6}, data=tmp_path / "s.csv")
+    table = pd.read_csv(tmp_path / "s.csv")
+    key = samples["model"].values[0]
+    np.testing.assert_allclose(table[f"e_out {key}"], np.sort(samples["e_out"].sel(model=key, e=0.6)))
+    np.testing.assert_allclose(table[f"share {key}"], (np.arange(64) + 0.5) / 64)
+    # a measured value has no share, and is not drawn at its own number
+    with pytest.raises(UsageError, match="the picture shows e_out and share, and the points have e_out"):
+        impact.plot(samples, sel={"e": 0.6}, points=pd.DataFrame({"e_out": [0.5]}))
 
 
 def test_a_part_of_a_study_is_described_and_drawn() -> None:

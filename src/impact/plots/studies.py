@@ -300,7 +300,7 @@ def uncertainty_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
             count = min(samples.size, MAX_DRAWN_PROBABILITIES)
             share = (np.arange(count) + 0.5) / count
             quantiles = np.quantile(samples, share, method="hazen")
-            curves.append(curve_of(law, quantiles, share, name))
+            curves.append(curve_of(law, quantiles, share, "share"))
         else:
             # NaN where a sample has no result
             least, median, largest = np.quantile(samples, (BAND[0], 0.5, BAND[1]), axis=-1)
