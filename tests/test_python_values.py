@@ -211,6 +211,23 @@ def test_a_data_array_has_the_unit_of_its_attribute() -> None:
         impact.sweep(BASE, v1=table["v1"].assign_attrs(units="foo"))
 
 
+def test_a_data_array_with_an_si_unit_of_another_dimension_is_refused() -> None:
+    problem = impact.prepare(model="hertz", outputs="peak_force")
+    speeds = xr.DataArray([[1.0, 2.0], [3.0, 4.0]], dims=("x", "y"))
+    masses = speeds.assign_attrs(units="kg")
+    for act in (
+        lambda: impact.run(model="hertz", at={"v1": masses[0, 0]}),
+        lambda: impact.sweep(BASE, v1=masses[0]),
+        lambda: problem(v1=masses),
+    ):
+        with pytest.raises(impact.ImpactError, match=r'got "1\.0 kg", expected a unit of m/s, such as "1 m/s"$'):
+            act()
+    for units in ("", "1", "m/s", "m s-1"):
+        of_units = speeds.assign_attrs(units=units)
+        assert problem(v1=of_units)["peak_force"].tolist() == problem(v1=speeds.values)["peak_force"].tolist()
+        assert impact.sweep(BASE, v1=of_units[0])["v1"].values.tolist() == [1.0, 2.0]
+
+
 def test_a_data_array_of_long_doubles_or_texts_with_a_unit_is_read() -> None:
     for values in (np.array([100.0, 200.0], np.longdouble), ["0.1 m/s", "20 cm/s"]):
         swept = impact.sweep(BASE, v1=xr.DataArray(values, attrs={"units": "mm/s"}))

@@ -21,7 +21,7 @@ from pydantic_core import PydanticCustomError
 
 from ..errors import ConfigError, ImpactError, MissingFileError, UsageError
 from ..formatting import safe_text
-from .quantities import ConfigProblem, KeyPath, Quantity, as_text, differs_from_si
+from .quantities import ConfigProblem, KeyPath, Quantity, as_text, differs_from_si, is_unit
 
 MAX_CONFIG_BYTES = 1_000_000  # size of a TOML file
 MAX_OVERRIDE_LENGTH = 4_000_000  # characters of the value of an override
@@ -195,6 +195,9 @@ def _from_library(value: Any) -> object:
         value = value.values
         if differs_from_si(unit):
             return _with_unit(_from_library(value), unit)
+        if is_unit(unit) and unit not in ("1", "dimensionless"):
+            # numbers in SI are quick to read without their unit, whose dimension one of them tells
+            return _with_unit(_from_library(value), unit, first=True)
     if getattr(getattr(value, "dtype", None), "char", "") == "g":
         # a long double stays one where it is too large for a float
         with np.errstate(over="ignore"):
@@ -209,9 +212,11 @@ def _from_library(value: Any) -> object:
     return value
 
 
-def _with_unit(number: object, unit: str) -> object:
+def _with_unit(number: object, unit: str, *, first: bool = False) -> object:
+    """Write numbers as texts with their unit, or only the first of them."""
     if isinstance(number, list):
-        return [_with_unit(each, unit) for each in number]
+        end = 1 if first else len(number)
+        return [_with_unit(each, unit, first=first) for each in number[:end]] + number[end:]
     # a text has its unit
     return number if isinstance(number, str) else f"{number!r} {unit}"
 
