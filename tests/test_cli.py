@@ -294,6 +294,8 @@ def test_run_repeats_a_point_of_a_result(cli: Run, tmp_path: Path) -> None:
         ),
         (["run", "absent.toml"], "absent.toml: cannot be read: No such file or directory"),
         (["models", "herz"], 'no model "herz"; did you mean "hertz"?'),
+        (["run", "--model", "coulomb-1785"], 'no model "coulomb-1785"; it is a friction law'),
+        (["run", "--model", "hertz", "--friction", "bilinear"], 'no friction law "bilinear"; it is a model'),
         (["info", "absent.h5"], "absent.h5: does not exist"),
         (["info", "pyproject.toml"], "pyproject.toml: is a TOML file, not a result"),
         (["plot", "absent.h5"], "absent.h5: does not exist"),

@@ -140,6 +140,10 @@ def config(**sweep: Any) -> Config:
          ['x.toml:10: output.variables[0]: got "beta", which needs frictions = [...]']),
         (HEAD.replace("coulomb", "coloumb") + "v1 = 2\nu1 = 2\nmu = 0.3",
          ['x.toml:2: frictions: got "coloumb-1785", expected a friction law; did you mean "coulomb-1785"?']),
+        (HEAD.replace('"coulomb-1785"', '"hertz"') + "v1 = 2\nu1 = 2\nmu = 0.3",
+         ['x.toml:2: frictions: got "hertz", expected a friction law; it is a model, of the key models']),
+        (HEAD.replace("tsuji-1992", "coulomb-1785") + "v1 = 2\nu1 = 2\nmu = 0.3",
+         ['x.toml:1: models: got "coulomb-1785", expected a model; it is a friction law, of the key frictions']),
         (MINDLIN + "v1 = 2\nu1 = 2\nmu = 0.3",
          ["x.toml:2: friction.lammps-mindlin.k_t: missing, expected k_t or kt_over_kn: K is set, so that 8 G* a "
           "may not belong to it"]),

@@ -26,6 +26,7 @@ from pydantic.dataclasses import dataclass
 from pydantic_core import PydanticCustomError
 
 from ..atomic import write_file
+from ..contact.catalogue import other_kind
 from ..contact.fixed_step import EXACT, MAX_STEPS_PER_CONTACT, SCHEMES
 from ..contact.friction import FrictionLaw
 from ..contact.frictions import frictions
@@ -627,5 +628,8 @@ def _laws_matching(word: object, laws: Mapping[str, L], what: str) -> dict[str, 
             raise mismatch_error(word, f"a pattern that some {what} matches")
         return matching
     if word not in laws:
-        raise mismatch_error(word, f"a {what}; {did_you_mean(word, list(laws))}")
+        other = other_kind(word, what)
+        key = "models" if other == "model" else "frictions"
+        hint = f"it is a {other}, of the key {key}" if other else did_you_mean(word, list(laws))
+        raise mismatch_error(word, f"a {what}; {hint}")
     return {word: laws[word]}

@@ -40,8 +40,23 @@ def by_key(laws: Iterable[Law], noun: str) -> Mapping[str, Law]:
 def look_up(laws: Mapping[str, Law], key: str, noun: str) -> Law:
     """Return the law of a key; the error for an unknown one names the nearest key."""
     if key not in laws:
-        raise ModelError(f'no {noun} "{key}"; {did_you_mean(key, list(laws))}')
+        other = other_kind(key, noun)
+        raise ModelError(f'no {noun} "{key}"; {f"it is a {other}" if other else did_you_mean(key, list(laws))}')
     return laws[key]
+
+
+def other_kind(key: str, noun: str) -> str:
+    """Return what a key is if not what the noun says, "model" or "friction law", or "".
+
+    >>> other_kind("coulomb-1785", "model"), other_kind("hertz", "friction law"), other_kind("hurtz", "model")
+    ('friction law', 'model', '')
+    """
+    # both import this module
+    from .frictions import frictions
+    from .models import catalogue
+
+    kinds = {"model": catalogue(), "friction law": frictions()}
+    return next((kind for kind, laws in kinds.items() if kind != noun and key in laws), "")
 
 
 def pickle_by_key(kind: type[Law], find: Callable[[str], Law]) -> None:
