@@ -234,6 +234,20 @@ def test_a_data_array_of_long_doubles_or_texts_with_a_unit_is_read() -> None:
         assert swept["v1"].values.tolist() == [0.1, 0.2]
 
 
+def test_a_result_that_has_lost_a_part_is_refused() -> None:
+    fits = impact.calibrate(ROOT / "docs" / "calibrate" / "drops.toml", overrides={"models": ["kelvin-voigt"]})
+    for result, line in (
+        (impact.sweep(BASE).drop_vars("title"), "this sweep has lost title"),
+        (fits.isel(model=0).drop_vars("title"), "this calibration has lost title"),
+        (fits.drop_vars("fit_status"), "this calibration has lost fit_status"),
+        (fits.where(False), "this calibration has lost values of identifiable, values of fit_status"),
+        (fits.drop_attrs(deep=False), "this calibration has lost data_file"),
+    ):
+        for function in (impact.info, impact.plot, impact.report):
+            with pytest.raises(impact.UsageError, match=f"^{line}.*; select parts of a result by sel or isel"):
+                function(result)
+
+
 def test_a_result_of_which_no_values_are_left_is_refused() -> None:
     result = impact.sweep(BASE)
     for function in (impact.info, impact.report, impact.page, impact.plot, impact.run):

@@ -27,7 +27,7 @@ from .seal import byte_reader, check_root, check_seal, digest, is_result, write_
 from .selection import select, select_laws
 from .slabs import slabs
 from .trajectory_table import in_memory, table_of_result
-from .validation import schema_violation
+from .validation import lost_parts, schema_violation
 
 # larger results are not loaded into memory
 MAX_LOADED_BYTES = 2**29
@@ -206,6 +206,8 @@ def result_of(result: xr.Dataset | str | Path) -> xr.Dataset:
         raise TypeError(f"got {type_of(result)}, expected a dataset, or the file of a result")
     require_result(result)
     kind = kind_of(result)
+    if lost := lost_parts(result):
+        raise UsageError(f"this {kind} has lost {', '.join(lost)}; select parts of a result by sel or isel only")
     # a calibration has the friction laws of its pairs along the models, and a history is of a single law
     for dim in {"sweep": ("friction", "model"), "history": ()}.get(kind, ("model",)):
         if dim in result.coords and result[dim].ndim == 0:
