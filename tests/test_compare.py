@@ -13,11 +13,12 @@ import pytest
 import xarray as xr
 
 import impact
-from impact.comparison.verdict import Verdict
+from impact.comparison.verdict import Verdict, as_markdown
 from impact.contact.variables import CENTRAL_OUTPUTS, OUTPUTS, default_variables
 from impact.errors import ResultError, UsageError
 from impact.results.selection import match_labels
 
+from .conftest import ROOT
 from .fork_server import ForkServer
 
 BY_DEFAULT = default_variables(of_friction=False)
@@ -482,6 +483,23 @@ def test_impacts_without_slip_have_no_tangential_restitution_and_are_equal() -> 
     verdict = impact.compare(slow, swept)
     assert verdict.headline == "not equal: values (friction_status)"
     assert verdict.differing[0].text.endswith(": slow_limit, baseline ok")
+    slides = swept.assign(contact_regime=xr.full_like(swept["contact_regime"], 2))
+    verdict = impact.compare(slides, swept)
+    assert verdict.differing[0].text.endswith(": slides_throughout, baseline sticks_throughout")
+    assert as_markdown(verdict).count("| slides_throughout | sticks_throughout |") == 1
+
+
+def test_statuses_of_calibrations_and_boards_are_named() -> None:
+    fits = impact.calibrate(ROOT / "docs" / "calibrate" / "drops.toml", overrides={"models": ["kelvin-voigt"]})
+    board = impact.load(ROOT / "docs" / "conform" / "board.h5").isel(check=slice(3))
+    for result, name, end in (
+        (fits, "fit_status", "not_converged, baseline ok"),
+        (board, "check_status", "not_supported, baseline pass"),
+    ):
+        baseline = result.assign({name: xr.zeros_like(result[name])})
+        changed = result.assign({name: xr.full_like(result[name], 2)})
+        (difference,) = impact.compare(changed, baseline).differing
+        assert difference.text.endswith(f": {end}")
 
 
 def test_a_friction_law_of_one_result_is_no_difference_of_the_laws_in_both() -> None:
@@ -511,7 +529,10 @@ def test_flags_are_compared_exactly_and_steps_are_reported_only(by_hand: xr.Data
     flipped = _with(by_hand, "in_domain", 0)
     verdict = impact.compare(flipped, by_hand, tol=1e6)
     assert verdict.headline == "not equal: values (in_domain)"
-    assert verdict.lines == ("in_domain: 1 of 2 differ, the first at model=hertz, e=0.5: 0, baseline 1",)
+    assert verdict.lines == (
+        "in_domain: 1 of 2 differ, the first at model=hertz, e=0.5: outside_claimed_domain, "
+        "baseline within_claimed_domain",
+    )
     flipped["in_domain"][0, 1] = 0
     assert flipped["in_domain"].values.tolist() == [[0, 0]]
     assert "in_domain: 2 of 2 differ, the first at model=hertz, e=0.5" in str(impact.compare(flipped, by_hand))

@@ -11,12 +11,12 @@ from typing import Any, Literal, get_args
 import xarray as xr
 
 from ..config.input_names import with_words
-from ..contact.status import FrictionStatus
 from ..contact.units import names_in
 from ..contact.variables import OUTPUTS
 from ..display import Block, Displayed, Table, Wrapped
 from ..formatting import number, prefixed, safe_text
 from ..results.provenance import describe_point, replay_command
+from ..results.schema import SCHEMA
 
 # in the order of a verdict: kinds that explain others first
 DifferenceKind = Literal["nothing in common", "physics config", "labels", "units", "missing variable", "values"]
@@ -112,12 +112,15 @@ class VariableComparison:
         return prefixed(self.worst, "1" if names_in(unit) else unit, digits)
 
 
+def _flag_name(name: str, value: float) -> str:
+    """Name the value of a status or of another variable with named values, else ""."""
+    flags = next((variables[name].flags for variables in SCHEMA.values() if name in variables), {})
+    return next((word for word, flag in flags.items() if flag == value), "")
+
+
 def _format_outcome(name: str, value: float) -> str:
     """Write a value that has no size: a status by its name."""
-    # the numbers of both statuses are shared
-    if name in ("status", "friction_status") and value in set(FrictionStatus):
-        return FrictionStatus(int(value)).name.lower()
-    return "NaN" if value != value else number(value, 10)
+    return _flag_name(name, value) or ("NaN" if value != value else number(value, 10))
 
 
 @dataclass(frozen=True)
@@ -334,7 +337,8 @@ def as_markdown(outcome: Verdict) -> str:
         lines.append("|---|--:|--:|--:|---|--:|--:|")
         for variable in outcome.differing:
             numbers = f"{number(variable.worst, 3)} | {number(variable.ratio, 3)}"
-            values = f"{number(variable.new, 12)} | {number(variable.baseline, 12)}"
+            both = (variable.new, variable.baseline)
+            values = " | ".join(_flag_name(variable.name, value) or number(value, 12) for value in both)
             counts, point = f"{variable.different} of {variable.points}", _escape_markdown(variable.location)
             lines.append(f"| `{variable.name}` | {counts} | {numbers} | {point} | {values} |")
         commands = dict.fromkeys(filter(None, map(outcome.replay, outcome.differing)))
