@@ -623,9 +623,17 @@ def test_a_result_is_stored_and_read_again(cli: Run, tmp_path: Path) -> None:
 
 def test_the_table_of_a_fit_names_parameters_without_their_law_and_has_two_digits_of_p(drops: xr.Dataset) -> None:
     (key, name, *_, p_value, _, _, _, _), *_ = fit_rows(drops)
-    assert (key, name) == ("kuwabara-kono-1987", "A")
+    assert (key, name) == ("kuwabara-kono-1987", "A [s]")
     assert float(p_value) == pytest.approx(drops["p_value"].values[0], rel=0.05)
     assert len(p_value.lstrip("0.").partition("e")[0].replace(".", "")) <= 2
+
+
+def test_the_unit_of_a_parameter_has_the_exponent_of_the_law_unless_it_is_fitted() -> None:
+    sweep = {"m1": 0.1, "m2": 1.0, "e": 0.8, "K": {"fit": [1e5, 1e7]}}
+    data = {"columns": {"v1": [0.5, 1.0, 2.0], "contact_time": [1e-3, 9e-4, 8e-4]}, "sigma": 1e-5}
+    for n, names in ((1.5, ["K [N/m^1.5]"]), ({"fit": [1.1, 2.0]}, ["n", "K [N/m^n]"])):
+        fits = impact.calibrate({"models": "hertz", "sweep": {"n": n, **sweep}, "data": data})
+        assert [row[1] for row in fit_rows(fits)] == names
 
 
 def test_a_law_of_the_best_config_that_is_not_fitted_is_refused_before_the_fit(tmp_path: Path) -> None:

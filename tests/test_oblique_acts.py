@@ -393,7 +393,7 @@ def test_angles_of_a_ranking_are_in_degrees() -> None:
     ranking = impact.recommend(result, target=target, tol="0.5 deg")
     assert ranking.tol == math.radians(0.5)
     assert ranking.headline.startswith("no pair gives rebound_angle = 20° within 0.5°")
-    assert ranking.headings[1] == "points within 0.5°"
+    assert ranking.headings[:2] == ("pair", "points within 0.5°")
     law = ranking.models[0]
     assert law.row[2] == f"{math.degrees(law.max_error):.3g}°"
     assert law.row[5].endswith(f"rebound_angle {math.degrees(law.e_out):.4g}°")

@@ -18,6 +18,7 @@ from ..config.load import Config
 from ..config.quantities import KeyPath
 from ..config.tables import DEFAULT_TITLE, Solver
 from ..contact.models import original_key
+from ..contact.units import names_in, with_numbers
 from ..contact.variables import OUTPUTS
 from ..display import Block, DisplayedDataset, Table
 from ..engine.plan import Plan
@@ -65,8 +66,10 @@ def fitted_laws(dataset: xr.Dataset) -> Iterator[dict[str, Any]]:
 
 
 def fit_rows(dataset: xr.Dataset) -> list[tuple[str, ...]]:
-    """Write a row for each parameter of each law, the best law first, under FIT_HEADINGS."""
+    """Write a row for each parameter of each law with its unit, the best law first, under FIT_HEADINGS."""
     rows: list[tuple[str, ...]] = []
+    # an n that is fitted or measured has no number in units
+    has_n = {"n", "exponent"} <= dataset.coords.keys() and dataset["n"].ndim == 0
     for law in fitted_laws(dataset):
         quality = (
             number(law["chi2_reduced"], 3),
@@ -76,8 +79,9 @@ def fit_rows(dataset: xr.Dataset) -> list[tuple[str, ...]]:
             number(law["loo"], 3),
             law["status"],
         )
+        n = {"n": float(dataset["exponent"].sel(model=law["model"]))} if has_n else {}
         parameters = [
-            (_own_name(law["model"], path), *_estimate_texts(**numbers))
+            (_name_with_unit(law["model"], path, n), *_estimate_texts(**numbers))
             for path, numbers in law["parameters"].items()
         ]
         first, *others = parameters or [("",) * 3]
@@ -90,6 +94,13 @@ def _own_name(law: str, path: str) -> str:
     """Write the path of a parameter, its name alone in [sweep] and in the table of a law of its own."""
     tables = ("sweep.", *map("{}.{}.".format, ("model", "friction"), law_keys(law)))
     return path.rpartition(".")[2] if path.startswith(tables) else path
+
+
+def _name_with_unit(law: str, path: str, exponents: Mapping[str, float]) -> str:
+    """Write the name of a parameter with its unit, such as "A [s]"."""
+    unit = InputName.parse(path.removeprefix("sweep.")).unit
+    unit = with_numbers(unit, exponents) if names_in(unit) <= exponents.keys() else unit
+    return _own_name(law, path) + (f" [{unit}]" if unit != "1" else "")
 
 
 def _estimate_texts(estimate: float, lower: float, upper: float, identifiable: bool) -> tuple[str, str]:

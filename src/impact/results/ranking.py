@@ -202,7 +202,7 @@ class Ranking(Displayed, Sequence[Ranked]):
         """Headings of a table of `Ranked.row`; the first and the last two columns are text, the others numbers."""
         tol = self.criterion.shown(self.tol)
         return (
-            "model",
+            "pair" if self.models[0].friction else "model",
             f"points within {tol}",
             "max error",
             "mean error",
