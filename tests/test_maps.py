@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -482,3 +483,15 @@ def test_names_above_panels_have_two_lines_within_them_and_letters_of_one_size(l
     for axes, text in zip(figure.axes, shown, strict=False):
         assert text.get_text().count("\n") <= 1
         assert text.get_window_extent().width <= axes.get_window_extent().width + 1.0
+
+
+@pytest.mark.parametrize("kind", ["map", "validity"])
+def test_every_number_of_a_map_has_a_decimal_comma(kind: str) -> None:
+    """Those of the colour bar and of the names of panels, too."""
+    sweep = {"e": [0.25, 0.5, 0.75], "v1": [0.5, 1.5], "R1": 0.05, "R2": 0.05, "material": "steel"}
+    result = impact.sweep({"models": ["thornton-1997", "hunt-crossley-1975"], "sweep": sweep})
+    figure = impact.plot(result, kind=kind, decimal="comma", width=10.0)
+    figure.draw_without_rendering()
+    texts = [text.get_text() for text in figure.findobj(Text)]
+    assert any("0,2" in text for text in texts)
+    assert not [text for text in texts if re.search(r"\d\.\d", text)]

@@ -15,6 +15,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
+from matplotlib.text import Text
 from matplotlib.ticker import FuncFormatter
 
 from ..atomic import check_outputs, write_file
@@ -243,12 +244,16 @@ def _draw_panels(
     plot_data: PlotData, all_axes: Sequence[Axes], labels: Mapping[str, str], points: Points | None, look: Look
 ) -> LegendEntries:
     """Draw the panels, with the decimal separator of the look; returns handles and names of the legend."""
+    before = list(all_axes[0].figure.axes)
     entries = plot_data.draw(all_axes, labels, points)
     if look.decimal == "point":
         return entries
-    for axes in all_axes:
-        for text in axes.texts:
-            text.set_text(with_comma(text.get_text()))
+    colour_bars = [axes for axes in all_axes[0].figure.axes if axes not in before]
+    for axes in (*all_axes, *colour_bars):
+        # names of panels as well
+        for text in axes.get_children():
+            if isinstance(text, Text):
+                text.set_text(with_comma(text.get_text()))
         for axis in (axes.xaxis, axes.yaxis):
             axis.set_major_formatter(FuncFormatter(partial(tick_with_comma, axis.get_major_formatter())))
     return [(artist, with_comma(name)) for artist, name in entries]
