@@ -495,3 +495,17 @@ def test_every_number_of_a_map_has_a_decimal_comma(kind: str) -> None:
     texts = [text.get_text() for text in figure.findobj(Text)]
     assert any("0,2" in text for text in texts)
     assert not [text for text in texts if re.search(r"\d\.\d", text)]
+
+
+@pytest.mark.parametrize("decimal", ["point", "comma"])
+def test_short_names_of_narrow_panels_have_the_parameters(decimal: str) -> None:
+    sweep = {"e": [0.25, 0.5], "v1": [0.5, 1.5], "R1": 0.05, "R2": 0.05, "material": "steel"}
+    law = {"kuwabara-kono-at-speed": {"ve": 1.5}}
+    result = impact.sweep({"models": ["kuwabara-kono-at-speed", "lammps-tsuji"], "sweep": sweep, "model": law})
+    figure = impact.plot(result, kind="map", width="84mm", decimal=decimal)
+    figure.draw_without_rendering()
+    names = [" ".join(text.get_text() for text in axes.findobj(Text)) for axes in figure.axes[:2]]
+    assert "kuwabara-kono" in names[0]
+    expected = "= 1.5 m/s" if decimal == "point" else "= 1,5 m/s"
+    assert expected in re.sub(r"\s", " ", names[0])
+    assert "= " not in names[1]

@@ -256,6 +256,9 @@ def _draw_panels(
                 text.set_text(with_comma(text.get_text()))
         for axis in (axes.xaxis, axes.yaxis):
             axis.set_major_formatter(FuncFormatter(partial(tick_with_comma, axis.get_major_formatter())))
+    figure = all_axes[0].figure
+    if isinstance(figure, Picture):
+        figure.short_names = {text: [*map(with_comma, names)] for text, names in figure.short_names.items()}
     return [(artist, with_comma(name)) for artist, name in entries]
 
 
