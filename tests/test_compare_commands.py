@@ -422,6 +422,15 @@ def test_a_picture_of_differences_has_degrees_and_words() -> None:
     assert [label.get_text() for label in beta.get_xticklabels()] == ["abs", "positive"]
 
 
+def test_numbers_of_cases_are_whole_ones_where_differences_are_drawn() -> None:
+    sweep = {"cases": {"e": [0.2, 0.9, 0.5, 0.7]}, "v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 1e6}
+    result = impact.sweep({"models": ["hertz"], "sweep": sweep})
+    moved = result.assign(e_out=result["e_out"] + 1e-3 * (result["case"] == 2))
+    (axes,) = draw_differences(difference_data(impact.compare(moved, result))).axes
+    assert axes.get_xlabel() == "Number of the case"
+    assert [tick for tick in axes.get_xticks() if 0 <= tick <= 3] == [0, 1, 2, 3]
+
+
 def test_long_keys_of_models_in_a_picture_of_differences_are_tilted() -> None:
     keys = ["lammps-coeff-restitution-hertz", "lammps-coeff-restitution-hooke", "hertz", "yade-en"]
     result = impact.sweep(models=keys, e=[0.5, 0.9])

@@ -16,7 +16,7 @@ from ..comparison.verdict import Verdict
 from ..config.input_names import InputName
 from ..errors import UsageError
 from ..formatting import number, safe_text, scaled_unit
-from ..results.schema import SCHEMA
+from ..results.schema import SCHEMA, is_case
 from .labels import annotate_right_edge, axis_text, escape_mathtext, number_axis, words_of
 from .layout import Picture
 from .slices import unit_of
@@ -49,6 +49,7 @@ class DifferencePanel:
     values: tuple[float, ...]
     names: tuple[str, ...]
     ratios: Mapping[str, tuple[float, ...]]
+    whole: bool = False  # whether its values are numbers of cases
 
 
 @dataclass(frozen=True)
@@ -91,6 +92,7 @@ def difference_data(verdict: Verdict) -> DifferenceData:
                 values=tuple((values / size).tolist()) if is_numeric else tuple(range(len(values))),
                 names=tuple(safe_text(text, MAX_NAME_LENGTH) for text in texts),
                 ratios={n: tuple(along[axis][n].values[order].tolist()) for n in shown if n in along[axis]},
+                whole=is_case(axis),
             )
         )
     return DifferenceData(verdict.headline, tuple(panels), max(0, len(wanted) - len(shown)))
@@ -189,7 +191,7 @@ def _draw_panel(
     if panel.names:
         _label_ticks(axes, panel, x)
     else:
-        number_axis(axes.xaxis, log=is_geometric(x))
+        number_axis(axes.xaxis, log=is_geometric(x), whole=panel.whole)
     return entries
 
 
