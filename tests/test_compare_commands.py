@@ -439,6 +439,20 @@ def test_long_keys_of_models_in_a_picture_of_differences_are_tilted() -> None:
     assert [(label.get_text(), label.get_rotation()) for label in labels] == [(key, 20.0) for key in keys]
 
 
+def test_names_of_many_checks_in_a_picture_of_differences_do_not_overlap() -> None:
+    board = impact.load(ROOT / "docs" / "conform" / "board.h5")
+    moved = board.assign(check_status=1 - board["check_status"].clip(0, 1))
+    figure = draw_differences(difference_data(impact.compare(moved, board)))
+    figure.canvas.draw()
+    _, over_checks = figure.axes
+    assert over_checks.get_xlabel() == "Collision and check"
+    labels = over_checks.get_xticklabels()
+    places = over_checks.transData.transform([(label.get_position()[0], 1.0) for label in labels])[:, 0]
+    # lines of text beside each other, in pixels
+    distance = np.diff(places).min() * math.sin(math.radians(labels[0].get_rotation()))
+    assert distance > 1.2 * labels[0].get_fontsize() * figure.dpi / 72.0
+
+
 def test_a_picture_of_the_differences_replaces_an_old_one(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
