@@ -575,6 +575,18 @@ def test_the_schema_is_json_in_a_locale_without_the_letters_of_units(cli: Run) -
     assert json.loads(cli("schema", PYTHONIOENCODING="ascii").stdout) == impact.schema()
 
 
+def test_what_programs_read_is_in_utf_8_in_any_locale(cli: Run, stored: Path, tmp_path: Path) -> None:
+    result = tmp_path / "Stöße.h5"
+    result.write_bytes(stored.read_bytes())
+    words = (
+        ("compare", result, result, "--format", "junit"),
+        ("export", "--to", "yade", "--at", "e=0.6", "--at", "v1=1"),
+        ("cite", "hertz"),
+    )
+    for command, text in zip(words, ("Stöße.h5", "√(m S) δ̇", "Über die Berührung"), strict=True):
+        assert text in cli(*command, PYTHONIOENCODING="latin-1").stdout
+
+
 def test_no_switch_is_on_unless_it_is_given() -> None:
     switches = {
         (name, option.name): option.default

@@ -75,6 +75,7 @@ def export(
     if as_json or result.verification is not None:
         show(result, as_json=as_json)
     elif output is None:
+        exits.write_utf8()
         print(result.text, end="")
     return exits.EXIT_NOT_EQUAL if result.verification and result.verification.differs else exits.EXIT_OK
 

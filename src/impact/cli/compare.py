@@ -128,6 +128,8 @@ def _print_outcome(outcome: Verdict, format: Format) -> None:
     """Print a verdict or an error on stdout; an error has no table, its message is on stderr."""
     from ..comparison import verdict
 
+    if format != "table":
+        exits.write_utf8()
     match format:
         case "table" if not isinstance(outcome, verdict.NoVerdict):
             show(outcome)

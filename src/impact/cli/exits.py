@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import functools
+import io
 import mmap
 import os
 import re
@@ -75,6 +76,13 @@ def print_line(line: str, *, error: bool = False) -> None:
     except OSError:
         # the reader is gone or the disk is full: neither ends the command or changes its exit code
         _discard_output(sys.stderr)
+
+
+def write_utf8() -> None:
+    """Write what other programs read on stdout, such as XML, in UTF-8 as in files, unless it is a terminal."""
+    # in a notebook or a test it may be another object
+    if isinstance(sys.stdout, io.TextIOWrapper) and not sys.stdout.isatty():
+        sys.stdout.reconfigure(encoding="utf-8", errors="backslashreplace")
 
 
 def print_written(*paths: Path | None) -> None:

@@ -140,4 +140,5 @@ def cite(
     as_json: options.Json = False,
 ) -> None:
     """Write BibTeX of laws, from their references, with the evidence for their formulas."""
+    exits.write_utf8()
     _show_records(impact.cite(*laws, plugins=plugins or ()), as_json=as_json)
