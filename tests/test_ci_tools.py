@@ -222,6 +222,22 @@ def test_speeds(impact_regression):
     )
 
 
+def test_a_baseline_that_another_worker_wrote_is_not_replaced(project: Path, entry_points: Path) -> None:
+    code = """
+import pytest
+
+@pytest.mark.parametrize("v1", [1.0, 1.0, 2.0, 2.0])
+def test_speed(impact_regression, v1):
+    config = {"models": ["hertz"], "sweep": {"e": 0.5, "v1": v1, "m1": 1.0, "m2": 1.0, "K": 1e6}}
+    impact_regression(config, "shared.h5")
+"""
+    (project / "tests" / "test_speed.py").write_text(code, encoding="utf-8")
+    done = run_pytest(project, entry_points, "tests/test_speed.py", "-n", "2", "--impact-bless=first")
+    # those of the speed that came first
+    assert re.search(r"^2 failed, 2 passed", done.stdout, re.MULTILINE), done.stdout
+    assert "shared.h5: was written from another result in this run" in done.stdout
+
+
 @pytest.mark.slow
 def test_a_baseline_is_rewritten_only_if_it_differs(project: Path, entry_points: Path) -> None:
     baseline = project / "baselines" / "contact.h5"

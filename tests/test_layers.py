@@ -30,7 +30,7 @@ LIBRARIES = {
     "xarray": {"results", "comparison", "inverse", "uncertainty", "plots", "reporting", "pytest_plugin"},
     "h5py": {"results"}, "h5netcdf": {"results"}, "tomllib": {"config"}, "pydantic": {"config", "results"},
     "pydantic_core": {"config"},
-    "pint": {"config"}, "filelock": {"engine"}, "numba": {"contact"},
+    "pint": {"config"}, "filelock": {"engine", "pytest_plugin"}, "numba": {"contact"},
     "scipy": {"config", "inverse", "results", "uncertainty"},
     "dask": {"engine"}, "distributed": {"engine"}, "pytest": {"pytest_plugin"},
 }  # fmt: skip

@@ -31,8 +31,6 @@ if TYPE_CHECKING:
 # the properties of a test that bring its baselines to the summary, also from workers of pytest-xdist
 WRITTEN, OLD_NAME = "impact baseline", "impact baseline with an old name"
 COLLECTED = pytest.StashKey[list[pytest.Item]]()
-# the baselines that this run wrote
-BLESSED = pytest.StashKey[set[Path]]()
 MAX_NAME_LENGTH = 150  # of a default baseline without .h5; file systems allow 255 bytes
 
 
@@ -123,6 +121,8 @@ class ImpactRegression:
         -------
         Verdict : the comparison; None if there was no baseline and --impact-bless wrote it
         """
+        from filelock import FileLock
+
         __tracebackhide__ = True
         try:
             path = self._path(
@@ -131,7 +131,8 @@ class ImpactRegression:
             reason = self.request.config.getoption("--impact-bless")
             new = self._result_file(source, overrides, plugins)
             if reason is not None:
-                return self._bless(new, path, reason, tol=tol, subset=subset, allow_failed=allow_failed)
+                with FileLock(f"{self._mark(path)}.lock"):
+                    return self._bless(new, path, reason, tol=tol, subset=subset, allow_failed=allow_failed)
             if not path.exists():
                 path = self._baseline_with_old_name(path, is_default=baseline is None)
             verdict = impact.compare(new, path, tol=tol, subset=subset)
@@ -172,8 +173,7 @@ class ImpactRegression:
                 verdict = impact.compare(new, baseline, tol=tol, subset=subset)
         if verdict is not None and verdict.equal:
             return verdict
-        written = self.request.config.stash.setdefault(BLESSED, set())
-        if baseline in written:
+        if self._mark(baseline).exists():
             raise impact.UsageError(
                 f"{baseline}: was written from another result in this run; name a baseline for each result"
             )
@@ -182,7 +182,7 @@ class ImpactRegression:
             save_with_attributes(new, baseline, str(result.encoding["seal"]), {"reason": reason})
         else:
             verdict = impact.bless(new, baseline, reason=reason, tol=tol, allow_failed=allow_failed)
-        written.add(baseline)
+        self._mark(baseline).touch()
         self.request.node.user_properties.append((WRITTEN, str(baseline)))
         return verdict
 
@@ -214,6 +214,13 @@ class ImpactRegression:
     def _path(self, path: str | Path) -> Path:
         """A path relative to the folder of the test file, whatever the working directory is."""
         return Path(os.path.normpath(self.request.path.parent / path))
+
+    def _mark(self, baseline: Path) -> Path:
+        """The name of a file that exists once this run wrote a baseline, also in a worker of pytest-xdist."""
+        folder = self.tmp_path_factory.getbasetemp()
+        # each worker has its own folder in that of the run
+        folder = folder.parent if hasattr(self.request.config, "workerinput") else folder
+        return folder / f"impact-{hashlib.sha256(os.fsencode(baseline)).hexdigest()}"
 
     def _is_shared(self, old: Path) -> bool:
         """Whether another test may have a baseline of this old name."""
