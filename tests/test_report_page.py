@@ -324,6 +324,20 @@ def test_a_figure_says_which_other_axes_matter_and_shows_their_values() -> None:
     assert restitution.endswith("Not drawn: 34 values of v1 and 156 combinations of v1 and m1.")
 
 
+def test_figures_of_many_points_take_little_memory(cli: Run, tmp_path: Path) -> None:
+    # a map has a million points, at each of 20 speeds
+    axes = {"e": {"linspace": [0.1, 1.0, 500]}, "m2": {"geomspace": [0.1, 10.0, 1000]}}
+    inputs = {**axes, "v1": {"linspace": [1.0, 2.0, 20]}, "m1": 1.0, "K": 6e9}
+    result = tmp_path / "result.h5"
+    impact.sweep({"models": FAIR, "sweep": inputs, "output": {"layout": "factored"}}, output=result)
+    done = cli("report", result, "--section=figures")
+    assert done.returncode == 0, done.stderr
+    captions = captions_of(result.with_suffix(".html").read_text())
+    (shown,) = [caption for caption in captions if CAPTIONS["map"] in caption]
+    assert shown.endswith("v1 does not matter (differences below 0.1%).")
+    assert done.memory < 800_000_000
+
+
 def test_numbers_have_few_digits_and_materials_of_the_library_are_no_change() -> None:
     inputs = {
         "e": {"linspace": [0.1, 0.6, 10]},

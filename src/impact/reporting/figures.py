@@ -21,6 +21,7 @@ from ..config.input_names import InputName, is_input
 from ..contact.model import ForceModel
 from ..contact.status import FIRST_FAILURE, NO_IMPACT
 from ..contact.units import names_in, with_numbers
+from ..contact.variables import LAW_DIMS
 from ..errors import ImpactError
 from ..formatting import prefixed
 from ..plots.data import PlotData
@@ -39,6 +40,8 @@ MAX_SEARCHED = 2**18
 # most combinations of values of other axes at which the numbers of a figure are compared, values of an axis that
 # are drawn, and further figures of a kind
 MAX_COMPARED, MAX_VALUES, MAX_MORE = 48, 6, 12
+# points of a figure that are compared, of all laws
+MAX_COMPARED_POINTS = 2**14
 # of the largest number: what is hardly visible
 MAX_DIFFERENCE = 1e-3
 # an index of some axes
@@ -162,17 +165,20 @@ def _compare_values(
     sizes, position = drawing.dataset.sizes, plan.position
     dims = [dim for dim in position if sizes[dim] > 1]
     base = tuple(position[dim] for dim in dims)
-    known: dict[tuple[int, ...], PlotData | None] = {base: plot_data}
+    whole, part = drawing.dataset, _compared_part(drawing, plan)
+    known_whole: dict[tuple[int, ...], PlotData | None] = {base: plot_data}
+    known_part = known_whole if part is whole else {}
 
-    def read(index: Position) -> PlotData | None:
+    def read(dataset: xr.Dataset, index: Position) -> PlotData | None:
         # a motion is integrated once
+        known = known_whole if dataset is whole else known_part
         place = tuple({**position, **index}[dim] for dim in dims)
         if place not in known:
             known[place] = None
             # it may have no values there
             with suppress(ImpactError):
                 choice = _plan_at(drawing.dataset, plan, index).choice
-                known[place] = get_plot_data(drawing.dataset, plan.kind.name, choice, drawing.plugins)
+                known[place] = get_plot_data(dataset, plan.kind.name, choice, drawing.plugins)
         return known[place]
 
     if plan.kind.source == "history":
@@ -184,8 +190,8 @@ def _compare_values(
         places = itertools.product(*(_spread(sizes[dim], count[dim], position[dim]) for dim in dims))
         compared = [dict(zip(dims, place, strict=True)) for place in places]
     for index in compared:
-        read(index)
-    tables = {place: _numbers(data) for place, data in known.items()}
+        read(part, index)
+    tables = {place: _numbers(data) for place, data in known_part.items()}
     differ = []
     for axis, dim in enumerate(dims):
         pairs = ((table, tables[*at[:axis], base[axis], *at[axis + 1 :]]) for at, table in tables.items())
@@ -193,8 +199,21 @@ def _compare_values(
             differ.append(dim)
     drawn = _more_positions(drawing, plan, differ)
     sentences = _comparison_sentences(sizes, dims, differ, drawn, len(tables))
-    more = [(index, read(index)) for index in drawn]
+    more = [(index, read(whole, index)) for index in drawn]
     return sentences, [(index, data) for index, data in more if data is not None]
+
+
+def _compared_part(drawing: Drawing, plan: FigurePlan) -> xr.Dataset:
+    """Leave out values of the axes of a figure until it has at most MAX_COMPARED_POINTS; a motion has few."""
+    dataset, sizes = drawing.dataset, drawing.dataset.sizes
+    if plan.kind.source == "history" or not plan.position:
+        return dataset
+    steps = {dim: 1 for dim in sizes if dim not in (*LAW_DIMS, *plan.position)}
+    laws = len(drawing.keys) * sizes.get("friction", 1)
+    while laws * math.prod(-(-sizes[dim] // step) for dim, step in steps.items()) > MAX_COMPARED_POINTS:
+        steps[max(steps, key=lambda dim: sizes[dim] / steps[dim])] *= 2
+    is_part = max(steps.values(), default=1) > 1
+    return dataset.isel({dim: slice(None, None, step) for dim, step in steps.items()}) if is_part else dataset
 
 
 def _comparison_sentences(
