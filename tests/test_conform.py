@@ -151,6 +151,12 @@ def test_a_wrong_engine_fails_the_check_that_names_its_fault(fault: str) -> None
         assert names <= allowed
 
 
+def test_the_worst_collision_of_a_check_is_one_that_delivers_no_number() -> None:
+    board = impact.conform(adapter=not_a_number, only=["stick-10-equal", "normal-e50-middle-equal"])
+    row = next(line.split() for line in str(board).splitlines() if line.startswith("momentum "))
+    assert row[4:7] == ["normal-e50-middle-equal", "0", "–"]
+
+
 def test_every_check_has_a_wrong_engine_that_fails_it() -> None:
     """Of the checks without an engine above: mirror, exchange, step and separates."""
 
@@ -173,6 +179,30 @@ def test_every_check_has_a_wrong_engine_that_fails_it() -> None:
         ("separates", ghost),
     ):
         assert name in failed(impact.conform(adapter=engine)), name
+
+
+def test_the_numbers_of_a_check_are_those_of_its_formula() -> None:
+    """An added spin, and an answer that pulls, of a collision with a slip, in the scales of docs/conform.md."""
+    d = 0.25
+    c: Values = read_suite()["frame-mirrored"].question
+    speed = abs(c["v1"] - c["v2"]) + abs(c["u1"] - c["u2"] + c["R1"] * c["omega1"] + c["R2"] * c["omega2"])
+    of_balls = [tuple(abs(c[name + ball]) for name in ("m", "R", "inertia", "v", "u", "omega")) for ball in "12"]
+    scale = sum(inertia * omega + m * R * (v + u) for m, R, inertia, v, u, omega in of_balls)
+    m = 1 / (1 / c["m1"] + 1 / c["m2"])
+    added = {
+        "angular_momentum": c["inertia1"] * d / scale,
+        "spin": c["inertia1"] * d / c["R1"] / (m * speed),
+        "mirror": c["R1"] * d / speed,
+    }
+    for engine, asked, delivered in (
+        (lambda c: rigid(c) | {"omega1": rigid(c)["omega1"] + d * (c["id"] == "frame-mirrored")}, {}, added),
+        # the impulse of balls that pull has no friction, which keeps all slip
+        (lambda c: rigid(c | {"e": -1.5, "mu": 0.0}), {"friction": -1.0}, {"friction": -1.0}),
+    ):
+        checks = impact.conform(adapter=engine, only="frame-mirrored").as_dict()["checks"]
+        values = {check["check"]: check for check in checks}
+        assert {name: values[name]["asked"] for name in asked} == pytest.approx(asked)
+        assert {name: values[name]["delivered"] for name in delivered} == pytest.approx(delivered, rel=1e-9)
 
 
 # ---- the set
@@ -226,6 +256,8 @@ def test_tolerances_follow_from_what_the_first_answer_states() -> None:
     assert (rigid_engine["momentum"], rigid_engine["restitution"], rigid_engine["repeat"]) == (1e-9, 1e-6, 0.0)
     assert (compliant["energy"], compliant["friction"]) == (1e-9, 0.02)
     assert tolerances(precision="float32")["momentum"] == 1e-5
+    # single precision widens a tolerance, and narrows none
+    assert tolerances(precision="float32", kind="compliant")["friction"] == 0.02
 
 
 def test_a_tolerance_is_an_option_by_name_or_for_all() -> None:
@@ -234,6 +266,9 @@ def test_a_tolerance_is_an_option_by_name_or_for_all() -> None:
     assert failed(impact.conform(adapter=half_of_mu, only=only, tol={"friction": 0.5, "all": 0.0}))
     with pytest.raises(UsageError, match=r'tol\["frction"\]: .* did you mean "friction"\?'):
         impact.conform(adapter=rigid, tol={"frction": 1.0})
+    # with which no number would fail
+    with pytest.raises(UsageError, match="got inf, expected a number >= 0"):
+        impact.conform(adapter=rigid, tol=math.inf)
 
 
 def test_an_engine_with_a_friction_law_of_the_catalogue_is_judged_by_it() -> None:
@@ -262,6 +297,23 @@ def test_an_engine_with_a_friction_law_of_the_catalogue_is_judged_by_it() -> Non
     named = impact.conform(adapter=lambda c: spring(c) | law, only=only, tol={"friction_bound": 0.5})
     assert named.passed, str(named)
     assert "friction" in failed(impact.conform(adapter=spring, only=only))
+
+
+@pytest.mark.parametrize("e", [0.5, 1.0])
+def test_a_stiffness_in_si_is_beside_that_of_a_spring_and_dashpot_of_the_contact_time(e: float) -> None:
+    from impact.conformance.conform import betas_of_law
+
+    c: Values = {**read_suite()["spin-shell"].question, "e": e, "mu": 1e5}
+    m = 1 / (1 / c["m1"] + 1 / c["m2"])
+    m_t = 1 / (1 / m + c["R1"] ** 2 / c["inertia1"] + c["R2"] ** 2 / c["inertia2"])
+    k_t = 0.1 * m * (math.pi**2 + math.log(e) ** 2) / c["contact_time"] ** 2
+    names = "cundall-strack-1979", "anagnostopoulos-1988"
+    chosen = {"k_t": k_t}, {"kt_over_kn": 0.1}
+    beta, of_ratio = (betas_of_law([c], *names, parameters)[c["id"]] for parameters in chosen)
+    assert beta == pytest.approx(of_ratio, rel=1e-9)
+    if e == 1.0:
+        # a spring that sticks to the end
+        assert beta == pytest.approx(-math.cos(math.sqrt(k_t / m_t) * c["contact_time"]), rel=1e-6)
 
 
 @pytest.mark.parametrize("model", ["hertz", "tsuji-1992-no-tension"])
@@ -305,6 +357,25 @@ def test_what_follows_from_a_collision_that_cannot_be_done_is_not_judged() -> No
     board = impact.conform(adapter=no_spin, only=["frame-fast"])
     statuses = {check["check"]: check["status"] for check in board.as_dict()["checks"]}
     assert (statuses["frame"], statuses["spin"]) == ("not_supported", "pass")
+
+
+def test_engines_of_one_name_are_numbered_and_have_the_version_that_they_state() -> None:
+    stated = [lambda c: rigid(c) | {"engine": "rigid", "version": "2.0"}] * 3
+    board = impact.conform(adapter=stated, only="normal-e50-middle-equal")
+    names = [(engine["engine"], engine["version"]) for engine in board.engines]
+    assert names == [("rigid", "2.0"), ("rigid #2", "2.0"), ("rigid #3", "2.0")]
+
+
+def test_collisions_are_asked_again_in_reverse_so_that_another_one_comes_before_each() -> None:
+    asked = []
+
+    def engine(c: Values) -> Values:
+        asked.append(c["id"])
+        return rigid(c)
+
+    ids = ["normal-e50-middle-equal", "stick-10-equal", "spin-both"]
+    impact.conform(adapter=engine, only=ids)
+    assert asked == [*ids, *ids[::-1]]
 
 
 # ---- programs
@@ -353,6 +424,18 @@ def test_a_program_that_does_not_speak_the_protocol_is_refused_in_one_line(
     assert len(done.stderr.splitlines()) == 1, done.stderr
     assert done.stderr.startswith("--adapter: ")
     assert BAD_PROGRAMS[text] in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [({"v1": True}, "v1: got True, expected a number"), ({"id": None}, "got an answer to None")],
+)
+def test_an_answer_of_a_function_that_is_none_is_refused(changes: Values, message: str) -> None:
+    def engine(c: Values) -> Values:
+        return {key: value for key, value in (rigid(c) | changes).items() if value is not None}
+
+    with pytest.raises(UsageError, match=message):
+        impact.conform(adapter=engine)
 
 
 def test_what_a_program_prints_before_it_ends_is_read() -> None:

@@ -33,7 +33,11 @@ class Ball(NamedTuple):
         return abs(self.inertia / (SOLID * self.m * self.R * self.R) - 1.0) <= 1e-9
 
     def start(self, time: float) -> tuple[float, float]:
-        """Find the centre at a time before the balls touch, side by side, at the origin."""
+        """Find the centre at a time before the balls touch, side by side, at the origin.
+
+        >>> Ball("1", side=-1.0, m=1.0, R=0.5, inertia=0.1, v=2.0, u=1.0, omega=0.0).start(0.25)
+        (-1.0, -0.25)
+        """
         return self.side * self.R - self.v * time, -self.u * time
 
 
@@ -83,9 +87,8 @@ def half_time(z: float) -> float:
 def damping_ratio(e: float) -> float:
     """Find the damping ratio that delivers e; with a dashpot that acts on approach only, that of e^2 does.
 
-    >>> z = damping_ratio(0.5)
-    >>> round(math.exp(-2.0 * z * half_time(z)), 12)
-    0.5
+    >>> [round(math.exp(-2.0 * z * half_time(z)), 12) for z in map(damping_ratio, (0.1, 0.5))]
+    [0.1, 0.5]
     """
     low, high = 0.0, 1.0 / e
     for _ in range(100):
