@@ -90,6 +90,15 @@ def test_a_stored_config_needs_no_file(folder: Path) -> None:
     )
 
 
+def test_the_lines_of_rows_that_are_left_out_are_left_out() -> None:
+    columns = {"v1": [1.0, 2.0, 3.0], "e_out": [0.5, "-", 0.7]}
+    data = {"columns": columns, "lines": [2, 5, 9], "fit": True}
+    source = {"models": "tsuji-1992", "data": data, "sweep": {"m1": 1.0, "m2": 1.0, "K": 1e6}}
+    config = read_config(source, purpose="calibrate")
+    assert config.data is not None
+    assert (config.data.lines, config.data.inputs) == ((2, 9), {"v1": (1.0, 3.0)})
+
+
 @pytest.mark.parametrize(
     ("csv", "message"),
     [
