@@ -169,6 +169,21 @@ def test_a_law_with_a_stiffness_of_its_own_is_not_charged_for_that_of_its_materi
     assert alone["identifiable"].sel(parameter="materials.ball.E").item() == -1
 
 
+@pytest.mark.parametrize("friction", [{}, {"k_t": 1e5}])
+def test_a_law_with_the_stiffness_of_the_sweep_is_not_charged_for_that_of_its_materials(
+    friction: dict[str, float],
+) -> None:
+    sweep = {"m1": 1.0, "m2": 1.0, "R1": 0.02, "R2": 0.02, "material": "ball", "K": {"fit": [1e5, 1e8]}, "e": 0.5}
+    config = {"models": "tsuji-1992", "sweep": sweep, "data": TIMES, "solver": QUICK}
+    if friction:
+        oblique = {"frictions": "lammps-mindlin", "friction": {"lammps-mindlin": friction}}
+        config |= oblique | {"sweep": {**sweep, "mu": 0.3, "angle": 0.5}}
+    materials = {"ball": {"E": {"fit": [1e8, 1e10]}, "nu": 0.3}}
+    with pytest.warns(impact.ImpactWarning, match=r"materials\.ball\.E: no law takes it"):
+        fit = impact.calibrate({**config, "materials": materials})
+    assert fit["identifiable"].sel(parameter="materials.ball.E").item() == -1
+
+
 def test_a_profile_with_several_minima_ends_in_an_interval() -> None:
     """The chi2 of this fit has two valleys, and a search for its end falls from one into the other."""
     sweep = {"m1": 1.0, "m2": 1.0, "K": {"fit": [1e5, 1e7]}, "alpha": {"fit": [0.01, 0.3]}}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Literal
@@ -12,7 +12,7 @@ import numpy as np
 from pydantic_core import PydanticCustomError
 
 from ..array_types import Array
-from ..contact.friction import HERTZ, FrictionLaw, required_inputs
+from ..contact.friction import FrictionLaw
 from ..contact.model import ForceModel, with_base_quantities
 from ..contact.variables import OUTPUTS
 from ..errors import ConfigError
@@ -556,14 +556,15 @@ def fitted_parameters(
     fits: Mapping[str, tuple[float, float]],
     model: ForceModel,
     friction: FrictionLaw | None = None,
-    *,
-    has_own_K: bool = False,
+    names: Collection[str] = (),
 ) -> tuple[str, ...]:
     """List the names of the fitted parameters that a law has, or its pair with a friction law.
 
-    A law whose table has a K of its own takes neither that of the sweep nor that of its materials.
+    A law whose table has a K of its own takes neither that of the sweep nor that of its materials, one with that
+    of the sweep not that of its materials; nor does the spring of a friction law beside a K. `names` are those of
+    the inputs of the config.
     """
-    used = with_base_quantities(model.quantities)
+    used, has_own_K = with_base_quantities(model.quantities), f"{model.key}.K" in names
 
     def is_used(name: str) -> bool:
         if name in ("e", "alpha"):
@@ -575,10 +576,8 @@ def fitted_parameters(
         input_name = InputName.parse(name)
         if input_name.key == "yield_strength":
             return bool(used & {"yield_strength1", "yield_strength2"})
-        if input_name.material and input_name.key in ("E", "nu") and has_own_K:
-            # the spring of a friction law may be that of the materials
-            of_spring = required_inputs(friction, (), (model.exponent or HERTZ,)) if friction else frozenset()
-            return bool((used | of_spring) & {f"{input_name.key}1", f"{input_name.key}2"})
+        if input_name.material and input_name.key in ("E", "nu") and (has_own_K or "K" in names):
+            return bool(used & {f"{input_name.key}1", f"{input_name.key}2"})
         return input_name.applies_to(model.key, friction.key if friction else "")
 
     return tuple(filter(is_used, fits))
@@ -589,10 +588,9 @@ def count_problems(draft: Draft, fits: Mapping[str, tuple[float, float]]) -> Ite
     if draft.measurements is None:
         return
     n_values = len(draft.measurements.lines) * len(draft.measurements.outputs)
-    own_K = {model.key for model in draft.models if f"{model.key}.K" in draft.input_names}
     counts = {
         law_name(*(law.key for law in (model, friction) if law)): len(
-            fitted_parameters(fits, model, friction, has_own_K=model.key in own_K)
+            fitted_parameters(fits, model, friction, draft.input_names)
         )
         for model in draft.models
         for friction in draft.frictions or (None,)

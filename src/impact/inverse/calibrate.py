@@ -65,7 +65,7 @@ def laws_to_fit(config: Config) -> dict[str, PlanLaw]:
 def parameters_of(config: Config, law: PlanLaw) -> tuple[str, ...]:
     """List the config names of the fitted parameters of a law."""
     model, friction = model_of(law), law.friction if isinstance(law, Pair) else None
-    return fitted_parameters(config.fits, model, friction, has_own_K=f"{model.key}.K" in config.scalars)
+    return fitted_parameters(config.fits, model, friction, config.scalars)
 
 
 def calibrate(
