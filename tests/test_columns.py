@@ -363,6 +363,31 @@ def test_the_key_of_the_message_settles_what_an_ambiguous_file_means(folder: Pat
     assert found.outputs == {"e_out": (0.5, 0.25)}
 
 
+@pytest.mark.parametrize(
+    ("csv", "data"),
+    [
+        # only one sign separates all rows alike, or names that are looked for
+        ("v1 [m/s];e_out;ball,e\n1;0.5;2\n2;1;2\n", {}),
+        ("v1 [m/s];e_out;remark, by hand\n1;0.5;good, clean\n2;1;bad, dusty\n", {}),
+        # the sign of a column without use does not matter
+        ("v1 [m/s];e_out in %;version\n1;50;1.2\n2;100;1.3\n", {"decimal": ","}),
+    ],
+)
+def test_columns_without_use_do_not_decide_how_a_file_is_written(
+    folder: Path, csv: str, data: dict[str, str]
+) -> None:
+    (folder / "a.csv").write_text(csv, encoding="utf-8")
+    found = measurements({"file": "a.csv", **data})
+    assert (found.inputs, found.outputs) == ({"v1": (1.0, 2.0)}, {"e_out": (0.5, 1.0)})
+
+
+def test_a_stiffness_of_cases_has_no_unit_where_the_exponent_is_one_of_their_columns(folder: Path) -> None:
+    (folder / "cases.csv").write_text("n,K [N/m^1.5]\n1.5,1e6\n2,1e6\n", encoding="utf-8")
+    sweep = {"v1": 1.0, "m1": 1.0, "m2": 1.0, "cases": "cases.csv"}
+    with pytest.raises(impact.ConfigError, match=r"K: got \[N/m\^1.5\], .* depends on n, which varies"):
+        read_config({"models": "hertz", "sweep": sweep})
+
+
 def test_messages_contain_nothing_of_a_file_that_a_config_guesses(folder: Path) -> None:
     """A config of unknown origin may name any file, and even the headers of well-known ones."""
     for text in ("user,SECRET1\nSECRET2,SECRET3\n", "user;SECRET1\n1,5;SECRET3\n1.5;SECRET\n", "user\nSECRET\n"):

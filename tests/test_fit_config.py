@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -195,6 +196,17 @@ def test_fewer_points_than_parameters_are_refused_with_both_numbers() -> None:
             {"models": "hunt-crossley-1975", "sweep": sweep, "data": {"columns": {"e_out": [0.5]}}},
             purpose="calibrate",
         )
+
+
+def test_each_output_of_a_point_counts_and_an_e_that_the_friction_law_takes() -> None:
+    fits = {"e": {"fit": [0.1, 1.0]}, "mu": {"fit": [0.05, 1.0]}}
+    sweep = {"v1": 1.0, "angle": 0.5, "m1": 1.0, "m2": math.inf, "R1": 0.05, "material": "steel", **fits}
+    pair = {"models": "hertz", "frictions": "yade-mindlin", "sweep": sweep}
+    columns = {"beta": [0.2], "sigma_beta": [0.01]}
+    with pytest.raises(ConfigError, match=r"got 1 .*at least 2, .* of hertz with yade-mindlin"):
+        read_config({**pair, "data": {"columns": columns}}, purpose="calibrate")
+    columns |= {"e_t": [0.9], "sigma_e_t": [0.01]}
+    assert read_config({**pair, "data": {"columns": columns}}, purpose="calibrate").fits.keys() == fits.keys()
 
 
 @pytest.mark.parametrize("change", [{"data": {"columns": {"e_out": [0.5]}}}, {}])
