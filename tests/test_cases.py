@@ -18,7 +18,7 @@ from impact.engine.plan import MAX_FULL_REPEATED, Plan
 from impact.errors import UsageError
 from impact.results.provenance import config_of_part
 from impact.results.ranking import recommend
-from impact.results.selection import select
+from impact.results.selection import select, select_laws
 from impact.results.summary import summarize
 from impact.results.sweep import read_plan, sweep_in_memory, sweep_into
 
@@ -327,3 +327,20 @@ def test_a_missing_value_counts_once_along_parameters_of_other_laws() -> None:
         "model": {"ismail-stronge-2008": {"gamma": [1.1, 1.5, 2.0], "K": 1e7}},
     })  # fmt: skip
     assert impact.info(result)["variables"]["e_out"]["missing"] == 1 + 3
+
+
+def test_words_and_laws_are_selected_and_what_is_missing_is_named() -> None:
+    balls = {"m1": 1.0, "m2": 1.0, "R1": 0.05, "R2": 0.05, "K": 1e6}
+    sweep = {**balls, "v1": [*range(1, 11)], "mu": 0.3, "angle": 0.5, "e": 0.5}
+    limit = "friction.coulomb-1785.limit"
+    friction = {"frictions": "coulomb-1785", "friction": {"coulomb-1785": {"limit": ["abs", "positive"]}}}
+    result = impact.sweep({"models": ["hertz", "tsuji-1992"], "sweep": sweep, **friction})
+    assert select(result, {limit: "positive"})[limit].item() == 1.0
+    with pytest.raises(UsageError, match=r"no v1 = 3\.4 in this result; the nearest are 3 and 4"):
+        select(result, {"v1": 3.4})
+    with pytest.raises(UsageError, match='no axis "model" in this result'):
+        select(result, {"model": "hertz"})
+    assert select_laws(result, ["tsuji-1992", "tsuji-1992"]).sizes["model"] == 1
+    # the law of a part is no dimension
+    part = result.isel(model=0)
+    assert select_laws(part, "hertz").sizes == part.sizes

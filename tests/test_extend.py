@@ -193,6 +193,16 @@ def test_a_law_is_added_with_an_axis_of_its_own(stored_sweep: StoredSweep, tmp_p
     assert_same_values(larger, single_sweep(BASE, [layout, both, more[1]], tmp_path))
 
 
+@BOTH_LAYOUTS
+def test_a_friction_law_is_added_to_the_laws_that_a_result_has(
+    stored_sweep: StoredSweep, tmp_path: Path, layout: str
+) -> None:
+    config = f'frictions = "coulomb-1785"\n{BASE}angle = 0.5\nmu = [0.1, 0.3]\nR1 = 0.05\nR2 = 0.05\n'
+    more = ['frictions=["coulomb-1785", "cundall-strack-1979"]', "friction.cundall-strack-1979.k_t=1e6"]
+    larger = impact.extend(stored_sweep(config, layout), more)
+    assert_same_values(larger, single_sweep(config, [layout, *more], tmp_path))
+
+
 def test_values_of_a_parameter_that_is_a_word_are_added(stored_sweep: StoredSweep, tmp_path: Path) -> None:
     sliding = BASE.replace("K = 1e9", "K = 1e9\nu1 = 0.5\nmu = 0.3\nR1 = 0.1\nR2 = 0.1")
     config = sliding.replace("[solver]", 'frictions = ["coulomb-1785"]\n[solver]')

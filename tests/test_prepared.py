@@ -134,6 +134,7 @@ def test_balls_that_adhesion_holds_are_at_the_limit_as_in_a_run() -> None:
         ({"w1": 1.0}, 'no input "w1" of this law; known: K, R1, R2, e, m1, m2, '),
         ({"e": 2}, "e: got 2, expected a number from 0 to 1"),
         ({"e": "half"}, 'e: got "half", expected a number from 0 to 1'),
+        ({"e": [-0.1, 0.5]}, "e: got -0.1, expected a number from 0 to 1"),
         ({"e": []}, "e: got no value, expected one or more"),
         ({"e": None}, "e: got nothing, expected a number from 0 to 1"),
         ({"e": [0.1, np.nan]}, "e: got nan, expected a number from 0 to 1"),
@@ -154,6 +155,26 @@ def test_an_input_that_is_none_is_refused(values: Any, message: str) -> None:
     with pytest.raises(impact.UsageError) as refusal:
         problem(values)
     assert message in str(refusal.value)
+
+
+def test_an_e_beside_an_alpha_is_refused() -> None:
+    balls = {name: value for name, value in BALLS.items() if name != "e"}
+    problem = impact.prepare({"models": "tsuji-1992", "sweep": {**balls, "alpha": 0.1}})
+    with pytest.raises(impact.UsageError, match='no input "e" of this law'):
+        problem(e=0.5)
+
+
+def test_impacts_of_several_exponents_are_those_of_each_and_arrays_are_of_the_caller() -> None:
+    problem = impact.prepare(
+        {"models": "hunt-crossley-1975", "sweep": {**BALLS, "n": 1.0}}, outputs="contact_time"
+    )
+    e = np.array([0.5, 0.7, 0.9])
+    for _ in range(2):
+        both = problem(e=e, n=[[1.0], [1.5]])["contact_time"]
+        assert both[0] == pytest.approx(problem(e=e)["contact_time"])
+        single = impact.prepare({"models": "hunt-crossley-1975", "sweep": {**BALLS, "n": 1.5}})
+        assert both[1] == pytest.approx(single(e=e)["contact_time"])
+        both *= 2.0
 
 
 def test_an_output_that_the_law_lacks_is_refused() -> None:

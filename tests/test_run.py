@@ -285,6 +285,13 @@ def test_alpha_replaces_e_and_e_replaces_alpha(cli: Run) -> None:
     assert overridden.point["e"] == 0.75
 
 
+def test_inputs_of_the_user_replace_those_of_table_1_and_not_each_other() -> None:
+    given = impact.run(model="hertz", overrides=["sweep.m1=2.0", "sweep.R1=0.02"]).point
+    assert (given["m1"], given["R1"]) == (2.0, 0.02)
+    oblique = {"speed": 2.0, "angle": 0.5, "mu": 0.3, "R1": 0.05, "R2": 0.05}
+    assert impact.run(model="hertz", friction="coulomb-1785", at=oblique).closing_speed == 2.0 * math.cos(0.5)
+
+
 def test_alpha_replaces_the_e_of_a_stored_sweep(tmp_path: Path) -> None:
     config = {
         "models": "bilinear",
