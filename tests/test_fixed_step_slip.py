@@ -395,6 +395,17 @@ def test_timestep_says_what_a_friction_law_lacks_with_a_contact_force() -> None:
 
 
 def test_a_contact_at_fixed_steps_sticks_slips_or_does_both() -> None:
-    inputs = {"k": STIFF**2, "b": 0.2 * STIFF, "mu": [0.1, 0.6, 5.0], "u1": -3.0}
-    result = sweep(SOLREF, CONE, {}, inputs | STEP, "mujoco-cone")
+    config = {
+        "models": SOLREF,
+        "model": {SOLREF: {"k": STIFF**2, "b": 0.2 * STIFF}},
+        "frictions": CONE,
+        "sweep": {name: value for name, value in WALL.items() if name != "angle"}
+        | {"mu": [0.1, 0.6, 5.0], "u1": -3.0}
+        | STEP,
+        "solver": {"integrator": "mujoco-cone"},
+        "output": {"variables": ["contact_regime", "slip_changes"]},
+    }
+    result = impact.sweep(config)
     assert result["contact_regime"].values.ravel().tolist() == [2, 3, 1]
+    # the first mode is no change
+    assert result["slip_changes"].values.ravel().tolist() == [0, 1, 0]
