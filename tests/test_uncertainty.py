@@ -587,6 +587,13 @@ def test_without_another_axis_the_picture_is_the_distribution_function(samples: 
     np.testing.assert_allclose(axes.lines[0].get_ydata(), (np.arange(64) + 0.5) / 64)
 
 
+def test_numbers_of_a_distribution_are_apart_from_their_decimal_commas(samples: xr.Dataset) -> None:
+    point, comma = (impact.plot(samples, decimal=decimal).texts[1].get_text() for decimal in ("point", "comma"))
+    of_v1, of_K = re.findall(r"normal\((.*?)\)", point)
+    assert of_v1.replace(",", ";").replace(".", ",") in comma
+    assert of_K.replace(",", ";").replace(".", ",") in comma
+
+
 def test_the_table_of_a_distribution_function_has_the_values_and_their_shares(
     samples: xr.Dataset, tmp_path: Path
 ) -> None:

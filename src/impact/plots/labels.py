@@ -325,7 +325,11 @@ def with_comma(text: str) -> str:
 
     >>> with_comma("e = 0.5, n = 1.5"), with_comma("N/m$^{1.5}$")
     ('e = 0,5, n = 1,5', 'N/m$^{1{,}5}$')
+    >>> with_comma(f"normal(1,{NO_BREAK}0.1)").replace(NO_BREAK, " ")
+    'normal(1; 0,1)'
     """
+    # numbers of a list, such as those of a distribution, which have a comma between them
+    text = re.sub(rf"(?<=[\d⁰¹²³⁴⁵⁶⁷⁸⁹]),(?={NO_BREAK}[\d−-])", ";", text)
     parts = text.split("$")
     commas = (",", "{,}")
     return "$".join(re.sub(r"(?<=\d)\.(?=\d)", commas[index % 2], part) for index, part in enumerate(parts))
