@@ -561,3 +561,10 @@ def test_a_law_without_known_radii_gets_finite_numbers() -> None:
         release = CODES[name].newest
         values = impact.export(name, default_law(name), source=source, code_version=release).parameters.values()
         assert all(math.isfinite(value) for value in values if isinstance(value, float))
+
+
+@pytest.mark.parametrize("model", ["kelvin-voigt", "kelvin-voigt-no-tension", "yade-viscoelastic"])
+def test_a_law_that_another_one_is_written_for_is_a_warning(model: str) -> None:
+    export = impact.export(to="yade", model=model, at={"C": 10.0}, dt=1e-6, code_version="2023.02a")
+    line = "YADE 2023.02a has no kelvin-voigt: yade-viscoelastic is written, F = K δ + C δ̇, to F = 0"
+    assert export.warnings == ((line,) if model == "kelvin-voigt" else ())

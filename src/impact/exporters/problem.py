@@ -47,6 +47,7 @@ class ExportProblem:
     notes : where the law and its values come from: a release, a calibration, Table 1 of the paper, first values
     better_fit : a remark on the law of a calibration that fits best, where it is none of the code; else ""
     left_out : friction laws of the source, where the code has none of them
+    other_law : a remark on a law that another one is written for; else ""
     """
 
     code: Code
@@ -55,6 +56,7 @@ class ExportProblem:
     notes: tuple[str, ...]
     better_fit: str
     left_out: tuple[str, ...]
+    other_law: str
 
     @property
     def model(self) -> ForceModel:
@@ -166,7 +168,12 @@ def prepare_export(
         notes.append(f"defaults of Table 1 of the paper: {', '.join(defaults)}")
     if fixed.first:
         notes.append(first_values_line(fixed.first))
-    return ExportProblem(code, version, fixed, tuple(notes), better_fit, left_out)
+    asked = [model] if model is not None else point_source.models
+    named = next((name for name in asked if has_law(code, key, version, name)), key)
+    # a code's own name is that of an option, whose law depends on the release
+    is_other = named not in code.laws and original_key(named) != original_key(key)
+    instead = f"{code.title} {version} has no {named}: {key} is written, {find(key).equation}"
+    return ExportProblem(code, version, fixed, tuple(notes), better_fit, left_out, instead if is_other else "")
 
 
 def _with_parameters(source: PointSource, key: str, code: Code, version: str) -> PointSource:
