@@ -501,6 +501,14 @@ def test_the_text_of_a_result_has_100_columns() -> None:
         assert 90 < max(map(cell_len, text.splitlines())) <= 100
 
 
+def test_a_text_has_no_colours_where_the_environment_forces_them(
+    result: xr.Dataset, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = str(impact.recommend(result))
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    assert str(impact.recommend(result)) == text
+
+
 @pytest.mark.slow
 def test_a_result_at_a_prompt_is_its_text(result: xr.Dataset) -> None:
     results = impact.run(model="hertz"), impact.recommend(result), impact.compare(result, result)

@@ -390,8 +390,11 @@ def _width(stream: TextIO, other: int = PIPE_WIDTH) -> int:
 def _console(stream: TextIO, width: int | None = None) -> Console:
     from rich.console import Console
 
+    # a text has no styles, also where the environment forces colours
+    is_styled = False if isinstance(stream, io.StringIO) else None
+    settings: dict[str, Any] = {"markup": False, "highlight": False, "emoji": False, "force_terminal": is_styled}
     # in a notebook rich would not write to the stream
-    return Console(file=stream, markup=False, highlight=False, emoji=False, width=width, force_jupyter=False)
+    return Console(file=stream, width=width, force_jupyter=False, **settings)
 
 
 def dump(value: Any) -> str:
