@@ -720,6 +720,15 @@ def test_a_picture_never_replaces_its_result(cli: Run, stored: Path, tmp_path: P
     assert result.read_bytes() == stored.read_bytes()
 
 
+def test_a_style_with_latex_that_is_not_installed_is_reported(cli: Run, stored: Path, tmp_path: Path) -> None:
+    (tmp_path / "tex.mplstyle").write_text("text.usetex: True", encoding="utf-8")
+    folder = str(tmp_path)
+    words = ("plot", stored, "--style", "tex.mplstyle", "-o", "picture.pdf")
+    done = cli(*words, cwd=tmp_path, PATH=folder, MPLCONFIGDIR=folder)
+    reason = "Failed to process string with tex because latex could not be found"
+    assert (done.returncode, done.stderr) == (2, f"the picture cannot be drawn with text.usetex: {reason}\n")
+
+
 @pytest.mark.slow
 def test_narrow_and_ascii_terminals(cli: Run, stored: Path) -> None:
     for environment in ({"COLUMNS": "20"}, {"PYTHONIOENCODING": "ascii"}, {"NO_COLOR": "1", "LC_ALL": "C"}):

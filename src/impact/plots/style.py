@@ -56,7 +56,14 @@ def styled(style: str | Path | None = None) -> Iterator[None]:
             # styles that have no grid may give it the colour of texts, such as dark_background
             if to_rgb(rcParams["grid.color"]) == to_rgb(rcParams["text.color"]):
                 rcParams["grid.color"] = tint(0.1)
-            yield
+            try:
+                yield
+            except RuntimeError as error:
+                # LaTeX measures texts, too
+                if not rcParams["text.usetex"]:
+                    raise
+                reason = " ".join(str(error).split())
+                raise UsageError(f"the picture cannot be drawn with text.usetex: {reason}") from None
 
 
 def _style_of(style: str | Path | None) -> Mapping[Any, Any]:
