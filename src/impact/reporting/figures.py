@@ -84,7 +84,7 @@ class Drawing:
         plans = list(iterate_choices(self.dataset, self.keys))
         # numbered as they stand on the page: those of friction have a section of their own
         for of_friction in (False, True):
-            more_figures: list[tuple[FigurePlan, str, PlotData]] = []
+            more_figures: list[tuple[FigurePlan, str, PlotData | None]] = []
             for plan in (plan for plan in plans if plan.kind.of_friction == of_friction):
                 kind, choice, position = plan
                 number = len(figures) + 1
@@ -100,7 +100,11 @@ class Drawing:
                         more_figures.append((_plan_at(self.dataset, plan, index), caption, data))
                 except ImpactError as error:
                     left_out.append(f"The figure {kind.name} is left out: {'; '.join(error.problems)}")
-            figures += [self.figure(i, *more) for i, more in enumerate(more_figures, len(figures) + 1)]
+            for plan, caption, known in more_figures:
+                # it may have no values there
+                with suppress(ImpactError):
+                    plot_data = known or get_plot_data(self.dataset, plan.kind.name, plan.choice, self.plugins)
+                    figures.append(self.figure(len(figures) + 1, plan, caption, plot_data))
         return figures, left_out
 
     def figure(
@@ -156,29 +160,29 @@ def _plan_at(dataset: xr.Dataset, plan: FigurePlan, index: Position) -> FigurePl
 
 def _compare_values(
     drawing: Drawing, plan: FigurePlan, plot_data: PlotData
-) -> tuple[list[str], list[tuple[Position, PlotData]]]:
+) -> tuple[list[str], list[tuple[Position, PlotData | None]]]:
     """Compare the data of a figure with those at the values of all other axes, at most MAX_COMPARED combinations.
 
-    Returns sentences, and what is drawn too: the indices of the axes that differ, and the data there.
+    Returns sentences, and what is drawn too: the indices of the axes that differ, and the data there, but those of
+    a figure of many points.
     Motions are integrated for it: they are compared at the first and the last value of each axis alone.
     """
     sizes, position = drawing.dataset.sizes, plan.position
     dims = [dim for dim in position if sizes[dim] > 1]
     base = tuple(position[dim] for dim in dims)
-    whole, part = drawing.dataset, _compared_part(drawing, plan)
-    known_whole: dict[tuple[int, ...], PlotData | None] = {base: plot_data}
-    known_part = known_whole if part is whole else {}
+    part = _compared_part(drawing, plan)
+    is_whole = part is drawing.dataset
+    known: dict[tuple[int, ...], PlotData | None] = {base: plot_data} if is_whole else {}
 
-    def read(dataset: xr.Dataset, index: Position) -> PlotData | None:
+    def read(index: Position) -> PlotData | None:
         # a motion is integrated once
-        known = known_whole if dataset is whole else known_part
         place = tuple({**position, **index}[dim] for dim in dims)
         if place not in known:
             known[place] = None
             # it may have no values there
             with suppress(ImpactError):
                 choice = _plan_at(drawing.dataset, plan, index).choice
-                known[place] = get_plot_data(dataset, plan.kind.name, choice, drawing.plugins)
+                known[place] = get_plot_data(part, plan.kind.name, choice, drawing.plugins)
         return known[place]
 
     if plan.kind.source == "history":
@@ -190,8 +194,8 @@ def _compare_values(
         places = itertools.product(*(_spread(sizes[dim], count[dim], position[dim]) for dim in dims))
         compared = [dict(zip(dims, place, strict=True)) for place in places]
     for index in compared:
-        read(part, index)
-    tables = {place: _numbers(data) for place, data in known_part.items()}
+        read(index)
+    tables = {place: _numbers(data) for place, data in known.items()}
     differ = []
     for axis, dim in enumerate(dims):
         pairs = ((table, tables[*at[:axis], base[axis], *at[axis + 1 :]]) for at, table in tables.items())
@@ -199,8 +203,8 @@ def _compare_values(
             differ.append(dim)
     drawn = _more_positions(drawing, plan, differ)
     sentences = _comparison_sentences(sizes, dims, differ, drawn, len(tables))
-    more = [(index, read(whole, index)) for index in drawn]
-    return sentences, [(index, data) for index, data in more if data is not None]
+    more = [(index, read(index)) for index in drawn]
+    return sentences, [(index, data if is_whole else None) for index, data in more if data is not None]
 
 
 def _compared_part(drawing: Drawing, plan: FigurePlan) -> xr.Dataset:
