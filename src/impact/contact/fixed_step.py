@@ -342,10 +342,12 @@ class _Contacts:
 
     def keep(self, active: Mask) -> None:
         """Remove the collisions that have ended."""
+        # several times as fast as an index by the mask
+        rows = np.flatnonzero(active)
         for name, value in list(vars(self).items()):
             if isinstance(value, np.ndarray):
-                setattr(self, name, value[..., active])
-        self.slip = None if self.slip is None else self.slip.take(active)
+                setattr(self, name, value.take(rows, axis=-1))
+        self.slip = None if self.slip is None else self.slip.take(rows)
 
 
 @dataclass
