@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import shlex
+import tracemalloc
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -497,3 +498,12 @@ def test_a_step_longer_than_the_contact_is_a_warning(cli: Run) -> None:
     assert (first, second[:56]) == (expected, "warning: dt = 0.001 s: unstable at 9 of 9 phases, the st")
     exported = impact.export("lammps", dt="1 ms", code_version="22Jul2025")
     assert any(warning.startswith("dt = 0.001 s: longer than the contact of ") for warning in exported.warnings)
+
+
+def test_many_steps_take_the_memory_of_few() -> None:
+    tracemalloc.start()
+    rows = impact.timestep("tsuji-1992", steps_per_contact=[*range(5, 45)]).rows
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert rows[7:8] == impact.timestep("tsuji-1992", steps_per_contact=[12]).rows
+    assert peak < 200_000_000

@@ -64,10 +64,12 @@ from .solve import config_name, placeholder, solve_damping, unknown_of
 
 # steps per contact if none are given
 STEPS_PER_CONTACT = (10.0, 20.0, 50.0, 100.0)
-# 0.7 GB for four steps of a law with an e
+# 0.4 GB for four steps of a law with an e
 MAX_PHASES = 10_000
 # the e to ask for is searched between so many values from here to 1; many laws take the logarithm of e
 MIN_E, N_SCAN = 1e-6, 33
+# collisions of this search that are followed at once
+MAX_COLLISIONS = 2**17
 # largest jump of the mean over the phases that is taken for a root
 MAX_JUMP = 1e-2
 # the effect of a parameter on the contact time is taken from a value larger by this factor; a smaller power of it
@@ -490,7 +492,10 @@ def timestep_rows(law: FixedStepLaw, dt: Sequence[float]) -> tuple[TimestepRow, 
     steps = np.array(dt)
     statuses, *delivered = law.outputs(steps, "status", "e_out", *(["beta"] if law.oblique else []))
     rows = []
-    for row, e_to_ask in enumerate(compensated_e(law, steps).tolist()):
+    # in parts of little memory; no step depends on another
+    parts = max(1, min(steps.size, steps.size * N_SCAN * law.phases // MAX_COLLISIONS))
+    e_to_ask_of = np.concatenate([compensated_e(law, part) for part in np.array_split(steps, parts)]).tolist()
+    for row, e_to_ask in enumerate(e_to_ask_of):
         failures = statuses[row][statuses[row] >= FIRST_FAILURE]
         # that of most of the collisions that fail
         status = Status(int(np.bincount(failures).argmax())) if failures.size else Status.OK
