@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 import signal
 import subprocess
@@ -111,6 +112,23 @@ def test_small_steps_give_every_variable_of_the_continuous_law(scheme: str) -> N
         np.testing.assert_array_equal(fine[name].values, exact[name].values)
     # the schemes of Drake and PyBullet lose energy in proportion to the step
     assert abs(fine["energy_residual"].item()) < (1e-3 if scheme == "kick-drift" else 2e-3)
+
+
+def test_the_energy_residual_of_a_dashpot_has_the_works_from_the_first_touch_to_the_last() -> None:
+    """By the trapezoidal rule over the ends of the steps, of a force that does not vanish at either end."""
+    C, dt, phase = 0.4, 0.2, 0.3
+    balls = {"m1": 1.0, "m2": math.inf, "K": 1.0, "n": 1.0, "v1": 1.0}
+    law = {"models": "kelvin-voigt", "model": {"kelvin-voigt": {"C": C}}, "solver": {"integrator": "kick-drift"}}
+    result = impact.sweep({**law, "sweep": {**balls, "dt": dt, "phase": phase}})
+    x, u, path = phase * dt, 1.0, [(0.0, C)]
+    while x > 0.0:
+        path.append((x, x + C * u))
+        u -= dt * path[-1][1]
+        x += dt * u
+    path.append((0.0, C * u))
+    positions, forces = zip(*path, strict=True)
+    expected = u * u - 1.0 + 2.0 * np.trapezoid(forces, positions)
+    assert result["energy_residual"].item() == pytest.approx(expected, abs=1e-12)
 
 
 def test_the_energy_residual_of_a_linear_spring_is_the_energy_that_the_scheme_adds() -> None:

@@ -358,6 +358,8 @@ def test_the_mass_ratio_has_the_same_bits_for_all_masses() -> None:
         assert (oblique.mass_ratio == 1 / SOLID).all()
     against_wall = oblique_of(impacts_of(m1=masses, m2=[np.inf]), inertia_factor1=[2 / 3], inertia_factor2=[0.4])
     assert (against_wall.mass_ratio == 1 / 2.5).all()
+    wall_first = oblique_of(impacts_of(m1=[np.inf], m2=masses), inertia_factor1=[0.4], inertia_factor2=[2 / 3])
+    assert (wall_first.mass_ratio == 1 / 2.5).all()
 
 
 # ---- what cannot be combined
@@ -373,6 +375,8 @@ BRANCH = "8 G* a needs a contact force without permanent indentation and without
         ("bilinear", "lammps-linear-history", 1.0, {"k_t": 1e5, "xt": 0.0}, ""),
         ("bilinear", "liggghts-history", 1.0, {}, f'{DASHPOT}tangential_damping = "off"'),
         ("bilinear", "liggghts-history", 1.0, {"tangential_damping": 0.0}, ""),
+        # that of n = 3/2 follows from the stiffness, and not from the contact force
+        ("lankarani-nikravesh-1994", "liggghts-history", 1.5, {"kt_over_kn": 0.3}, ""),
         ("lankarani-nikravesh-1994", "yade-mindlin", 1.5, {}, BRANCH),
         ("lankarani-nikravesh-1994", "yade-mindlin", 1.5, {"k_t": 1e5}, ""),
         ("hertz", "lammps-mindlin", 1.0, {}, "8 G* a needs a contact force of n = 1.5; set k_t"),
