@@ -237,10 +237,11 @@ def test_the_derivative_at_a_bound_is_that_of_the_prediction(
     assert result.jacobian[:, 0] == pytest.approx(float(slope), rel=1e-5)
 
 
-def test_as_many_points_as_parameters_are_too_few() -> None:
-    data = DataPoints(np.array([0.5, 0.6]), np.full(2, 0.01), "scale")
+@pytest.mark.parametrize("count", [2, 3])
+def test_as_many_points_as_parameters_and_that_of_the_noise_are_too_few(count: int) -> None:
+    data = DataPoints(np.array([0.5, 0.6, 0.8])[:count], np.full(count, 0.01), "scale")
     bounds = Bounds(np.full(2, -1.0), np.full(2, 2.0))
-    (result,) = fit_all([FitProblem(lambda rows: rows[:, :1] + rows[:, 1:] * X[:2], bounds, data)])
+    (result,) = fit_all([FitProblem(lambda rows: rows[:, :1] + rows[:, 1:] * X[:count], bounds, data)])
     assert result.status == "too_few_points"
     assert np.isnan(result.lower).all()
     assert np.isnan(result.aicc)

@@ -135,6 +135,14 @@ def test_a_pair_that_cannot_be_combined_is_named_with_the_reason(beads: xr.Datas
         curves_of(beads, "e-t", models=[HOOKE], frictions=[FORCE])
 
 
+def test_a_pair_that_fails_at_some_points_is_drawn_at_the_others() -> None:
+    balls = {"v1": 1.0, "m1": 1.0, "m2": 1.0, "R1": 0.05, "R2": 0.05, "K": 1e6, "angle": 0.5}
+    law = {"frictions": "drake-regularized", "friction": {"drake-regularized": {"v_s": 0.01, "mu_d": 0.2}}}
+    result = impact.sweep({"models": "hertz", **law, "sweep": {**balls, "mu": [0.1, 0.3, 0.4]}})
+    (curve,) = of_pairs(curves_of(result, "beta"))
+    assert np.isfinite(curve.y).tolist() == [False, True, True]
+
+
 def test_a_pair_that_cannot_be_combined_has_no_curve_of_the_spin_at_a_wall() -> None:
     balls = BALLS | {"angle": [0.5, 1.0], "mu": 0.1, "R2": math.inf, "m2": math.inf}
     data = curves_of(sweep(frictions=[COULOMB, FORCE], sweep=balls, friction={}), "spin")

@@ -212,17 +212,23 @@ def test_a_held_spring_forgets_the_past() -> None:
 
 
 @pytest.mark.parametrize(
-    ("q", "k", "mu", "m_t", "g0"),
-    [(1.5, 1.0, 0.3, 0.3, [1.05, 1.1]), (0.25, 0.7, 0.1, 0.4, [0.26, 0.27])],
+    ("q", "k", "mu", "m_t", "g0", "damping", "memory"),
+    [
+        (1.5, 1.0, 0.3, 0.3, [1.05, 1.1], [0.1170461913, 0.1178336498], [0.0009241581, 0.0002307919]),
+        (0.25, 0.7, 0.1, 0.4, [0.26, 0.27], [0.0564244898, 0.0420244899], [0.0, 0.0]),
+    ],
 )
 def test_a_spring_that_is_held_to_the_end_of_a_fading_force_determines_the_last_slip(
-    q: float, k: float, mu: float, m_t: float, g0: list[float]
+    q: float, k: float, mu: float, m_t: float, g0: list[float], damping: list[float], memory: list[float]
 ) -> None:
     """k_t x^(1/2) g = mu d(K x^(3/2))/dt gives g1 = -(3/2) mu (K/k_t) v0, although 0 = 0 at the end."""
     form = spring(0.5, q, (0.0, 0.0), "spring")
     result = simulate("hertz", form, g0, k=k, c=1.0, mu=mu, m_t=m_t)
     assert result.status.tolist() == [1, 1]
     np.testing.assert_allclose(result.slip, -1.5 * m_t / k, rtol=1e-6)
+    # the works of `friction_reference`
+    np.testing.assert_allclose(result.damping_work, damping, rtol=0.0, atol=1e-7)
+    np.testing.assert_allclose(result.memory_work, memory, rtol=0.0, atol=1e-7)
 
 
 def test_smooth_regularized_friction() -> None:
