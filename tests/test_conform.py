@@ -615,6 +615,13 @@ def test_boards_of_other_engines_or_collisions_are_compared_where_they_meet(tmp_
     assert "no engine in common" in str(impact.compare(renamed.dataset, few.dataset))
 
 
+def test_boards_of_two_sets_are_not_equal() -> None:
+    board = impact.conform(adapter=rigid, only="stick-10-equal").dataset
+    verdict = impact.compare(board, board.assign_attrs(suite="conformance-2"))
+    assert not verdict.equal
+    assert [fault.text for fault in verdict.faults] == ["suite is conformance-1, in BASELINE conformance-2"]
+
+
 def test_a_damaged_board_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "board.h5"
     impact.conform(adapter=rigid, only="spin-both", output=path)
