@@ -235,7 +235,10 @@ class Fits(DisplayedDataset):
         """A row for each law and parameter, and what to know besides."""
         yield describe_data(self.dataset)
         yield ""
-        yield Table(fit_rows(self.dataset), FIT_HEADINGS, text=(0, 1, -1))
+        rows, p = fit_rows(self.dataset), FIT_HEADINGS.index("p")
+        # without a stated noise no law has one
+        shown = [i for i in range(len(FIT_HEADINGS)) if i != p or {row[p] for row in rows} - {"", "–"}]
+        yield Table([[row[i] for i in shown] for row in rows], [FIT_HEADINGS[i] for i in shown], text=(0, 1, -1))
         yield from fit_notes(self.dataset)
 
 
