@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+import re
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future
 from contextlib import contextmanager
@@ -234,17 +235,25 @@ def test_a_data_array_of_long_doubles_or_texts_with_a_unit_is_read() -> None:
         assert swept["v1"].values.tolist() == [0.1, 0.2]
 
 
-def test_a_result_that_has_lost_a_part_is_refused() -> None:
+def test_a_result_that_was_changed_is_taken_where_it_can_be_read_and_else_refused() -> None:
     fits = impact.calibrate(ROOT / "docs" / "calibrate" / "drops.toml", overrides={"models": ["kelvin-voigt"]})
-    for result, line in (
-        (impact.sweep(BASE).drop_vars("title"), "this sweep has lost title"),
-        (fits.isel(model=0).drop_vars("title"), "this calibration has lost title"),
-        (fits.drop_vars("fit_status"), "this calibration has lost fit_status"),
-        (fits.where(False), "this calibration has lost values of identifiable, values of fit_status"),
-        (fits.drop_attrs(deep=False), "this calibration has lost data_file"),
+    sweep = impact.sweep({**BASE, "models": ["hertz", "tsuji-1992"]})
+    halves = [sweep.isel(model=[number]) for number in range(2)]
+    show = (impact.info, impact.plot, impact.report)
+    for result, kind, violation, refusing in (
+        (sweep.drop_vars("title"), "sweep", "title of the models is missing", show[1:]),
+        (sweep.drop_vars("doi"), "sweep", "doi of the models is missing", show[2:]),
+        (xr.concat(halves, "model", data_vars="all"), "sweep", "v1_reference: lies along model", show[1:]),
+        (fits.isel(model=0).drop_vars("title"), "calibration", "title of the models is missing", show[1:]),
+        (fits.drop_vars("fit_status"), "calibration", "fit_status: got none, expected model", show),
+        (fits.where(False), "calibration", "identifiable: got float32, expected int8", show),
     ):
-        for function in (impact.info, impact.plot, impact.report):
-            with pytest.raises(impact.UsageError, match=f"^{line}.*; select parts of a result by sel or isel"):
+        for function in show:
+            if function in refusing:
+                line = f"this {kind} was changed: {violation}; select parts by sel or isel only"
+                with pytest.raises(impact.UsageError, match=f"^{re.escape(line)}$"):
+                    function(result)
+            else:
                 function(result)
 
 

@@ -25,7 +25,7 @@ from ..engine.plugins import read_plugins
 from ..errors import UsageError
 from ..formatting import argument
 from ..results.single_impact import Impact, histories
-from ..results.xarray_backend import load, result_of
+from ..results.xarray_backend import load, result_to_show
 from .curves import CurveData
 from .data import LegendEntries, PlotData, Points, read_points
 from .kinds import DEFAULT_LEGENDS, STUDIES, Choice, Look, check_choice, default_kind, find_kind
@@ -118,15 +118,15 @@ def plot(
         if dataset.history is None:
             raise UsageError(f"no motion to draw: {dataset.why_no_history}")
         dataset = dataset.history
-    dataset = result_of(dataset)
     choice = Choice(x, y, variable, sel, models, log, equations, frictions)
     look = Look(width, height, style, ax is None if title is None else title, labels, legend, decimal)
     for name in ("width", "height", "style"):
         if ax is not None and getattr(look, name) is not None:
             raise UsageError(f"{argument(name)}: does not apply to ax, whose figure has its own")
-    kind = kind or default_kind(dataset).name
-    check_choice(choice, [find_kind(kind)])
-    plot_data = get_plot_data(dataset, kind, choice, plugins)
+    with result_to_show(dataset) as result:
+        kind = kind or default_kind(result).name
+        check_choice(choice, [find_kind(kind)])
+        plot_data = get_plot_data(result, kind, choice, plugins)
     _check_shown(choice, look, [plot_data])
     return draw(plot_data, look, None if points is None else read_points(points), ax)
 

@@ -43,7 +43,7 @@ from ..results.selection import select_laws
 from ..results.sensitivity import INDEX_HEADINGS, describe_design, study_texts
 from ..results.slabs import MAX_SUMMARY_POINTS, is_large
 from ..results.summary import Summary, extremes_of, input_notes, inputs_of, result_notes, summarize, with_depths
-from ..results.xarray_backend import result_of
+from ..results.xarray_backend import result_to_show
 from .figures import Drawing, Figure, at_text, coordinate_text, numbered_unit
 
 # the most that is shown: letters of a text and of a line of the config, values of an axis, failed points
@@ -94,7 +94,8 @@ def report(
     check_page_path(output, [dataset, *plugins], overwrite=overwrite)
     # the error of one that cannot be read would leave out every figure
     read_plugins(plugins)
-    text = _report_of(result_of(dataset), plugins, models, sections)
+    with result_to_show(dataset) as result:
+        text = _report_of(result, plugins, models, sections)
     if output is not None:
         write_file(Path(output), text.encode(), overwrite=overwrite)
     return text

@@ -23,7 +23,7 @@ from .schema import MODEL_METADATA, count_points, exponents_of, kind_of, plain_u
 from .sensitivity import Studies
 from .slabs import is_large
 from .summary import Extremes, Summary, error_table, extremes_of, summarize
-from .xarray_backend import open_result, result_of
+from .xarray_backend import open_result, result_of, result_to_show
 
 # attributes that are shown if they are set
 SHOWN_ATTRIBUTES = (
@@ -87,7 +87,8 @@ def info(result: xr.Dataset | str | Path) -> Info:
         # not loaded, so that a summary in the file is used
         with open_result(result) as opened:
             return _describe(opened, str(result))
-    return _describe(result_of(result))
+    with result_to_show(result) as dataset:
+        return _describe(dataset)
 
 
 def _describe(result: xr.Dataset, name: str = "") -> Info:

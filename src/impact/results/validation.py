@@ -103,29 +103,6 @@ def schema_violation(dataset: xr.Dataset) -> str | None:
     return next((safe_text(fault) for check in checks for fault in check(dataset)), None)
 
 
-def lost_parts(dataset: xr.Dataset) -> list[str]:
-    """Name what a result has lost, such as by `drop_vars` or `where`; a sweep may have any of its outputs."""
-    kind = kind_of(dataset)
-    names = [] if kind in ("board", "history") else ["model", *MODEL_METADATA]
-    if kind not in STUDIES:
-        return [name for name in names if name not in dataset.variables]
-    absent, variables = _absent_names(dataset), SCHEMA[kind]
-    names += [name for name in variables if not variables[name].is_new and not absent & {*variables[name].dims}]
-    names += [name for name in STUDY_COORDINATES[kind] if name not in absent]
-    masked = [name for name in variables if variables[name].dtype.startswith("i") and name in dataset]
-    attributes = {*TEXT_ATTRIBUTES[kind], *(("of", "design") if kind == "sensitivity study" else ())}
-    return [
-        *(name for name in names if name not in dataset.variables),
-        *(f"values of {name}" for name in masked if dataset[name].isnull().any()),
-        *sorted(attributes - {*_SWEEP_TEXTS, *dataset.attrs}),
-    ]
-
-
-def _absent_names(dataset: xr.Dataset) -> set[str]:
-    """Name the coordinates of a study that it may lack."""
-    return {"specimen"} | (set() if dataset.attrs.get("varied") else {"grid", "output_name"})
-
-
 def _name_violations(dataset: xr.Dataset) -> Iterator[str]:
     """Names that no result has, and axes without values, or with a label that occurs twice."""
     unknown = sorted({str(name) for name in (*dataset.variables, *dataset.dims) if not is_name(str(name))})
@@ -210,7 +187,8 @@ def _study_violations(dataset: xr.Dataset) -> Iterator[str]:
             yield f"{', '.join(names)}: of a {study}, which has the axis {STUDIES[study]}"
     if kind not in STUDY_COORDINATES:
         return
-    absent = _absent_names(dataset)
+    # what a study may lack
+    absent = {"specimen"} | (set() if dataset.attrs.get("varied") else {"grid", "output_name"})
     points: tuple[Hashable, ...] = () if kind == "board" else ("model",)
     points = dataset["mean"].dims if "mean" in dataset else points
     for name, variable in SCHEMA[kind].items():

@@ -18,7 +18,7 @@ from ..atomic import Sink, atomic_write, check_output, check_outputs, check_resu
 from ..config.files import RESULT_MAGIC
 from ..config.grid import MAX_POINTS
 from ..config.tables import Output
-from ..errors import ResultError, UnfinishedError, UsageError, warn
+from ..errors import ImpactError, ResultError, UnfinishedError, UsageError, warn
 from ..formatting import argument, safe_text, type_of
 from .layouts import read_layout
 from .netcdf import RegionValues, encode_attribute, read_variables, write_dataset
@@ -27,7 +27,7 @@ from .seal import byte_reader, check_root, check_seal, digest, is_result, write_
 from .selection import select, select_laws
 from .slabs import slabs
 from .trajectory_table import in_memory, table_of_result
-from .validation import lost_parts, schema_violation
+from .validation import schema_violation
 
 # larger results are not loaded into memory
 MAX_LOADED_BYTES = 2**29
@@ -206,8 +206,6 @@ def result_of(result: xr.Dataset | str | Path) -> xr.Dataset:
         raise TypeError(f"got {type_of(result)}, expected a dataset, or the file of a result")
     require_result(result)
     kind = kind_of(result)
-    if lost := lost_parts(result):
-        raise UsageError(f"this {kind} has lost {', '.join(lost)}; select parts of a result by sel or isel only")
     # a calibration has the friction laws of its pairs along the models, and a history is of a single law
     for dim in {"sweep": ("friction", "model"), "history": ()}.get(kind, ("model",)):
         if dim in result.coords and result[dim].ndim == 0:
@@ -217,6 +215,23 @@ def result_of(result: xr.Dataset | str | Path) -> xr.Dataset:
             names = [dim, *(name for name in along if name in result.variables)]
             result = result.assign({name: result[name].expand_dims(dim) for name in names})
     return result
+
+
+@contextlib.contextmanager
+def result_to_show(result: xr.Dataset | str | Path) -> Iterator[xr.Dataset]:
+    """Open what a function takes as a result; an unexpected error names what is wrong with that, if anything.
+
+    Whatever works is taken: some functions can read what `drop_vars`, `where` and `concat` of xarray leave.
+    """
+    dataset = result_of(result)
+    try:
+        yield dataset
+    except Exception as error:
+        violation = None if isinstance(error, ImpactError) else schema_violation(dataset)
+        if violation is None:
+            raise
+        kind = kind_of(dataset)
+        raise UsageError(f"this {kind} was changed: {violation}; select parts by sel or isel only") from error
 
 
 def expand(
