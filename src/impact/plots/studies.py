@@ -213,12 +213,12 @@ class BarData(PlotData):
         for axes, panel in zip(all_axes, self.panels, strict=True):
             for offset, (index, (name, colour)) in zip((0.5, -0.5), BARS.items(), strict=True):
                 lower, upper = np.asarray(panel.lower[index]), np.asarray(panel.upper[index])
-                places = positions + offset * BAR_HEIGHT
-                bars = axes.barh(places, panel.values[index], BAR_HEIGHT, color=colour)
+                heights = positions + offset * BAR_HEIGHT
+                bars = axes.barh(heights, panel.values[index], BAR_HEIGHT, color=colour)
                 # an estimate may be outside of its interval, which ends at 0 or 1
                 axes.errorbar(
                     (lower + upper) / 2.0,
-                    places,
+                    heights,
                     xerr=(upper - lower) / 2.0,
                     fmt="none",
                     ecolor=tint(1.0),
