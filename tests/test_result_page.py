@@ -296,6 +296,13 @@ def test_a_result_without_outputs_of_friction_has_a_page_of_its_models() -> None
     assert [output["name"] for output in content["outputs"]] == ["e_out"]
 
 
+@pytest.mark.parametrize("layout", ["full", "factored"])
+def test_a_page_of_a_result_without_outputs_of_its_models_is_refused(layout: str, tmp_path: Path) -> None:
+    impact.sweep_to_file({**OBLIQUE, "output": {"layout": layout, "variables": ["beta"]}}, tmp_path / "beta.h5")
+    with pytest.raises(UsageError, match="e_out is not in this result"):
+        impact.page(tmp_path / "beta.h5")
+
+
 @pytest.mark.slow
 def test_pairs_are_drawn_where_friction_has_a_meaning(browser: Page, tmp_path: Path) -> None:
     result = impact.sweep(OBLIQUE)

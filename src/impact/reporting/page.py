@@ -44,6 +44,7 @@ SHOWN_OF_PAIRS = (
     *("beta", "e_t", "rebound_angle", "impulse_ratio"),
     *("u1_post", "u2_post", "omega1_post", "omega2_post"),
 )
+NO_OUTPUT = "e_out is not in this result; sweep with it in output.variables"
 # columns of a trajectory, in the contact's own units, by the names of the outputs that follow from them
 TRAJECTORY = {"e_out": "e_out", "peak_force": "force", "contact_time": "contact_time", "status": "status"}
 # inputs that the outputs depend on besides the trajectory
@@ -112,6 +113,8 @@ def _page_of(dataset: xr.Dataset, models: Sequence[str] | None) -> str:
         inputs = table.inputs
         arrays = [*_trajectories(table, positions)]
     names = [name for name in SHOWN if name in dataset]
+    if not names:
+        raise UsageError(NO_OUTPUT)
     parts = [*split_by_law(dataset[names], numbered=False)]
     of_pairs = [name for name in SHOWN_OF_PAIRS if name in dataset]
     if of_pairs:
@@ -196,7 +199,7 @@ def _trajectories(table: TrajectoryTable, positions: Sequence[int]) -> Iterator[
 def _stored_values(dataset: xr.Dataset, inputs: Inputs) -> Iterator[dict[str, Any]]:
     """Collect the values of laws that a result stores; outputs that it lacks are left out."""
     if "e_out" not in dataset:
-        raise UsageError("e_out is not in this result; sweep with it in output.variables")
+        raise UsageError(NO_OUTPUT)
     names = [name for name in TRAJECTORY if name in dataset and name != "status"]
     others = {*dataset["e_out"].dims} - {"model", *(axis.name for axis in inputs.axes)}
     if others:
