@@ -94,6 +94,10 @@ def test_the_limit_of_small_steps_is_named_beside_the_law_that_reaches_it_slowly
         labels = {curve.friction: curve.label for curve in curves_of(result, kind).panels[0].curves}
         assert labels["lammps-mindlin"].endswith(", limit of small steps")
         assert "limit" not in labels["coulomb-1785"]
+    # with short names, too
+    for legend in ("full", "short", "keys"):
+        names = impact.plot(result, kind="beta", legend=legend).legends[0].get_texts()
+        assert ["limit" in name.get_text() for name in names] == [False, True]
 
 
 @pytest.mark.parametrize("kind", SHOWN)

@@ -30,6 +30,7 @@ from .curves import CurveData
 from .data import LegendEntries, PlotData, Points, read_points
 from .kinds import DEFAULT_LEGENDS, STUDIES, Choice, Look, check_choice, default_kind, find_kind
 from .labels import (
+    SLOW_LIMIT,
     check_labels,
     escape_mathtext,
     legend_labels,
@@ -218,6 +219,9 @@ def _legend_for(axes: Axes, plot_data: PlotData, look: Look) -> str:
 def _labels(plot_data: PlotData, look: Look) -> dict[str, str]:
     """The texts of names: those of the user, else the title, and of laws those of the legend."""
     of_legend = legend_labels(plot_data.laws, look.legend or "full")
+    for law in of_legend:
+        if plot_data.laws[law].endswith(SLOW_LIMIT):
+            of_legend[law] += SLOW_LIMIT
     return {"title": escape_mathtext(plot_data.title), **of_legend, **(look.labels or {})}
 
 

@@ -52,6 +52,8 @@ MATH_SYMBOLS = {
 THREE_AUTHORS = r"^([\w-]+)(?:, [A-Z][\w-]+)+ and [A-Z][\w-]+"
 # name of the impulse-momentum solution in the paper
 REFERENCE = "Impulse-momentum"
+# end of the name of a pair whose curve is far from what a code with fixed steps delivers
+SLOW_LIMIT = ", limit of small steps"
 # a logarithmic axis that leaves this range has powers of ten
 MIN_PLAIN, MAX_PLAIN = 5e-3, 1e5
 # distances of ticks of angles [deg], of which the first with a suitable number of ticks is used
