@@ -179,6 +179,12 @@ def legend_labels(laws: Collection[str], legend: str) -> dict[str, str]:
     return {law: escape_mathtext(safe_text(law_name(*map(write, parts)), 80)) for law, parts in keys.items()}
 
 
+def parameters_in(label: str) -> list[str]:
+    """Find the parameters in the label of a model or a pair, whose spaces do not break."""
+    words = label.replace(WITH, ", ").split(", ")
+    return [word for word in words if f"{NO_BREAK}={NO_BREAK}" in word]
+
+
 def parameters_of_laws(laws: Mapping[str, str], names: Mapping[str, str]) -> str:
     """Write the parameters in the labels of laws, for a picture with other names that lack them.
 
@@ -192,7 +198,7 @@ def parameters_of_laws(laws: Mapping[str, str], names: Mapping[str, str]) -> str
         parts = label.rsplit(WITH, len(keys) - 1)
         # the label of a pair may lack its model, which then is in the conditions
         for law, part in zip(keys[-len(parts) :], parts, strict=True):
-            parameters = " and ".join(word for word in part.split(", ") if f"{NO_BREAK}={NO_BREAK}" in word)
+            parameters = " and ".join(parameters_in(part))
             name = names.get(law, escape_mathtext(law))
             owners.setdefault(pretty_conditions(parameters), {})[name] = None
     return ", ".join(

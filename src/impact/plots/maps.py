@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -24,7 +23,7 @@ from matplotlib.patheffects import withStroke
 
 from ..array_types import Array, Mask
 from ..errors import UsageError, did_you_mean
-from ..formatting import NO_BREAK, argument, heading, percentage, safe_text
+from ..formatting import argument, heading, percentage, safe_text
 from ..results.ranking import error_floor
 from .data import LegendEntries, PlotData, Points, stacked
 from .kinds import Choice, Kind
@@ -34,6 +33,7 @@ from .labels import (
     label_axis,
     legend_labels,
     number_axis,
+    parameters_in,
     pretty_conditions,
     split_by_law,
     symbol,
@@ -164,11 +164,8 @@ class MapData(PlotData):
         short, plain = legend_labels(names, "short"), legend_labels(names, "keys")
         shorter = {}
         for (key, name), panel in zip(names.items(), self.panels, strict=True):
-            # the parameters, which have no other space than one that does not break
-            own = [
-                pretty_conditions(word) for word in re.findall(rf"[^ ,]+{NO_BREAK}={NO_BREAK}[^ ,]+", panel.label)
-            ]
-            shorter[name] = tuple(", ".join([text, *own]) for text in (short[key], plain[key]))
+            parameters = [*map(pretty_conditions, parameters_in(panel.label))]
+            shorter[name] = [", ".join([text, *parameters]) for text in (short[key], plain[key])]
         figure = all_axes[0].figure
         for axes, title in zip(all_axes, titles, strict=True):
             heading_text = axes.set_title(title)
