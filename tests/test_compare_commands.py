@@ -431,6 +431,16 @@ def test_numbers_of_cases_are_whole_ones_where_differences_are_drawn() -> None:
     assert [tick for tick in axes.get_xticks() if 0 <= tick <= 3] == [0, 1, 2, 3]
 
 
+def test_numbers_of_measured_values_are_whole_ones_where_differences_are_drawn() -> None:
+    data = {"columns": {"v1": [0.5, 1.0, 2.0], "e_out": [0.9, 0.85, 0.8]}}
+    sweep = {"m1": 1.0, "m2": 1.0, "K": 1e6, "e": {"fit": [0.5, 1.0]}}
+    fits = impact.calibrate({"models": "tsuji-1992", "sweep": sweep, "data": data})
+    moved = fits.assign(residual=fits["residual"] + 0.1)
+    figure = draw_differences(difference_data(impact.compare(moved, fits)))
+    (axes,) = [axes for axes in figure.axes if axes.get_xlabel() == "Number of the measured value"]
+    assert [tick for tick in axes.get_xticks() if 1 <= tick <= 3] == [1, 2, 3]
+
+
 def test_long_keys_of_models_in_a_picture_of_differences_are_tilted() -> None:
     keys = ["lammps-coeff-restitution-hertz", "lammps-coeff-restitution-hooke", "hertz", "yade-en"]
     result = impact.sweep(models=keys, e=[0.5, 0.9])

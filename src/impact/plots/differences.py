@@ -16,8 +16,8 @@ from ..comparison.verdict import Verdict
 from ..config.input_names import InputName
 from ..errors import UsageError
 from ..formatting import number, safe_text, scaled_unit
-from ..results.schema import SCHEMA, is_case
-from .labels import annotate_right_edge, axis_text, escape_mathtext, number_axis, words_of
+from ..results.schema import SCHEMA
+from .labels import annotate_right_edge, axis_text, escape_mathtext, is_whole, number_axis, words_of
 from .layout import Picture
 from .slices import unit_of
 from .style import COLOURS, MARKERS, default_size, is_geometric, styled, tint
@@ -49,7 +49,7 @@ class DifferencePanel:
     values: tuple[float, ...]
     names: tuple[str, ...]
     ratios: Mapping[str, tuple[float, ...]]
-    whole: bool = False  # whether its values are numbers of cases
+    whole: bool = False  # whether its values are numbers of measured values or of cases
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ def difference_data(verdict: Verdict) -> DifferenceData:
                 values=tuple((values / size).tolist()) if is_numeric else tuple(range(len(values))),
                 names=tuple(safe_text(text, MAX_NAME_LENGTH) for text in texts),
                 ratios={n: tuple(along[axis][n].values[order].tolist()) for n in shown if n in along[axis]},
-                whole=is_case(axis),
+                whole=is_whole(axis),
             )
         )
     return DifferenceData(verdict.headline, tuple(panels), max(0, len(wanted) - len(shown)))

@@ -304,7 +304,12 @@ def label_axis(
     if words := InputName.parse(name).words:
         axis.set_ticks(range(len(words)), words)
     else:
-        number_axis(axis, size, log=log, whole=name == "point" or is_case(name))
+        number_axis(axis, size, log=log, whole=is_whole(name))
+
+
+def is_whole(name: str) -> bool:
+    """Whether the values of an axis are numbers of measured values or of cases."""
+    return name == "point" or is_case(name)
 
 
 def number_axis(axis: Axis, size: float = 1.0, *, log: bool = False, whole: bool = False) -> None:
