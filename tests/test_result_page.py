@@ -320,6 +320,8 @@ def test_pairs_are_drawn_where_friction_has_a_meaning(browser: Page, tmp_path: P
     number = columns[0].index('"rebound_angle of hertz with lammps-mindlin [°]"')
     degrees = [float(row[number]) for row in columns[1:]]
     np.testing.assert_allclose(degrees, np.degrees(part.values), rtol=1e-15)
+    # as in pictures, without a prefix
+    assert browser.evaluate("scale('rad/s', 2000)") == [1, "rad/s"]
     choose(browser, "variable", "e_out")
     assert browser.evaluate(visible) == OBLIQUE["models"]
     assert len(browser.evaluate("curves()")) == 2

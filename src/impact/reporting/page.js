@@ -69,7 +69,8 @@ const digits = number => Number.isFinite(number) ? String(+number.toPrecision(6)
 
 // a factor, and the unit of an output with its prefix, for values up to `largest`
 function scale(unit, largest) {
-  if (unit === "1" || unit === "°") return [1, unit === "1" ? "" : unit];
+  if (unit === "1") return [1, ""];
+  if (unit === "°" || unit === "rad/s") return [1, unit];
   const power = largest > 0 ? 3 * Math.floor(Math.log10(largest) / 3 + 1e-4) : 0;
   const limited = Math.min(9, Math.max(-9, power));
   return [10 ** -limited, PREFIXES[limited] + unit];
@@ -167,16 +168,16 @@ function draw() {
   const room = 0.05 * (high - low > FLAT * size ? high - low : size || 1);
   [low, high] = [low - room, high + room];
   const [factor, unit] = scale(output.unit, Math.max(Math.abs(low), Math.abs(high)));
-  const heights = ticks(low * factor, high * factor, false, height / 60);
+  const levels = ticks(low * factor, high * factor, false, height / 60);
   // the numbers stand between the name of the output and the frame
-  const left = 34 + 7.5 * Math.max(4, ...heights.map(number => digits(number).length));
+  const left = 34 + 7.5 * Math.max(4, ...levels.map(number => digits(number).length));
   const [xSize, xUnit] = axis.scaled, xFactor = 1 / xSize;
   const first = x[0], last = x[x.length - 1];
   const share = number => (warp(number) - warp(first)) / (warp(last) - warp(first));
   const toX = number => last > first ? left + share(number) * (right - left) : (left + right) / 2;
   const toY = number => bottom - (number - low) / (high - low) * (bottom - top);
 
-  for (const number of heights) {
+  for (const number of levels) {
     const y = toY(number / factor);
     add(svg, "line", {x1: left, x2: right, y1: y, y2: y, class: "grid"});
     add(svg, "text", {x: left - 8, y: y + 4, "text-anchor": "end"}, digits(number));
