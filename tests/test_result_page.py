@@ -102,6 +102,12 @@ def test_a_title_of_several_lines_is_one_comment_of_the_csv() -> None:
     assert content_of(impact.page(result))["title"] == "Drops of a ball"
 
 
+def test_a_page_of_arrays_of_dask_is_that_of_their_values() -> None:
+    pytest.importorskip("dask")
+    result = impact.load(ROOT / "tests" / "data" / "figure6.h5")
+    assert impact.page(result.chunk()) == impact.page(result)
+
+
 def test_the_script_and_the_template_are_short() -> None:
     lines = [
         len((REPORTING / name).read_text(encoding="utf-8").splitlines()) for name in ("page.js", "page.html.j2")

@@ -146,11 +146,11 @@ def law_text(title: str, year: int, equation: str, parameters: str, *, numbered:
 
 def model_label(model_data: xr.Dataset, *, numbered: bool = False) -> str:
     """Write the title of a model of a result, with the values of its parameters."""
-    title, year, equation = (model_data[name].item() for name in ("title", "year", "equation"))
+    title, year, equation = (model_data[name].values.item() for name in ("title", "year", "equation"))
     inputs = scalars_of(model_data)
     if "exponent" in model_data.coords and model_data["exponent"].ndim == 0:
-        inputs["n"] = float(model_data["exponent"].item()), "1"
-    parameters = parameter_text(str(model_data["model"].item()), inputs)
+        inputs["n"] = float(model_data["exponent"].values.item()), "1"
+    parameters = parameter_text(str(model_data["model"].values.item()), inputs)
     return law_text(str(title), int(year), str(equation), parameters, numbered=numbered)
 
 
