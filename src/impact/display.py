@@ -392,9 +392,16 @@ def _console(stream: TextIO, width: int | None = None) -> Console:
 
     # a text has no styles, also where the environment forces colours
     is_styled = False if isinstance(stream, io.StringIO) else None
-    settings: dict[str, Any] = {"markup": False, "highlight": False, "emoji": False, "force_terminal": is_styled}
     # in a notebook rich would not write to the stream
-    return Console(file=stream, width=width, force_jupyter=False, **settings)
+    return Console(
+        file=stream,
+        width=width,
+        force_terminal=is_styled,
+        force_jupyter=False,
+        markup=False,
+        highlight=False,
+        emoji=False,
+    )
 
 
 def dump(value: Any) -> str:
