@@ -236,7 +236,7 @@ class Fits(DisplayedDataset):
         yield describe_data(self.dataset)
         yield ""
         rows, p = fit_rows(self.dataset), FIT_HEADINGS.index("p")
-        # without a stated noise no law has one
+        # no law has one without a stated noise, or in a file of version 1.0.0
         shown = [i for i in range(len(FIT_HEADINGS)) if i != p or {row[p] for row in rows} - {"", "–"}]
         yield Table([[row[i] for i in shown] for row in rows], [FIT_HEADINGS[i] for i in shown], text=(0, 1, -1))
         yield from fit_notes(self.dataset)
