@@ -172,7 +172,7 @@ def prepare_export(
     named = next((name for name in asked if has_law(code, key, version, name)), key)
     # a code's own name is that of an option, whose law depends on the release
     is_other = named not in code.laws and original_key(named) != original_key(key)
-    instead = f"{code.title} {version} has no {named}: {key} is written, {find(key).equation}"
+    instead = f"{code.title} {version} has no {named}: {key} is written; see impact models {key}"
     return ExportProblem(code, version, fixed, tuple(notes), better_fit, left_out, instead if is_other else "")
 
 
