@@ -377,8 +377,8 @@ def test_columns_without_use_do_not_decide_how_a_file_is_written(
     folder: Path, csv: str, data: dict[str, str]
 ) -> None:
     (folder / "a.csv").write_text(csv, encoding="utf-8")
-    found = measurements({"file": "a.csv", **data})
-    assert (found.inputs, found.outputs) == ({"v1": (1.0, 2.0)}, {"e_out": (0.5, 1.0)})
+    read = measurements({"file": "a.csv", **data})
+    assert (read.inputs, read.outputs) == ({"v1": (1.0, 2.0)}, {"e_out": (0.5, 1.0)})
 
 
 def test_a_stiffness_of_cases_has_no_unit_where_the_exponent_is_one_of_their_columns(folder: Path) -> None:

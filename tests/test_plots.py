@@ -333,9 +333,9 @@ def test_numbers_of_a_narrow_axis_are_those_of_its_ticks() -> None:
 
 
 def test_a_stiffness_is_stated_with_the_unit_of_the_laws_that_use_it() -> None:
-    """A linear law first, with a K of its own, beside a K of the sweep in N/m^1.5."""
-    own = {"model.kelvin-voigt": {"K": 1e5, "C": 1.0}}
-    result = impact.sweep(models=["kelvin-voigt", "hertz"], K=2e6, m1=1.0, m2=1.0, overrides=own)
+    """A linear law with a K in its table comes first, beside a K of the sweep in N/m^1.5."""
+    settings = {"model.kelvin-voigt": {"K": 1e5, "C": 1.0}}
+    result = impact.sweep(models=["kelvin-voigt", "hertz"], K=2e6, m1=1.0, m2=1.0, overrides=settings)
     loop, alone = (
         get_curve_data(result, "loop", **law).conditions.replace("\N{NO-BREAK SPACE}", " ")
         for law in ({}, {"models": ["kelvin-voigt"]})

@@ -256,8 +256,8 @@ def test_selecting_a_parameter_changes_only_the_loop_of_its_model() -> None:
 
 def test_a_stiffness_that_a_law_replaces_keeps_the_exponent_of_the_others() -> None:
     """The K of the sweep is that of laws with another n than this one has."""
-    own = {"model.kelvin-voigt": {"K": 1e5, "C": 1.0}}
-    result = impact.sweep(models=["kelvin-voigt", "hertz"], K=2e6, m1=1.0, m2=1.0, overrides=own)
+    settings = {"model.kelvin-voigt": {"K": 1e5, "C": 1.0}}
+    result = impact.sweep(models=["kelvin-voigt", "hertz"], K=2e6, m1=1.0, m2=1.0, overrides=settings)
     rows = {key: impact.run(result, model=key).groups()["Inputs"] for key in ("kelvin-voigt", "hertz")}
     units = {key: {name: value for name, value, _ in row} for key, row in rows.items()}
     assert (units["kelvin-voigt"]["K"], units["kelvin-voigt"]["kelvin-voigt.K"]) == ("2 MN/m^n", "100 kN/m")
@@ -286,8 +286,8 @@ def test_alpha_replaces_e_and_e_replaces_alpha(cli: Run) -> None:
 
 
 def test_inputs_of_the_user_replace_those_of_table_1_and_not_each_other() -> None:
-    given = impact.run(model="hertz", overrides=["sweep.m1=2.0", "sweep.R1=0.02"]).point
-    assert (given["m1"], given["R1"]) == (2.0, 0.02)
+    inputs = impact.run(model="hertz", overrides=["sweep.m1=2.0", "sweep.R1=0.02"]).point
+    assert (inputs["m1"], inputs["R1"]) == (2.0, 0.02)
     oblique = {"speed": 2.0, "angle": 0.5, "mu": 0.3, "R1": 0.05, "R2": 0.05}
     assert impact.run(model="hertz", friction="coulomb-1785", at=oblique).closing_speed == 2.0 * math.cos(0.5)
 

@@ -196,7 +196,7 @@ def _from_library(value: Any) -> object:
         if differs_from_si(unit):
             return _with_unit(_from_library(value), unit)
         if is_unit(unit) and unit not in ("1", "dimensionless"):
-            # numbers in SI are quick to read without their unit, whose dimension one of them tells
+            # numbers in SI are quick to read without a unit: it stays at the first, where its dimension is checked
             return _with_unit(_from_library(value), unit, first=True)
     if getattr(getattr(value, "dtype", None), "char", "") == "g":
         # a long double stays one where it is too large for a float

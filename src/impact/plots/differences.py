@@ -201,7 +201,7 @@ def _draw_limit(axes: Axes, height: float, name: str, **style: Any) -> None:
 
 
 def _label_ticks(axes: Axes, panel: DifferencePanel, x: np.ndarray) -> None:
-    """Write names below the points: all up to MAX_TICKS, and of more so few that there is room between them."""
+    """Write names below the points: up to MAX_TICKS all of them, else few enough not to overlap."""
     every = 1 if len(x) <= MAX_TICKS else -(-2 * len(x) // MAX_TICKS)
     names = panel.names[::every]
     # a panel with more than MAX_NAMES_LENGTH letters has a whole row; the longest name has to fit its place
