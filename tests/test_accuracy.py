@@ -1,6 +1,7 @@
 """At the default tolerance restitutions are within 1e-9 of their closed forms, and other outputs within 1e-8."""
 
 import functools
+import math
 
 import numpy as np
 import pytest
@@ -146,6 +147,21 @@ def test_a_history_ends_where_the_contact_does() -> None:
     assert history["delta"].values[-1] == pytest.approx(outputs["permanent_indentation"], rel=1e-5)
     # the force pulls nowhere
     assert history["F"].values.min() >= -1e-12 * history["F"].values.max()
+
+
+@pytest.mark.parametrize("law", ["lammps-viscoelastic-hooke-limit", "lammps-viscoelastic-hertz-limit"])
+def test_a_force_that_pulls_in_a_part_of_a_long_step_ends_the_contact(law: str) -> None:
+    config = {
+        "models": law,
+        "sweep": {"v1": 1.0, "m1": 1.0, "R1": 1.0, "m2": math.inf, "R2": math.inf},
+        "model": {law: {"K": 1.0, "eta": {"geomspace": [1e-2, 0.5, 100]}}},
+    }
+    exact, *results = (impact.sweep(config | {"solver": {"rtol": rtol}}) for rtol in (1e-12, 1e-9, 1e-6, 1e-5))
+    for result in results:
+        bound = 10 * result.attrs["rtol"]
+        for name in ("e_out", "contact_time"):
+            assert result[name].values == pytest.approx(exact[name].values, rel=bound)
+        assert np.abs(result["energy_residual"].values).max() <= bound
 
 
 @functools.cache

@@ -201,6 +201,18 @@ def test_works_make_up_the_loss_and_momenta_are_kept() -> None:
         assert change == pytest.approx(R * impulse, abs=1e-14 * inertia * 100.0 + 1e-14 * R * m1 * 3.0)
 
 
+def test_works_make_up_the_loss_where_the_force_pulls_only_in_a_part_of_a_step() -> None:
+    config = {
+        "models": "kuwabara-kono-1987",
+        "frictions": "lammps-mindlin",
+        "sweep": BALL | {"K": 1.0, "v1": 1.0, "v2": 0.0, "m1": 1.0, "m2": math.inf, "u1": 0.2},
+        "model": {"kuwabara-kono-1987": {"A": {"geomspace": [1e-5, 1e-2, 50]}}},
+        "friction": {"lammps-mindlin": {"k_t": 0.3, "xt": 0.0}},
+    }
+    residual = impact.sweep(config)["friction_residual"].values
+    assert np.abs(residual).max() < 1e-8
+
+
 @pytest.mark.parametrize("friction", ["lammps-mindlin", "lammps-mindlin-force", "liggghts-history"])
 def test_tiny_slips_and_tiny_frictions_are_their_limits(friction: str) -> None:
     """The slip after over that before has a limit for g0/mu to 0, and none changes for mu to 0."""

@@ -26,7 +26,7 @@ from .formula_calls import argument_names, describe_error
 from .model import ForceModel
 from .numba import dispatch
 from .piecewise import in_parts
-from .powers import distinct_values, power
+from .powers import distinct_values, integer_power, power
 from .records import CollisionResult, Positions, Record, deduplicate, positions
 from .slip_motion import TangentialForm
 from .status import LIMIT, STATUS_OK, Status
@@ -42,8 +42,9 @@ STATUS_OF_TERMINATION = np.array(
 STEPS_PER_CONTACT, STEP, PHASE = "sweep.steps_per_contact", "sweep.dt", "sweep.phase"
 # the contact time of a linear spring, in the contact's unit of time
 LINEAR_CONTACT_TIME = np.pi
-# parts of the recovered indentation between which an end at zero force is looked for that no step has seen
-HIDDEN_END, HIDDEN_END_BISECTIONS = (1e-12, 1e-2), 60
+# the part of the recovered indentation down to which an end at zero force is looked for that no step has seen, and
+# parts of the s there at which the force is averaged
+HIDDEN_END, HIDDEN_END_BISECTIONS, HIDDEN_PARTS = 1e-12, 60, (np.arange(8.0) + 0.5) / 8.0
 
 # arrays that a law needs, by name, in the contact's own units
 ValueArrays = Mapping[str, Array]
@@ -347,6 +348,7 @@ def integrate_collisions(
         return in_parts(run, problem, breakpoints, start, params)
 
     phases = solve_phases(law, params, n, solve, never_separates)
+    _end_at_zero_force(phases)
     approach, restitution, rows = phases.approach, phases.restitution, phases.rows
     result = replace(
         CollisionResult.blank(n),
@@ -423,7 +425,6 @@ def solve_phases(
         start = motion.components_at(back, back_params, power(recovered, 1.0 / back.model.coordinate_power), 0.0)
         restitution = solve(back, motion.restitution_problem(back), start, back_params, (rows, residual[rows]))
         _mark_never_separating(back, restitution, back_params, recovered)
-        _end_at_zero_force(back, restitution, back_params, recovered)
         velocity = -back.velocity(restitution.state, back_params)
         ended = STATUS_OF_TERMINATION.take(restitution.termination)
         # the balls are held, or separate at zero speed after infinite time
@@ -436,35 +437,44 @@ def solve_phases(
     return Phases(law, both_params, approach, restitution, rows, peak, at_peak, residual, e_out, status)
 
 
-def _end_at_zero_force(law: motion.MotionLaw, solution: Solution, params: Params, recovered: Array) -> None:
-    """Move ends at zero indentation to where the force vanished, if it pulls in a part much shorter than a step.
-
-    There it changes the speed by less than the errors of the integration.
-    """
-    ended = (solution.termination == Termination.EVENT_REACHED) & (law.model.release == "force")
-    least, most = (part * recovered for part in HIDDEN_END)
-    rows = np.flatnonzero(ended & (np.abs(motion.indentation(law, solution.state[0])) < least))
+def _end_at_zero_force(phases: Phases) -> None:
+    """Move ends at zero indentation to where the force vanished, if it pulls in a part that no step has seen."""
+    law, solution = motion.restitution_law(phases.law), phases.restitution
+    if solution is None or law.model.release != "force":
+        return
+    p, back_params = law.model.coordinate_power, phases.params[1]
+    recovered = (phases.peak - phases.residual)[phases.rows]
+    is_at_gap = np.abs(motion.indentation(law, solution.state[0])) < HIDDEN_END * recovered
+    rows = np.flatnonzero((solution.termination == Termination.EVENT_REACHED) & is_at_gap)
     if not rows.size:
         return
-    of_velocity, p = replace(law, coordinate=VelocityCoordinate()), law.model.coordinate_power
+    of_velocity = replace(law, coordinate=VelocityCoordinate())
     force_at = motion.force_of(of_velocity, unloads=True)
-    velocity = law.velocity(solution.state, params)[rows]
-    params = tuple(column[rows] for column in params)
+    velocity = law.velocity(solution.state, back_params)[rows]
+    params = tuple(column[rows] for column in back_params)
 
-    def pulls(x: Array) -> Mask:
-        return np.broadcast_to(force_at(np.array([power(x, 1.0 / p), velocity]), params) < 0.0, x.shape)
+    def force(s: Array) -> Array:
+        return np.broadcast_to(force_at(np.array([s, velocity]), params), s.shape)
 
-    lower, upper = least[rows], most[rows]
-    hidden = pulls(lower) & ~pulls(upper)
+    upper = power(recovered[rows], 1.0 / p)
+    lower = upper * HIDDEN_END ** (1.0 / p)
+    hidden = (force(lower) < 0.0) & (force(upper) >= 0.0)
     if not hidden.any():
         return
     for _ in range(HIDDEN_END_BISECTIONS):
         middle = np.sqrt(lower * upper)
-        is_below = pulls(middle)
+        is_below = force(middle) < 0.0
         lower, upper = np.where(is_below, middle, lower), np.where(is_below, upper, middle)
-    at_end = motion.components_at(law, params, power(lower, 1.0 / p), velocity)
-    solution.state[:2, rows[hidden]] = at_end[:, hidden]
-    solution.state[2, rows[hidden]] += (lower / velocity)[hidden]
+    x = integer_power(lower, p)
+    # the energy that the pull took from there on, by the midpoint rule in s
+    work = np.mean([force(part * lower) * p * x * part ** (p - 1) for part in HIDDEN_PARTS], axis=0)
+    speed = np.sqrt(velocity * velocity - 2.0 * work)
+    solution.state[:2, rows[hidden]] = motion.components_at(law, params, lower, -speed)[:, hidden]
+    solution.state[2, rows[hidden]] += (x / velocity)[hidden]
+    solution.state[3, rows[hidden]] += work[hidden]
+    e_out = phases.e_out[phases.rows]
+    e_out[rows[hidden]] = speed[hidden]
+    phases.e_out[phases.rows] = e_out
 
 
 def _mark_never_separating(law: motion.MotionLaw, solution: Solution, params: Params, recovered: Array) -> None:
