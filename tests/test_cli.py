@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import errno
+import importlib.util
 import inspect
 import io
 import itertools
@@ -727,6 +728,32 @@ def test_a_style_with_latex_that_is_not_installed_is_reported(cli: Run, stored: 
     done = cli(*words, cwd=tmp_path, PATH=folder, MPLCONFIGDIR=folder)
     reason = "Failed to process string with tex because latex could not be found"
     assert (done.returncode, done.stderr) == (2, f"the picture cannot be drawn with text.usetex: {reason}\n")
+
+
+@pytest.mark.parametrize(
+    ("setting", "problem"),
+    [
+        ("figure.dpi: -1", "the settings of matplotlib allow no figure: dpi must be positive"),
+        ("figure.subplot.left: 2", "the settings of matplotlib allow no figure: left cannot be >= right"),
+        ("savefig.dpi: 0", "the picture cannot be drawn as .png: dpi must be positive"),
+    ],
+)
+def test_a_setting_of_matplotlib_that_allows_no_picture_is_reported(
+    cli: Run, stored: Path, tmp_path: Path, setting: str, problem: str
+) -> None:
+    (tmp_path / "mine.mplstyle").write_text(setting, encoding="utf-8")
+    done = cli("plot", stored, "--style", "mine.mplstyle", "-o", "picture.png", cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (2, f"{problem}\n")
+
+
+def test_a_library_that_refuses_the_environment_is_reported(cli: Run, stored: Path, small: Path) -> None:
+    done = cli("plot", stored, MPLBACKEND="none such")
+    assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)
+    assert done.stderr.startswith("matplotlib cannot be imported: ValueError: Key backend: 'none such' is not")
+    if importlib.util.find_spec("numba"):
+        done = cli("sweep", small, "--set", 'solver.core="numba"', NUMBA_NUM_THREADS="0")
+        reason = "ValueError: Number of threads specified must be > 0."
+        assert (done.returncode, done.stderr) == (2, f"numba cannot be imported: {reason}\n")
 
 
 @pytest.mark.slow

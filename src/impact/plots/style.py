@@ -57,6 +57,10 @@ def styled(style: str | Path | None = None) -> Iterator[None]:
             if to_rgb(rcParams["grid.color"]) == to_rgb(rcParams["text.color"]):
                 rcParams["grid.color"] = tint(0.1)
             try:
+                Figure().draw_without_rendering()
+            except ValueError as error:
+                raise UsageError(f"the settings of matplotlib allow no figure: {error}") from None
+            try:
                 yield
             except RuntimeError as error:
                 # LaTeX measures texts, too
@@ -180,8 +184,8 @@ def encoded(figure: Figure, kind: str, style: str | Path | None = None) -> bytes
     with styled(style):
         try:
             figure.savefig(buffer, format=kind, **options)
-        except RuntimeError as error:
-            # LaTeX runs for the format .pgf, and if the user sets text.usetex
+        except (RuntimeError, ValueError) as error:
+            # LaTeX runs for the format .pgf, and if the user sets text.usetex; matplotlib refuses some savefig.dpi
             reason = " ".join(str(error).split())
             raise UsageError(f"the picture cannot be drawn as .{kind}: {reason}") from None
     if kind == "eps":
