@@ -967,6 +967,23 @@ def test_the_catalogue_keeps_the_restitution_on_a_narrow_terminal(
     assert re.search(r"^tsuji-1992 +0\.\d{4}", "\n".join(lines), re.MULTILINE)
 
 
+@pytest.mark.parametrize("width", [60, 80])
+def test_numbers_of_a_calibration_are_whole_on_a_narrow_terminal(forked: ForkServer, width: int) -> None:
+    words = ("calibrate", "docs/calibrate/drops.toml", "--set", 'models=["hunt-crossley-1975"]')
+    done, printed = printed_on_terminal(forked, *words, width=width, NO_COLOR="1")
+    lines = re.sub(r"\x1b\[[\d;]*m", "", printed).splitlines()
+    rows = [line for line in lines if line.startswith(("law ", "hunt-crossley-1975 "))]
+    assert max(map(cell_len, rows)) <= width
+    # a part of the table for some columns, as pandas has it
+    names, values = (
+        [part for line in rows[start::2] for part in re.split("  +", line.strip())] for start in (0, 1)
+    )
+    shown = dict(zip(names, values, strict=True))
+    expected = {"law": "hunt-crossley-1975", "95 %": "0.05 to 0.050354", "AICc": "3446.2", "status": "at_bound"}
+    assert {name: shown[name] for name in expected} == expected
+    assert done.returncode == 0
+
+
 @pytest.mark.slow
 def test_a_shell_completes_models_keys_axes_and_outputs(forked: ForkServer, stored: Path) -> None:
     def completed(*words: str | Path) -> list[str]:

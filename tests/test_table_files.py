@@ -182,7 +182,7 @@ def test_a_table_without_room_is_folded_at_spaces_and_the_widest_column_first() 
     pair = "lankarani-nikravesh-1994 with cundall-strack-1979"
     table = Table([[pair, "kt_over_kn", "0.0967 to 0.1033", 1.25e-12]], ("law", "parameter", "95 %", "chi2/dof"))
     lines = {}
-    for width in (100, 66, 46):
+    for width in (100, 66, 46, 24):
         stream = io.StringIO()
         print_blocks([table], stream, width)
         lines[width] = [line.rstrip() for line in stream.getvalue().splitlines()]
@@ -190,8 +190,16 @@ def test_a_table_without_room_is_folded_at_spaces_and_the_widest_column_first() 
     assert len(lines[100]) == 2
     assert lines[100][1].split("  ")[0] == pair
     words = {*pair.split(), "kt_over_kn", "0.0967", "to", "0.1033", "1.25e-12"}
-    assert words <= {word for line in lines[66] for word in line.split()}
+    for width in (66, 46):
+        assert words <= {word for line in lines[width] for word in line.split()}
     # numbers keep their line as long as texts give way
     assert any("0.0967 to 0.1033" in line for line in lines[66])
-    # where even the words have no room they are broken, and all characters are there
-    assert sorted("".join(lines[46]).replace(" ", "")) == sorted("".join(lines[100]).replace(" ", ""))
+    # where the words of all columns have no room, each part has the law and a column
+    assert [line.split() for line in lines[46] if line.startswith("law")] == [
+        ["law", "parameter"],
+        ["law", "95", "%"],
+        ["law", "chi2/dof"],
+    ]
+    # where even those of two columns have none they are broken, and all characters are there
+    repeated = 2 * f"law{pair}".replace(" ", "")
+    assert sorted("".join(lines[24]).replace(" ", "")) == sorted("".join(lines[100]).replace(" ", "") + repeated)

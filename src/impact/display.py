@@ -13,7 +13,7 @@ import math
 import re
 import sys
 from abc import abstractmethod
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from html import escape
 from pathlib import Path
@@ -86,34 +86,54 @@ class Table:
         ]
         texts = ([cell.plain for cell in row] for row in rows)
         columns = list(itertools.zip_longest(self.headings, *texts, fillvalue=""))
-        table = RichTable(box=None, pad_edge=False, header_style="bold", show_header=bool(self.headings))
-        for position, width in enumerate(self._widths(columns, console.width)):
-            is_text = not self.headings or position in self.text or position - len(columns) in self.text
-            table.add_column(
-                columns[position][0], justify="left" if is_text else "right", overflow="fold", width=width
-            )
-        for row in rows:
-            table.add_row(*row)
-        console.print(table)
+        for part in self._parts(columns, console.width):
+            table = RichTable(box=None, pad_edge=False, header_style="bold", show_header=bool(self.headings))
+            for position, width in zip(part, self._widths(columns, part, console.width), strict=True):
+                is_text = not self.headings or position in self.text or position - len(columns) in self.text
+                table.add_column(
+                    columns[position][0], justify="left" if is_text else "right", overflow="fold", width=width
+                )
+            for row in rows:
+                table.add_row(*(row[position] for position in part if position < len(row)))
+            if 0 < len(part) <= part[-1]:
+                console.print()
+            console.print(table)
 
-    def _widths(self, columns: Sequence[Sequence[str]], width: int) -> Sequence[int | None]:
+    def _parts(self, columns: Sequence[Sequence[str]], width: int) -> Iterator[Sequence[int]]:
+        """Split columns whose words have no room, as pandas does: the first column is in each part."""
+        from rich.cells import cell_len
+
+        if not self.headings or None not in self._widths(columns, range(len(columns)), width):
+            yield range(len(columns))
+            return
+        most = [max(map(cell_len, texts)) for texts in columns]
+        part = [0]
+        for position in range(1, len(columns)):
+            if len(part) > 1 and sum(most[i] + 2 for i in (*part, position)) - 2 > width:
+                yield part
+                part = [0]
+            part.append(position)
+        yield part
+
+    def _widths(self, columns: Sequence[Sequence[str]], part: Sequence[int], width: int) -> Sequence[int | None]:
         """Choose the widths of columns that fold at spaces, the widest first; None where words have no room."""
         from rich.cells import cell_len
 
-        most = [max(map(cell_len, texts)) for texts in columns]
-        words = [max((cell_len(word) for text in texts for word in text.split()), default=0) for texts in columns]
+        texts = [columns[i] for i in part]
+        most = [max(map(cell_len, column)) for column in texts]
+        words = [max((cell_len(word) for text in column for word in text.split()), default=0) for column in texts]
         # headings keep their line, for which addresses may be broken
-        kept = [max(cell_len(texts[0]), min(word, MAX_WORD)) for texts, word in zip(columns, words, strict=True)]
-        whole = [most[i] if i in self.no_wrap else kept[i] for i in range(len(columns))]
+        kept = [max(cell_len(column[0]), min(word, MAX_WORD)) for column, word in zip(texts, words, strict=True)]
+        whole = [full if i in self.no_wrap else least for i, full, least in zip(part, most, kept, strict=True)]
         for least in (whole, kept, words):
             # two spaces are between columns
-            widths, room = most.copy(), width - 2 * (len(columns) - 1)
+            widths, room = most.copy(), width - 2 * (len(part) - 1)
             if sum(least) > room:
                 continue
             while sum(widths) > room:
                 widths[max((i for i in range(len(widths)) if widths[i] > least[i]), key=widths.__getitem__)] -= 1
             return widths
-        return [None] * len(columns)
+        return [None] * len(part)
 
     def html(self) -> str:
         """The table in HTML; texts are left-aligned.
