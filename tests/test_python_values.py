@@ -257,6 +257,13 @@ def test_a_result_that_was_changed_is_taken_where_it_can_be_read_and_else_refuse
                 function(result)
 
 
+def test_inputs_and_titles_that_became_variables_are_taken_for_coordinates() -> None:
+    result = impact.sweep(BASE)
+    names = [name for name in result.coords if name not in result.dims]
+    for show in (impact.page, impact.report, impact.info):
+        assert str(show(result.reset_coords(names))) == str(show(result))
+
+
 def test_a_result_of_which_no_values_are_left_is_refused() -> None:
     result = impact.sweep(BASE)
     for function in (impact.info, impact.report, impact.page, impact.plot, impact.run):

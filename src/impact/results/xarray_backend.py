@@ -17,6 +17,7 @@ from xarray.backends import BackendEntrypoint
 from ..atomic import Sink, atomic_write, check_output, check_outputs, check_result_name
 from ..config.files import RESULT_MAGIC
 from ..config.grid import MAX_POINTS
+from ..config.input_names import is_input
 from ..config.tables import Output
 from ..errors import ImpactError, ResultError, UnfinishedError, UsageError, warn
 from ..formatting import argument, safe_text, type_of
@@ -206,6 +207,9 @@ def result_of(result: xr.Dataset | str | Path) -> xr.Dataset:
         raise TypeError(f"got {type_of(result)}, expected a dataset, or the file of a result")
     require_result(result)
     kind = kind_of(result)
+    # those of `reset_coords`
+    names = [name for name in result.data_vars if name in (*MODEL_METADATA, "exponent") or is_input(name)]
+    result = result.set_coords([name for name in names if name not in SCHEMA[kind]])
     # a calibration has the friction laws of its pairs along the models, and a history is of a single law
     for dim in {"sweep": ("friction", "model"), "history": ()}.get(kind, ("model",)):
         if dim in result.coords and result[dim].ndim == 0:
