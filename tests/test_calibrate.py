@@ -540,6 +540,24 @@ def test_what_is_determined_of_a_law_with_exponents_in_its_units_has_no_dimensio
     assert unidentified_notes(result) == [f"{key}: K, c: only (v0^2 c)/K is determined"]
 
 
+def test_only_what_the_data_determine_of_parameters_counts() -> None:
+    """Of K and C restitutions determine C/sqrt(K), and beside e nothing of K: n - 1 degrees of freedom remain."""
+    e, sigma = np.array([0.48, 0.5, 0.51, 0.49, 0.53]), 0.01
+    sweep = {**LINEAR["sweep"], "K": {"fit": [1e4, 1e8]}}
+    squares, half = 4.0 * e.var(ddof=1), stats.t.ppf(0.975, 4) * e.std(ddof=1) / math.sqrt(5.0)
+    given = {"columns": {"e_out": e.tolist(), "sigma": [sigma] * 5}}
+    of_spring = {"sweep": {**sweep, "e": 0.5}, "model": {"kelvin-voigt": {"C": {"fit": [1.0, 1e5]}}}}
+    fit = impact.calibrate({"models": "kelvin-voigt", **of_spring, "data": given})
+    assert fit["identifiable"].values.tolist() == [[0, 0]]
+    assert fit["chi2_reduced"].item() == pytest.approx(squares / sigma**2 / 4.0, rel=1e-7)
+    assert fit["p_value"].item() == pytest.approx(stats.chi2.sf(squares / sigma**2, 4), rel=1e-7)
+    likelihood = -0.5 * (squares / sigma**2 + 5.0 * math.log(2.0 * math.pi * sigma**2))
+    assert fit["aicc"].item() == pytest.approx(2.0 - 2.0 * likelihood + 4.0 / 3.0, rel=1e-7)
+    scaled = impact.calibrate({**LINEAR, "sweep": sweep, "data": {"columns": {"e_out": e.tolist()}}})
+    interval = [scaled[name].sel(parameter="e").item() for name in ("lower", "upper")]
+    assert interval == pytest.approx([e.mean() - half, e.mean() + half], abs=1e-6)
+
+
 @pytest.mark.slow
 def test_the_bytes_of_a_result_do_not_depend_on_the_number_of_processes(cli: Run, tmp_path: Path) -> None:
     laws = ("--set", 'models=["anagnostopoulos-1988", "hunt-crossley-1975"]', "--set", "solver.rtol=1e-6")

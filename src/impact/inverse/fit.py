@@ -463,8 +463,13 @@ class _Minimum:
         return np.asarray(~np.any(np.abs(self.unidentified) > PARTICIPATION_TOL, axis=0))
 
     @property
+    def determined(self) -> int:
+        """Count the independent combinations of parameters that the measurements determine."""
+        return self.problem.count - len(self.unidentified)
+
+    @property
     def freedom(self) -> int:
-        return self.problem.data.values.size - self.problem.count
+        return self.problem.data.values.size - self.determined
 
     @cached_property
     def variance_factors(self) -> tuple[float, float]:
@@ -483,7 +488,7 @@ class _Minimum:
     def aicc(self) -> float:
         """Compute the AICc of the largest likelihood with normal errors, or of a loss; NaN with too few points."""
         data, misfit = self.problem.data, self.objective
-        n, parameters = data.values.size, self.problem.count + (data.noise != "given")
+        n, parameters = data.values.size, self.determined + (data.noise != "given")
         if n - parameters - 1 <= 0:
             return math.nan
         if data.noise == "scale":
