@@ -707,6 +707,13 @@ def test_a_single_point_without_a_reference_is_drawn(tmp_path: Path) -> None:
 # options of the user
 
 
+def test_the_legend_has_the_size_that_the_user_gives_other_texts(coarse: xr.Dataset) -> None:
+    with matplotlib.rc_context({"font.size": 20.0}):
+        figure = impact.plot(coarse.isel(model=[0]), kind="restitution")
+    tick = figure.axes[0].get_xticklabels()[0]
+    assert figure.legends[0].get_texts()[0].get_fontsize() == tick.get_fontsize() > 16.0
+
+
 @pytest.mark.slow
 def test_the_style_of_the_user_is_respected(coarse: xr.Dataset, tmp_path: Path) -> None:
     assert impact.plot(coarse).axes[0].xaxis.label.get_fontsize() == 9.0
