@@ -638,7 +638,9 @@ def needed_parameter(
         nearby = collide_at(NEARBY * value)
         slope = math.log(nearby.contact_time / law.contact_time) / math.log(NEARBY)
     if abs(slope) < MIN_SLOPE:
-        raise UsageError(f"{argument('parameter')}: {name} does not set the contact time of {model.key}")
+        expected = time_parameter(config, model) or "materials.NAME.E"
+        message = f"{name} does not set the contact time of {model.key}, expected {expected}"
+        raise UsageError(f"{argument('parameter')}: {message}")
     for _ in range(MAX_SECANTS):
         needed = needed_steps(law, tol, MAX_SECANT_STEPS, needed)
         if needed is None:
