@@ -529,7 +529,8 @@ def test_the_command_judges_a_python_function_of_a_file(cli: Run) -> None:
 BAD_COMMANDS = {
     (): "expected the name of an engine",
     ("pymonk",): 'no adapter of an engine "pymonk"; did you mean "pymunk"?',
-    ("--adapter", "no_such_program"): 'no program "no_such_program"',
+    ("--adapter", "no_such_program"): 'no executable program "no_such_program"',
+    ("--adapter", str(EXAMPLES / "rigid.c")): f'no executable program "{EXAMPLES / "rigid.c"}"',
     ("--adapter", "nowhere.py:collide"): "nowhere.py: does not exist",
     ("--adapter", f"{EXAMPLES / 'rigid.py'}:colide"): "has no attribute 'colide'",
     ("--adapter", f"{EXAMPLES / 'rigid.py'}:collide", "--only", "slide"): 'no collision "slide"',

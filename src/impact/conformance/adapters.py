@@ -116,7 +116,7 @@ def _command(adapter: object) -> list[str]:
         raise AdapterError(f"{adapter}: {error}") from None
     program = find_program(words[0], None)
     if program is None:
-        raise AdapterError(f'no program "{words[0]}"; expected FILE.py:FUNCTION or "PROGRAM ARGUMENTS"')
+        raise AdapterError(f'no executable program "{words[0]}"; expected FILE.py:FUNCTION or "PROGRAM ARGUMENTS"')
     return [program, *words[1:]]
 
 
