@@ -707,6 +707,13 @@ def test_a_single_point_without_a_reference_is_drawn(tmp_path: Path) -> None:
 # options of the user
 
 
+def test_a_grid_is_faint_on_the_background_of_the_user(coarse: xr.Dataset, tmp_path: Path) -> None:
+    (tmp_path / "dark.mplstyle").write_text("axes.facecolor: black\ntext.color: white\n", encoding="utf-8")
+    for style, colour in ((None, "#e6e6e6"), (tmp_path / "dark.mplstyle", "#1a1a1a"), ("ggplot", "#ffffff")):
+        (line, *_) = impact.plot(coarse, kind="restitution", style=style).axes[0].get_xgridlines()
+        assert matplotlib.colors.to_hex(line.get_color()) == colour
+
+
 def test_the_legend_has_the_size_that_the_user_gives_other_texts(coarse: xr.Dataset) -> None:
     with matplotlib.rc_context({"font.size": 20.0}):
         figure = impact.plot(coarse.isel(model=[0]), kind="restitution")

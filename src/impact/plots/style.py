@@ -53,8 +53,9 @@ def styled(style: str | Path | None = None) -> Iterator[None]:
     with DRAWING:
         unchanged = {key: value for key, value in ours.items() if rcParams[key] == rcParamsDefault[key]}
         with matplotlib.rc_context({**unchanged, **_style_of(style)}):
-            # styles that have no grid may give it the colour of texts, such as dark_background
-            if to_rgb(rcParams["grid.color"]) == to_rgb(rcParams["text.color"]):
+            # faint on any background; styles that have no grid may give it the colour of texts, as dark_background
+            unset = rcParamsDefault["grid.color"], rcParams["text.color"]
+            if to_rgb(rcParams["grid.color"]) in map(to_rgb, unset):
                 rcParams["grid.color"] = tint(0.1)
             try:
                 Figure().draw_without_rendering()
