@@ -24,7 +24,7 @@ def read(name: str) -> str:
     return (ROOT / name).read_text(encoding="utf-8")
 
 
-def test_the_recipe_has_the_version_the_dependencies_and_the_program_of_the_package() -> None:
+def test_the_recipe_has_the_version_the_dependencies_and_the_programs_of_the_package() -> None:
     recipe = read("recipe/meta.yaml")
     template, settings = re.subn(r"^{% set version = .* %}$", "", recipe, flags=re.MULTILINE)
     assert settings == 1
@@ -36,7 +36,7 @@ def test_the_recipe_has_the_version_the_dependencies_and_the_program_of_the_pack
     expected = {re.sub(r"^matplotlib>", "matplotlib-base>", name) for name in PROJECT["dependencies"]}
     expected.add(f"python{PROJECT['requires-python']}")
     assert {name.replace(" ", "") for name in values["requirements"]["run"]} == expected
-    assert values["build"]["entry_points"] == [f"impact = {PROJECT['scripts']['impact']}"]
+    assert values["build"]["entry_points"] == [f"{name} = {PROJECT['scripts'][name]}" for name in PROJECT["scripts"]]
     assert (values["about"]["summary"], values["about"]["license"]) == (PROJECT["description"], PROJECT["license"])
 
 
