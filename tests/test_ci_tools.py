@@ -239,6 +239,22 @@ def test_speed(impact_regression, v1):
 
 
 @pytest.mark.slow
+def test_the_command_of_a_failure_runs_where_pytest_ran(project: Path, entry_points: Path) -> None:
+    (project / "pytest.ini").write_text("[pytest]\n", encoding="utf-8")
+    folder = project / "tests"
+    failed = run_pytest(folder, entry_points, "-k", "mapping and hertz")
+    command = shlex.split(failed.stdout.partition("to accept the new result: pytest ")[2].partition("\n")[0])
+    assert command[0] == "test_contact.py::test_mapping[hertz]"
+    (folder / "baselines").touch()
+    refused = run_pytest(folder, entry_points, *command)
+    assert f"File exists: '{folder / 'baselines'}'" in refused.stdout
+    # one line, not a traceback through the package
+    assert "pytest_plugin.py" not in refused.stdout
+    (folder / "baselines").unlink()
+    assert run_pytest(folder, entry_points, *command).returncode == 0
+
+
+@pytest.mark.slow
 def test_a_baseline_is_rewritten_only_if_it_differs(project: Path, entry_points: Path) -> None:
     baseline = project / "baselines" / "contact.h5"
     select = ("-k", "test_config and not overrides")

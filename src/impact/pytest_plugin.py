@@ -136,7 +136,7 @@ class ImpactRegression:
             if not path.exists():
                 path = self._baseline_with_old_name(path, is_default=baseline is None)
             verdict = impact.compare(new, path, tol=tol, subset=subset)
-        except impact.ImpactError as error:
+        except (impact.ImpactError, OSError) as error:
             raise pytest.fail.Exception(str(error), pytrace=False) from None
         if not verdict.equal:
             hint = self._hint("why the numbers change")
@@ -232,7 +232,10 @@ class ImpactRegression:
 
     def _hint(self, reason: str) -> str:
         """How to accept the new result."""
-        test = shlex.quote(self.request.node.nodeid)
+        path, folder = self.request.path, self.request.config.invocation_params.dir
+        file = path.relative_to(folder) if path.is_relative_to(folder) else path
+        # a node id starts at the rootdir, an argument of pytest at the working directory
+        test = shlex.quote(f"{file}::{self.request.node.nodeid.partition('::')[2]}")
         return f'to accept the new result: pytest {test} --impact-bless "{reason}"'
 
 
