@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -60,12 +59,12 @@ class Rebound:
         """1 of ball 1 and -1 of ball 2."""
         return np.array([1.0, -1.0])[: self.m.size]
 
-    @cached_property
+    @property
     def m_n(self) -> float:
         """Effective mass [kg]."""
         return 1.0 / float(sum(1.0 / self.m))
 
-    @cached_property
+    @property
     def m_t(self) -> float:
         """Effective tangential mass [kg]."""
         return float(1.0 / (1.0 / self.m_n + sum(self.R**2 / self.inertia)))
@@ -93,7 +92,7 @@ class Rebound:
         """The impulses on ball 1 along the normal and the tangent [N s], from the motion of each ball."""
         return self.sides * self.m * (self.before - self.after)[:2]
 
-    @cached_property
+    @property
     def speed(self) -> float:
         """The speed to which differences are relative [m/s]: v0 + |g0|, else the largest before.
 
