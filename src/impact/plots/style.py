@@ -21,7 +21,7 @@ from matplotlib import rc_params_from_file, rcParams, rcParamsDefault
 from matplotlib.colors import to_rgb, to_rgba
 from matplotlib.figure import Figure
 
-from ..atomic import write_file
+from ..atomic import PICTURE_SUFFIXES, write_file
 from ..contact.frictions import frictions
 from ..contact.models import catalogue
 from ..errors import UsageError
@@ -36,7 +36,6 @@ DASHES = ("-", (0, (6, 1.5)), (0, (3, 1.2)), (0, (6, 1.5, 1, 1.5)), (0, (1.2, 1.
 HATCHES = ("", "////", "....", "\\\\\\\\", "xxxx", "----", "oo", "||||")
 # without dates in the metadata a picture has the same bytes each time
 METADATA = {"svg": dict.fromkeys(("Date", "Creator", "Format", "Type")), "pdf": {"CreationDate": None}}
-FORMATS = ("png", "svg", "pdf", "eps", "pgf", "gif")
 FRAMES_PER_SECOND = 20
 # values are equal that differ by less, relative to the largest
 FLAT = 1e-6
@@ -164,8 +163,8 @@ def is_geometric(values: np.ndarray) -> bool:
 def check_picture(path: Path) -> str:
     """Find the format of a picture from the ending of its name, and check that it can be written."""
     kind = path.suffix.lower().removeprefix(".")
-    if kind not in FORMATS:
-        *most, last = (f".{name}" for name in FORMATS)
+    if f".{kind}" not in PICTURE_SUFFIXES:
+        *most, last = PICTURE_SUFFIXES
         raise UsageError(f"{path}: expected a name that ends in {', '.join(most)} or {last}")
     latex = str(rcParams["pgf.texsystem"])
     if kind == "pgf" and shutil.which(latex) is None:
@@ -176,7 +175,7 @@ def check_picture(path: Path) -> str:
 
 
 def encoded(figure: Figure, kind: str, style: str | Path | None = None) -> bytes:
-    """Encode a figure in one of FORMATS; the bytes are the same each time."""
+    """Encode a figure in a format of PICTURE_SUFFIXES; the bytes are the same each time."""
     if kind == "gif":
         return _encoded_frames(figure, style)
     buffer = io.BytesIO()
