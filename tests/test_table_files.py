@@ -87,6 +87,16 @@ def test_all_numbers_of_a_picture_have_the_comma(stored: Path) -> None:
     assert any("1,5" in text for text in texts)
 
 
+def test_texts_of_the_user_keep_their_points_beside_numbers_with_commas(stored: Path) -> None:
+    _, ax = plt.subplots()
+    ax.set_title("Version 1.5")
+    impact.plot(impact.load(stored), kind="restitution", decimal="comma", ax=ax)
+    ax.figure.draw_without_rendering()
+    assert ax.get_title() == "Version 1.5"
+    assert "0,2" in [text.get_text() for text in ax.get_yticklabels()]
+    plt.close(ax.figure)
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="the locale is not that of the environment")
 def test_the_locale_chooses_the_decimal_separator_and_is_not_changed(monkeypatch: pytest.MonkeyPatch) -> None:
     for name, decimal in (("C", "point"), ("no_SUCH.locale", "point"), ("de_DE.utf8", "comma")):

@@ -249,6 +249,8 @@ def _draw_panels(
 ) -> LegendEntries:
     """Draw the panels, with the decimal separator of the look; returns handles and names of the legend."""
     before = list(all_axes[0].figure.axes)
+    # of the user
+    texts = {text: text.get_text() for axes in all_axes for text in axes.get_children() if isinstance(text, Text)}
     entries = plot_data.draw(all_axes, labels, points)
     if look.decimal == "point":
         return entries
@@ -256,7 +258,7 @@ def _draw_panels(
     for axes in (*all_axes, *colour_bars):
         # names of panels as well
         for text in axes.get_children():
-            if isinstance(text, Text):
+            if isinstance(text, Text) and text.get_text() != texts.get(text):
                 text.set_text(with_comma(text.get_text()))
         for axis in (axes.xaxis, axes.yaxis):
             axis.set_major_formatter(FuncFormatter(partial(tick_with_comma, axis.get_major_formatter())))
