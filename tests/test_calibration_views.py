@@ -161,6 +161,14 @@ def test_a_report_shows_the_picture(drops: xr.Dataset) -> None:
     assert page.count("<img") == 1
 
 
+@pytest.mark.parametrize(("loss", "has_p"), [("linear", True), ("huber", False)])
+def test_a_report_has_a_column_of_p_where_a_law_has_one(loss: str, has_p: bool) -> None:
+    changes = ['models=["hunt-crossley-1975"]', f'data.loss="{loss}"', *QUICK]
+    page = impact.report(impact.calibrate(FOLDER / "drops.toml", overrides=changes))
+    headings = re.findall(r"<th[^>]*>([^<]*)</th>", page)
+    assert ("p" in headings, "AICc" in headings) == (has_p, True)
+
+
 @pytest.mark.slow
 def test_commands_that_take_a_sweep_refuse_a_calibration_in_one_line(
     cli: Run, drops: xr.Dataset, tmp_path: Path

@@ -35,7 +35,7 @@ from ..formatting import argument, law_name, number, prefixed, safe_text, scaled
 from ..plots.slices import varying_inputs
 from ..results.attributes import read_attribute
 from ..results.board import BOARD_HEADINGS, Board, board_rows, check_rows, engine_headline, failure_lines
-from ..results.calibration import FIT_HEADINGS, calibration_title, describe_data, fit_notes, fit_rows
+from ..results.calibration import calibration_title, describe_data, fit_notes, fit_table
 from ..results.provenance import stored_config
 from ..results.ranking import DEFAULT_TOL, Ranking, rank_laws
 from ..results.schema import FIT_STATUSES, MODEL_METADATA, count_points, exponents_of, kind_of, require_axes
@@ -237,9 +237,10 @@ def page_title(dataset: xr.Dataset) -> str:
 
 def _fits_section(dataset: xr.Dataset) -> dict[str, Any]:
     """Rank the laws of a calibration; explain what the data do not determine, and the columns."""
+    headings, rows = fit_table(dataset)
     return {
-        "headings": list(FIT_HEADINGS),
-        "rows": [[row[0] or "″", *row[1:]] for row in fit_rows(dataset)],
+        "headings": headings,
+        "rows": [[row[0] or "″", *row[1:]] for row in rows],
         "notes": fit_notes(dataset),
         "statuses": [f"{name}: {meaning}" for name, meaning in FIT_STATUSES.items() if name != "ok"],
     }

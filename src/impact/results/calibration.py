@@ -90,6 +90,14 @@ def fit_rows(dataset: xr.Dataset) -> list[tuple[str, ...]]:
     return rows
 
 
+def fit_table(dataset: xr.Dataset) -> tuple[list[str], list[list[str]]]:
+    """Write the headings and rows of the table of a calibration; without p where no law has one."""
+    rows, p = fit_rows(dataset), FIT_HEADINGS.index("p")
+    # no law has one without a stated noise, or in a file of version 1.0.0
+    shown = [i for i in range(len(FIT_HEADINGS)) if i != p or {row[p] for row in rows} - {"", "–"}]
+    return [FIT_HEADINGS[i] for i in shown], [[row[i] for i in shown] for row in rows]
+
+
 def _own_name(law: str, path: str) -> str:
     """Write the path of a parameter, its name alone in [sweep] and in the table of a law of its own."""
     tables = ("sweep.", *map("{}.{}.".format, ("model", "friction"), law_keys(law)))
@@ -235,10 +243,8 @@ class Fits(DisplayedDataset):
         """A row for each law and parameter, and what to know besides."""
         yield describe_data(self.dataset)
         yield ""
-        rows, p = fit_rows(self.dataset), FIT_HEADINGS.index("p")
-        # no law has one without a stated noise, or in a file of version 1.0.0
-        shown = [i for i in range(len(FIT_HEADINGS)) if i != p or {row[p] for row in rows} - {"", "–"}]
-        yield Table([[row[i] for i in shown] for row in rows], [FIT_HEADINGS[i] for i in shown], text=(0, 1, -1))
+        headings, rows = fit_table(self.dataset)
+        yield Table(rows, headings, text=(0, 1, -1))
         yield from fit_notes(self.dataset)
 
 
