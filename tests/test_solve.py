@@ -44,6 +44,18 @@ def test_the_damping_ratio_of_a_linear_contact_depends_on_no_speed(speed: float)
 
 
 @pytest.mark.slow
+def test_a_target_that_only_impacts_of_many_steps_reach_is_attained() -> None:
+    """The more damping the longer such a contact lasts, and its integration takes more steps than a scan."""
+    model, at = "lammps-viscoelastic-hooke", {"v1": 5.356721}
+    solver = ["solver.rtol=1e-6", "solver.max_steps=1500"]
+    solved = impact.solve(model, "eta", {"contact_time": 4e-3}, at=at, overrides=solver)
+    at["eta"] = solved.roots[0].value
+    problem = impact.prepare(model=model, at=at, outputs="contact_time", overrides=solver)
+    assert problem()["contact_time"] == pytest.approx(4e-3, rel=1e-5)
+    assert solved.attainable[1] >= 4e-3
+
+
+@pytest.mark.slow
 def test_a_root_agrees_with_the_closed_form_of_the_linear_dashpot() -> None:
     (root,) = impact.solve("kelvin-voigt", "C", {"e_out": 0.6}, at={"m1": 1.0, "m2": 1.0}).roots
     stiffness = impact.run(model="kelvin-voigt", overrides=[f"model.kelvin-voigt.C={root.value!r}"]).values[

@@ -503,6 +503,11 @@ def _roots_and_values(
         known_scan, known_values = interpolant.samples()
         scan = scan[np.isnan(interpolant(scan)[:, 0])]
     values = problem.evaluate(scan, is_scan=True)[problem.variable] if scan.size else np.zeros(0)
+    failed = np.isnan(values)
+    reached = np.append(known_values, values[~failed])
+    if with_range and failed.any() and not (reached.size and reached.min() <= target <= reached.max()):
+        # the scan gave up what takes more steps than others, and the target may be there
+        values[failed] = problem.evaluate(scan[failed])[problem.variable]
     # a value at which the integration fails, often for want of steps, hides no root between its neighbours
     scan, values = scan[~np.isnan(values)], values[~np.isnan(values)]
     if not scan.size + known_scan.size:
