@@ -480,8 +480,8 @@ def test_a_file_of_version_1_is_refused_and_the_command_that_replaces_it_is_name
     old.to_netcdf(tmp_path / "old.h5", engine="h5netcdf")
     assert (tmp_path / "old.h5").read_bytes().startswith(b"\x89HDF\r\n\x1a\n")
     message = (
-        "old.h5: is of schema version 1, or no result of impact; expected version 2: sweep its config again: "
-        "impact sweep CONFIG.toml -o RESULT --overwrite\n"
+        "old.h5: is of schema version 1, or no result of impact, such as a file of to_netcdf in place of "
+        "impact.save; expected version 2: sweep its config again: impact sweep CONFIG.toml -o RESULT --overwrite\n"
     )
     for command in commands:
         done = cli(command[0], "old.h5", *command[1:], cwd=tmp_path)

@@ -89,7 +89,8 @@ def check_seal(path: Path) -> str:
         header = file.read(USER_BLOCK_BYTES)
         if header.startswith(HDF5_MAGIC):
             raise ResultError(
-                f"is of schema version 1, or no result of impact; expected version {SCHEMA_VERSION}: {SWEEP_AGAIN}"
+                "is of schema version 1, or no result of impact, such as a file of to_netcdf in place of "
+                f"impact.save; expected version {SCHEMA_VERSION}: {SWEEP_AGAIN}"
             )
         if not header.startswith(RESULT_MAGIC):
             no_result = "is not a readable result (it does not begin with the header of a sealed file)"
