@@ -36,7 +36,8 @@ def test_the_recipe_has_the_version_the_dependencies_and_the_programs_of_the_pac
     expected = {re.sub(r"^matplotlib>", "matplotlib-base>", name) for name in PROJECT["dependencies"]}
     expected.add(f"python{PROJECT['requires-python']}")
     assert {name.replace(" ", "") for name in values["requirements"]["run"]} == expected
-    assert values["build"]["entry_points"] == [f"{name} = {PROJECT['scripts'][name]}" for name in PROJECT["scripts"]]
+    scripts = [f"{name} = {function}" for name, function in PROJECT["scripts"].items()]
+    assert values["build"]["entry_points"] == scripts
     assert (values["about"]["summary"], values["about"]["license"]) == (PROJECT["description"], PROJECT["license"])
 
 
