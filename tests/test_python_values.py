@@ -208,6 +208,9 @@ def test_a_data_array_has_the_unit_of_its_attribute() -> None:
         impact.sweep(BASE, m1=table["v1"])
     stiffness = xr.DataArray([1e9, 2e9], attrs={"units": "N m-1.5"})
     assert impact.sweep(BASE, K=stiffness)["K"].values.tolist() == [1e9, 2e9]
+    assert impact.sweep(BASE, K=stiffness.assign_attrs(units="mN m-1.5"))["K"].values.tolist() == [1e6, 2e6]
+    with pytest.raises(impact.ConfigError, match=r"got .1000000000\.0 N m-1\.5., expected a unit of m/s"):
+        impact.sweep(BASE, v1=stiffness)
     with pytest.raises(impact.ConfigError, match='"foo" is not a known unit'):
         impact.sweep(BASE, v1=table["v1"].assign_attrs(units="foo"))
 

@@ -54,7 +54,7 @@ _DIGITS = r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
 NUMBER_SYNTAX = re.compile(rf"\s*([-+]?(?:{_DIGITS}|inf\b|nan\b))\s*(.*?)\s*")
 # names with small exponents and one level of brackets: no expression that takes long to evaluate
 _SIGNED = r"-?[0-9]{1,2}(?:\.[0-9]{1,6})?"
-_POWER = rf"(?:\s*(?:\^|\*\*)\s*(?:{_SIGNED}|\(-?[0-9]{{1,2}}(?:[./][0-9]{{1,6}})?\))|-?[0-9]{{1,2}}|⁻?[⁰¹²³⁴-⁹])?"
+_POWER = rf"(?:\s*(?:\^|\*\*)\s*(?:{_SIGNED}|\(-?[0-9]{{1,2}}(?:[./][0-9]{{1,6}})?\))|{_SIGNED}|⁻?[⁰¹²³⁴-⁹])?"
 _LETTERS = "A-Za-zµμΩ°Å%_"
 _FACTOR = rf"(?:1|[{_LETTERS}]+{_POWER})"
 _PRODUCT = rf"{_FACTOR}(?:\s*[*/·]\s*{_FACTOR}|\s+{_FACTOR})*+"
@@ -569,14 +569,14 @@ def is_unit(text: str) -> bool:
 def differs_from_si(text: str) -> bool:
     """Check whether a text is a unit in which numbers are not those in SI, or no unit.
 
-    Units of results, such as "N m-n" and "N m-1.5", are in SI.
+    Units of results with a name in an exponent, such as "N m-n", are in SI.
 
     >>> differs_from_si("cm/s"), differs_from_si("m s-1"), differs_from_si("N m-n"), differs_from_si("foo")
     (True, False, False, True)
     """
     scale = _si_scale(text)
     if scale is None:
-        return text not in ("", "-") and re.search(r"[-^]([A-Za-z(]|[0-9]+\.)", text) is None
+        return text not in ("", "-") and re.search(r"[-^][A-Za-z(]", text) is None
     return scale[0] != 1
 
 
