@@ -335,8 +335,7 @@ def iterate_choices(dataset: xr.Dataset, keys: Sequence[str]) -> Iterator[Figure
         dims = [axes[name].dims[0] for name in inputs if name in axes and name not in (choice.sel or {})]
         position = _first_answered_index(dataset, keys, [*dims, *({SAMPLE} & {*kind.along})])
         if is_motion and choice.x:
-            values = axes[choice.x].values
-            position[dims[0]] = int(np.argsort(values, kind="stable")[values.size // 2])
+            position[dims[0]] = _answered_near_middle(dataset.isel(position), kind, axes[choice.x])
         choice = replace(choice, x=None if is_motion else choice.x, sel=None)
         yield _plan_at(dataset, FigurePlan(kind, choice, {}), position)
 
@@ -347,6 +346,17 @@ def _inputs_at(dataset: xr.Dataset, position: Position) -> dict[str, float | str
     inputs = {name: dataset[name].values[position[dim]].item() for dim in names for name in names[dim]}
     # a missing number is not an input
     return {name: value for name, value in inputs.items() if value == value}
+
+
+def _answered_near_middle(dataset: xr.Dataset, kind: Kind, axis: xr.DataArray) -> int:
+    """Find the index nearest the middle of an axis at which a law has an answer, and with friction a slip."""
+    order, (dim,) = np.argsort(axis.values, kind="stable"), axis.dims
+    indices = order[np.argsort(np.abs(np.arange(order.size) - order.size // 2), kind="stable")]
+    values = dataset.get("beta" if kind.of_friction else "status")
+    if values is not None and dim in values.dims:
+        answered = values.notnull() if kind.of_friction else (values < FIRST_FAILURE) & (values != NO_IMPACT)
+        indices = indices[answered.any(set(answered.dims) - {dim}).values[indices]] if answered.any() else indices
+    return int(indices[0])
 
 
 def _first_answered_index(
