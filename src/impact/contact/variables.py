@@ -159,7 +159,9 @@ OUTPUTS = by_name(
     Variable("e_kinetic", "kinetic restitution; the impulses are the changes of the momentum, so that it is e_out",
              _POINTS, "1", "1", "τ_r/τ_c  (2)",
              symbol=r"e_\mathrm{kinetic}", measured="fraction", on_request=True),
-    Variable("e_energetic", "energetic restitution, from the integrated works of the two phases",
+    Variable("e_energetic",
+             "energetic restitution, from the integrated works of the two phases; a root, so that its error is "
+             "about sqrt(rtol) at small e",
              _POINTS, "1", "1", "√(-W_r/W_c)  (3)",
              symbol=r"e_\mathrm{energetic}", measured="fraction", on_request=True),
     Variable("lambda", "damping factor, where the law has one; n is the coordinate exponent",
