@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 import errno
-import importlib.util
 import inspect
 import io
 import itertools
@@ -746,14 +745,17 @@ def test_a_setting_of_matplotlib_that_allows_no_picture_is_reported(
     assert (done.returncode, done.stderr) == (2, f"{problem}\n")
 
 
-def test_a_library_that_refuses_the_environment_is_reported(cli: Run, stored: Path, small: Path) -> None:
+def test_a_backend_that_matplotlib_does_not_have_is_reported(cli: Run, stored: Path) -> None:
     done = cli("plot", stored, MPLBACKEND="none such")
     assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)
     assert done.stderr.startswith("matplotlib cannot be imported: ValueError: Key backend: 'none such' is not")
-    if importlib.util.find_spec("numba"):
-        done = cli("sweep", small, "--set", 'solver.core="numba"', NUMBA_NUM_THREADS="0")
-        reason = "ValueError: Number of threads specified must be > 0."
-        assert (done.returncode, done.stderr) == (2, f"numba cannot be imported: {reason}\n")
+
+
+def test_a_number_of_threads_that_numba_refuses_is_reported(cli: Run, small: Path) -> None:
+    pytest.importorskip("numba")
+    done = cli("sweep", small, "--set", 'solver.core="numba"', NUMBA_NUM_THREADS="0")
+    reason = "ValueError: Number of threads specified must be > 0."
+    assert (done.returncode, done.stderr) == (2, f"numba cannot be imported: {reason}\n")
 
 
 @pytest.mark.slow

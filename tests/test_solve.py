@@ -45,7 +45,7 @@ def test_the_damping_ratio_of_a_linear_contact_depends_on_no_speed(speed: float)
 
 @pytest.mark.slow
 def test_a_target_that_only_impacts_of_many_steps_reach_is_attained() -> None:
-    """The more damping the longer such a contact lasts, and its integration takes more steps than a scan."""
+    """The more damping the longer a contact lasts, and its integration takes more steps than a scan allows."""
     model, at = "lammps-viscoelastic-hooke", {"v1": 5.356721}
     solver = ["solver.rtol=1e-6", "solver.max_steps=1500"]
     solved = impact.solve(model, "eta", {"contact_time": 4e-3}, at=at, overrides=solver)

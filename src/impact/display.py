@@ -86,7 +86,7 @@ class Table:
         ]
         texts = ([cell.plain for cell in row] for row in rows)
         columns = list(itertools.zip_longest(self.headings, *texts, fillvalue=""))
-        for part in self._parts(columns, console.width):
+        for index, part in enumerate(self._parts(columns, console.width)):
             table = RichTable(box=None, pad_edge=False, header_style="bold", show_header=bool(self.headings))
             for position, width in zip(part, self._widths(columns, part, console.width), strict=True):
                 is_text = not self.headings or position in self.text or position - len(columns) in self.text
@@ -95,12 +95,12 @@ class Table:
                 )
             for row in rows:
                 table.add_row(*(row[position] for position in part if position < len(row)))
-            if 0 < len(part) <= part[-1]:
+            if index:
                 console.print()
             console.print(table)
 
     def _parts(self, columns: Sequence[Sequence[str]], width: int) -> Iterator[Sequence[int]]:
-        """Split columns whose words have no room, as pandas does: the first column is in each part."""
+        """Split columns under headings whose words have no room, as pandas does; each part has the first one."""
         from rich.cells import cell_len
 
         if not self.headings or None not in self._widths(columns, range(len(columns)), width):

@@ -148,21 +148,22 @@ def _exit_code(command: Callable[[], object], *, debug: bool) -> int:
         if isinstance(error, OSError) and (error.errno in WRITE_ERRNOS or lacks_folder):
             print_line(f"cannot write: {error.strerror}", error=True)
             return EXIT_STORAGE
-        library, what = _library_at_import(error), safe_text(f"{type(error).__name__}: {error}")
+        library, reason = _library_at_import(error), safe_text(f"{type(error).__name__}: {error}")
         if debug:
             for line in traceback.format_exc().splitlines():
                 print_line(line)
         elif library:
-            print_line(f"{library} cannot be imported: {what}", error=True)
+            print_line(f"{library} cannot be imported: {reason}", error=True)
         else:
-            print_line(f"internal error: {what}; report: {_write_traceback()}; --debug shows it", error=True)
+            print_line(f"internal error: {reason}; report: {_write_traceback()}; --debug shows it", error=True)
         return EXIT_USAGE if library else EXIT_INTERNAL
 
 
 def _library_at_import(error: BaseException) -> str | None:
     """Find the library whose import failed, such as one that refuses an environment variable."""
     frames = (frame for frame, _ in traceback.walk_tb(error.__traceback__) if frame.f_code.co_name == "<module>")
-    names = (str(frame.f_globals["__name__"]).partition(".")[0] for frame in frames)
+    # code of exec and eval has this name, too, but belongs to no module that is imported
+    names = (frame.f_globals["__name__"].partition(".")[0] for frame in frames if frame.f_globals.get("__spec__"))
     return next((name for name in names if name != "impact"), None)
 
 

@@ -42,9 +42,10 @@ STATUS_OF_TERMINATION = np.array(
 STEPS_PER_CONTACT, STEP, PHASE = "sweep.steps_per_contact", "sweep.dt", "sweep.phase"
 # the contact time of a linear spring, in the contact's unit of time
 LINEAR_CONTACT_TIME = np.pi
-# the part of the recovered indentation down to which an end at zero force is looked for that no step has seen, and
-# parts of the s there at which the force is averaged
-HIDDEN_END, HIDDEN_END_BISECTIONS, HIDDEN_PARTS = 1e-12, 60, (np.arange(8.0) + 0.5) / 8.0
+# an end at zero force between two steps is searched for down to this part of the recovered indentation
+HIDDEN_END, HIDDEN_END_BISECTIONS = 1e-12, 60
+# parts of the s of that end at which the force beyond it is averaged
+HIDDEN_PARTS = (np.arange(8.0) + 0.5) / 8.0
 
 # arrays that a law needs, by name, in the contact's own units
 ValueArrays = Mapping[str, Array]

@@ -463,13 +463,13 @@ class _Minimum:
         return np.asarray(~np.any(np.abs(self.unidentified) > PARTICIPATION_TOL, axis=0))
 
     @property
-    def determined(self) -> int:
+    def n_determined(self) -> int:
         """Count the independent combinations of parameters that the measurements determine."""
         return self.problem.count - len(self.unidentified)
 
     @property
     def freedom(self) -> int:
-        return self.problem.data.values.size - self.determined
+        return self.problem.data.values.size - self.n_determined
 
     @cached_property
     def variance_factors(self) -> tuple[float, float]:
@@ -488,8 +488,8 @@ class _Minimum:
     def aicc(self) -> float:
         """Compute the AICc of the largest likelihood with normal errors, or of a loss; NaN with too few points."""
         data, misfit = self.problem.data, self.objective
-        n, parameters = data.values.size, self.determined + (data.noise != "given")
-        if n - parameters - 1 <= 0:
+        n, parameters = data.values.size, self.n_determined + (data.noise != "given")
+        if not self.problem.is_determined or n - parameters - 1 <= 0:
             return math.nan
         if data.noise == "scale":
             # that of the largest likelihood
@@ -622,7 +622,7 @@ class _Minimum:
             )
             half_width = t_quantile(degrees_of_freedom(variance, spread)) * np.sqrt(variance)
         # a robust loss allows residuals that the noise alone does not give
-        has_p = data.noise == "given" and data.loss == "linear"
+        has_p = problem.is_determined and data.noise == "given" and data.loss == "linear"
         left_out = (data.values - np.array(predictions)) / data.sigma if predictions else np.array([np.nan])
         return Fit(
             status=self._status(),
@@ -637,7 +637,7 @@ class _Minimum:
             jacobian=jacobian,
             other_predicted=self.all_predicted[data.values.size :],
             other_half_width=half_width,
-            chi2_reduced=squares / self.freedom if self.freedom > 0 else math.nan,
+            chi2_reduced=squares / self.freedom if data.values.size > problem.count else math.nan,
             p_value=float(chi2.sf(squares, self.freedom)) if has_p else math.nan,
             excess=best.excess,
             aicc=self.aicc,

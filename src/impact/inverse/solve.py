@@ -504,9 +504,10 @@ def _roots_and_values(
         scan = scan[np.isnan(interpolant(scan)[:, 0])]
     values = problem.evaluate(scan, is_scan=True)[problem.variable] if scan.size else np.zeros(0)
     failed = np.isnan(values)
-    reached = np.append(known_values, values[~failed])
-    if with_range and failed.any() and not (reached.size and reached.min() <= target <= reached.max()):
-        # the scan gave up what takes more steps than others, and the target may be there
+    computed = np.append(known_values, values[~failed])
+    is_beyond = not (computed.size and computed.min() <= target <= computed.max())
+    if with_range and failed.any() and is_beyond and (problem.variable != "e_out" or 0.0 <= target <= 1.0):
+        # the scan stops at SCAN_MAX_STEPS: impacts of more steps may attain the target
         values[failed] = problem.evaluate(scan[failed])[problem.variable]
     # a value at which the integration fails, often for want of steps, hides no root between its neighbours
     scan, values = scan[~np.isnan(values)], values[~np.isnan(values)]

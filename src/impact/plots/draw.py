@@ -249,7 +249,7 @@ def _draw_panels(
 ) -> LegendEntries:
     """Draw the panels, with the decimal separator of the look; returns handles and names of the legend."""
     before = list(all_axes[0].figure.axes)
-    # of the user
+    # texts of the axes of a user keep their points
     texts = {text: text.get_text() for axes in all_axes for text in axes.get_children() if isinstance(text, Text)}
     entries = plot_data.draw(all_axes, labels, points)
     if look.decimal == "point":

@@ -18,6 +18,7 @@ from typing import Any
 import matplotlib
 import numpy as np
 from matplotlib import rc_params_from_file, rcParams, rcParamsDefault
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb, to_rgba
 from matplotlib.figure import Figure
 
@@ -52,12 +53,13 @@ def styled(style: str | Path | None = None) -> Iterator[None]:
     with DRAWING:
         unchanged = {key: value for key, value in ours.items() if rcParams[key] == rcParamsDefault[key]}
         with matplotlib.rc_context({**unchanged, **_style_of(style)}):
-            # faint on any background; styles that have no grid may give it the colour of texts, as dark_background
+            # the grid is faint where no style sets its colour; dark_background gives it that of texts
             unset = rcParamsDefault["grid.color"], rcParams["text.color"]
             if to_rgb(rcParams["grid.color"]) in map(to_rgb, unset):
                 rcParams["grid.color"] = tint(0.1)
             try:
-                Figure().draw_without_rendering()
+                # a small one, whatever the size and the format of pictures
+                FigureCanvasAgg(Figure(figsize=(1.0, 1.0))).get_renderer()
             except ValueError as error:
                 raise UsageError(f"the settings of matplotlib allow no figure: {error}") from None
             try:

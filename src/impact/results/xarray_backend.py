@@ -207,7 +207,7 @@ def result_of(result: xr.Dataset | str | Path) -> xr.Dataset:
         raise TypeError(f"got {type_of(result)}, expected a dataset, or the file of a result")
     require_result(result)
     kind = kind_of(result)
-    # those of `reset_coords`
+    # `reset_coords` has made variables of them
     names = [name for name in result.data_vars if name in (*MODEL_METADATA, "exponent") or is_input(name)]
     result = result.set_coords([name for name in names if name not in SCHEMA[kind]])
     # a calibration has the friction laws of its pairs along the models, and a history is of a single law
