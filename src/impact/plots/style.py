@@ -18,7 +18,6 @@ from typing import Any
 import matplotlib
 import numpy as np
 from matplotlib import rc_params_from_file, rcParams, rcParamsDefault
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb, to_rgba
 from matplotlib.figure import Figure
 
@@ -59,7 +58,7 @@ def styled(style: str | Path | None = None) -> Iterator[None]:
                 rcParams["grid.color"] = tint(0.1)
             try:
                 # a small one, whatever the size and the format of pictures
-                FigureCanvasAgg(Figure(figsize=(1.0, 1.0))).get_renderer()
+                Figure(figsize=(1.0, 1.0)).savefig(io.BytesIO(), format="raw", dpi="figure")
             except ValueError as error:
                 raise UsageError(f"the settings of matplotlib allow no figure: {error}") from None
             try:
