@@ -439,7 +439,7 @@ def solve_phases(
 
 
 def _end_at_zero_force(phases: Phases) -> None:
-    """Move ends at zero indentation to where the force vanished, if it pulls in a part that no step has seen."""
+    """Move ends at zero indentation to where the force vanished before, if that was inside the last step."""
     law, solution = motion.restitution_law(phases.law), phases.restitution
     if solution is None or law.model.release != "force":
         return

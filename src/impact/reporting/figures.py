@@ -355,7 +355,8 @@ def _answered_near_middle(dataset: xr.Dataset, kind: Kind, axis: xr.DataArray) -
     values = dataset.get("beta" if kind.of_friction else "status")
     if values is not None and dim in values.dims:
         answered = values.notnull() if kind.of_friction else (values < FIRST_FAILURE) & (values != NO_IMPACT)
-        indices = indices[answered.any(set(answered.dims) - {dim}).values[indices]] if answered.any() else indices
+        has_answer = answered.any(set(answered.dims) - {dim}).values[indices]
+        indices = indices[has_answer] if has_answer.any() else indices
     return int(indices[0])
 
 
