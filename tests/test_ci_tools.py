@@ -396,7 +396,8 @@ def test_the_action_executes_no_module_of_the_checkout(tmp_path: Path) -> None:
     assert imported.exists()
     imported.unlink()
     # pip finds no package and fails; the other steps do not need it
-    inputs = {"config": "contact.toml", "baseline": "impact-new.h5", "plot": "", "version": "0"}
+    impact.save(impact.sweep(tmp_path / "contact.toml"), tmp_path / "baseline.h5")
+    inputs = {"config": "contact.toml", "baseline": "baseline.h5", "plot": "", "version": "0"}
     (name, script, variables), *others = action_steps(inputs)
     assert name == "Install impact"
     assert run(["bash", "-c", script], tmp_path, PYTHONPATH="", PIP_NO_INDEX="1", **variables).returncode == 1
@@ -404,6 +405,17 @@ def test_the_action_executes_no_module_of_the_checkout(tmp_path: Path) -> None:
         done = run(["bash", "-c", script], tmp_path, GITHUB_STEP_SUMMARY="", **variables)
         assert done.returncode == 0, done.stderr
     assert not imported.exists()
+
+
+@pytest.mark.parametrize("baseline", ["impact-new.h5", "./impact-new.h5"])
+def test_the_action_does_not_replace_the_baseline(tmp_path: Path, baseline: str) -> None:
+    (tmp_path / "contact.toml").write_text(CONTACT, encoding="utf-8")
+    (tmp_path / "impact-new.h5").write_bytes(b"stored")
+    _, (name, script, variables), _ = action_steps({"config": "contact.toml", "baseline": baseline})
+    done = run(["bash", "-c", script], tmp_path, **variables)
+    assert (name, done.returncode) == ("Sweep", 2)
+    assert "result and baseline are the same file" in done.stdout
+    assert (tmp_path / "impact-new.h5").read_bytes() == b"stored"
 
 
 @pytest.mark.slow
