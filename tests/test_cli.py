@@ -751,13 +751,6 @@ def test_a_backend_that_matplotlib_does_not_have_is_reported(cli: Run, stored: P
     assert done.stderr.startswith("matplotlib cannot be imported: ValueError: Key backend: 'none such' is not")
 
 
-def test_a_number_of_threads_that_numba_refuses_is_reported(cli: Run, small: Path) -> None:
-    pytest.importorskip("numba")
-    done = cli("sweep", small, "--set", 'solver.core="numba"', NUMBA_NUM_THREADS="0")
-    reason = "ValueError: Number of threads specified must be > 0."
-    assert (done.returncode, done.stderr) == (2, f"numba cannot be imported: {reason}\n")
-
-
 @pytest.mark.slow
 def test_narrow_and_ascii_terminals(cli: Run, stored: Path) -> None:
     for environment in ({"COLUMNS": "20"}, {"PYTHONIOENCODING": "ascii"}, {"NO_COLOR": "1", "LC_ALL": "C"}):

@@ -322,3 +322,11 @@ def test_damaged_compiled_code_is_compiled_again_with_a_note(tmp_path: Path, suf
     assert (code, hits, len(notes)) == (0, "0", 1)
     assert "is damaged and is compiled again" in notes[0]
     assert run_compiling(tmp_path) == (0, "2", [])
+
+
+@needs_numba
+def test_a_number_of_threads_that_numba_refuses_is_reported(cli: Run, tmp_path: Path) -> None:
+    words = ("sweep", ROOT / "configs" / "figure6.toml", "-o", tmp_path / "r.h5", "--set", 'solver.core="numba"')
+    done = cli(*words, NUMBA_NUM_THREADS="0")
+    reason = "ValueError: Number of threads specified must be > 0."
+    assert (done.returncode, done.stderr) == (2, f"numba cannot be imported: {reason}\n")
