@@ -292,7 +292,7 @@ def test_the_figures_are_at_a_speed_at_which_the_balls_meet() -> None:
 
 def test_a_motion_is_that_of_an_impact_with_a_slip_near_the_middle_of_its_axis() -> None:
     captions = captions_of(build(swept(FAIR, e=0.5, v1=[-3.0, -2.0, -1.0, 1.0, 2.0])))
-    assert any(caption.startswith(CAPTIONS["loop"]) and "At v1 = 1 m/s." in caption for caption in captions)
+    assert any(CAPTIONS["loop"] in caption and "At v1 = 1 m/s." in caption for caption in captions)
     sweep = {"v1": 1.0, "u1": [-1.0, 0.0, 3.0], "m1": 1.0, "m2": 1.0, "R1": 0.01, "R2": 0.01, "mu": 0.3, "K": 1e7}
     friction = {"frictions": "cundall-strack-1979", "friction": {"cundall-strack-1979": {"k_t": 1e6}}}
     captions = captions_of(build(impact.sweep({"models": "hertz", "sweep": sweep, **friction})))
