@@ -208,3 +208,18 @@ def test_the_measurements_of_kharaz_gorham_and_salman() -> None:
     at_4 = result["e_t"].values.reshape(-1, len(angles))[:, 1]
     np.testing.assert_allclose(at_4.min(), 0.714, atol=5e-4)
     np.testing.assert_allclose((at_4[1:].min(), at_4.max()), (0.863, 0.994), atol=1e-3)
+
+
+def test_a_spring_held_at_its_limit_stays_there_until_the_balls_separate() -> None:
+    """Near the end the force and its limit are less than the rounding errors of the rate of the slip."""
+    config = {
+        "models": ["mbdyn-hunt-crossley"],
+        "frictions": ["liggghts-history"],
+        "sweep": {
+            "e": {"linspace": [0.05, 0.15, 21]}, "angle": "21.8 deg", "speed": 1.0, "omega1": -66.4, "mu": 0.0122,
+            "m1": 0.01, "m2": 0.02, "R1": 0.005, "R2": 0.01, "material1": "soft", "material2": "stiff",
+        },
+        "materials": {"soft": {"E": 1.2e8, "nu": 0.3}, "stiff": {"E": 1e9, "nu": 0.25}},
+    }  # fmt: skip
+    beta = [impact.sweep({**config, "solver": {"rtol": rtol}}).beta.values for rtol in (1e-9, 1e-11)]
+    np.testing.assert_allclose(beta[0], beta[1], rtol=0.0, atol=1e-9)

@@ -59,6 +59,8 @@ MIN_REACH = 1e-2
 ORDER_TOLERANCE = 1e-6
 # steps of the central difference quotients for the rate of N and the rate of the slip that it determines
 RATE_OF_LIMIT_STEP, RATE_OF_SLIP_STEP = 1e-5, 1e-3
+# error of the slip by rounding, relative to the two terms of it: some five times what impacts have
+SLIP_ROUNDING = 1e-10
 # s at which leading powers of x are compared at first contact, and their rates; and the least s for what
 # is singular at s = 0
 START_S, RATE_S, LEAST_S = 1e-7, 1e-4, 1e-10
@@ -592,8 +594,8 @@ class SlipPhase:
 
     # ---- the modes -2 and 2, in which a spring at its limit determines the slip
 
-    def _held_slip(self, y: Array, params: Params, direction: Array) -> tuple[Array, Array]:
-        """Compute Gamma for which the trial force of the spring grows as its limit does, and N."""
+    def _held_slip(self, y: Array, params: Params, direction: Array) -> tuple[Array, Array, Array]:
+        """Compute Gamma for which the trial force of the spring grows as its limit does, its error, and N."""
         # at s = 0 the slip is 0/0; a force that vanishes there is known relative to s
         y = np.array([np.where(np.abs(y[0]) < self.end, self.end, y[0]), *y[1:]])
         k, columns = self.rates(y, params), self.columns(params)
@@ -601,24 +603,31 @@ class SlipPhase:
         s, growth = self.whole(y[0], columns)
         stiffness = self._times(columns.root * columns.root * k[TIME_ROW], s, self.stiffness_power)
         fading = self.memory * self.stiffness_power * (growth * k[0]) / _away_from_zero(s) * N
-        return direction * (dN - fading) / stiffness, N
+        error = SLIP_ROUNDING * (np.abs(dN) + np.abs(fading)) / stiffness
+        return direction * (dN - fading) / stiffness, error, N
 
-    def _held_force(self, y: Array, params: Params, direction: Array) -> Array:
-        """Compute the friction force that gives the slip its rate, over G0."""
+    def _held_force(self, y: Array, params: Params, direction: Array) -> tuple[Array, Array]:
+        """Compute the friction force that gives the slip its rate, over G0, and its error."""
         small = RATE_OF_SLIP_STEP * np.clip(np.abs(y[0]), motion.MIN_RELEASE_S, 1.0)
         k = self.rates(y, params)
         step = small * k[:N_COMPONENTS]
-        ahead, behind = (self._held_slip(y + sign * step, params, direction)[0] for sign in (1.0, -1.0))
-        return np.asarray((behind - ahead) / (2.0 * small * k[TIME_ROW]))
+        (ahead, error, _), (behind, _, _) = (
+            self._held_slip(y + sign * step, params, direction) for sign in (1.0, -1.0)
+        )
+        duration = 2.0 * small * k[TIME_ROW]
+        return (behind - ahead) / duration, error / duration
 
     def _held_margin(self, y: Array, params: Params, direction: Array) -> tuple[Array, Mask]:
-        """Compute a margin, positive while the force is between slip and stick, and where it is nearer to slip."""
+        """Compute a margin, positive while the force is between slip and stick, and where it is nearer to slip.
+
+        It is negative by no more than errors, which exceed the force near the end of the contact.
+        """
         columns, y = self.columns(params), y[:N_COMPONENTS]
-        slip, N = self._held_slip(y, params, direction)
-        force = self._held_force(y, params, direction)
+        slip, _, N = self._held_slip(y, params, direction)
+        force, error = self._held_force(y, params, direction)
         drag = self._times(columns.damping * slip, self.whole(y[0], columns)[0], self.drag_power)
         above_slip = (force - direction * N) * np.sign(drag)
-        return np.minimum(above_slip, np.abs(drag) - above_slip), above_slip < 0.5 * np.abs(drag)
+        return np.minimum(above_slip, np.abs(drag) - above_slip) + error, above_slip < 0.5 * np.abs(drag)
 
     def _held_mode(
         self, at_limit: Mask, leaves: Mask, direction: Array, new: Array, y: Array, params: Params
@@ -659,7 +668,7 @@ class SlipPhase:
             drag = self._times(columns.damping * slip, self.whole(y[0], columns)[0], self.drag_power)
             bounds = np.sort([limit, limit + drag], axis=0)[:, held]
             direction = np.sign(columns.mode[held])
-            force[held] = np.clip(self._held_force(y.take(held, 1), _taken(params, held), direction), *bounds)
+            force[held] = np.clip(self._held_force(y.take(held, 1), _taken(params, held), direction)[0], *bounds)
         return slip, force
 
     # ---- the start and the end of a part
