@@ -631,6 +631,24 @@ def test_intervals_of_a_picture_end_where_the_study_says() -> None:
     assert np.array(drawn) == pytest.approx(np.concatenate(ends))
 
 
+def test_the_bars_of_every_panel_are_within_the_picture() -> None:
+    """An index of few samples is below 0, and with one friction law more so than with another."""
+    sweep = {"v1": 1.0, "angle": {"uniform": [0.2, 1.3]}, "mu": {"uniform": [0.1, 0.4]}, "e": 0.6}
+    contact = {"K": 1e6, "n": 1, "m1": 1.0, "m2": math.inf, "R1": 0.1}
+    config = {
+        "models": ["anagnostopoulos-1988"],
+        "frictions": ["coulomb-1785", "cundall-strack-1979"],
+        "sweep": {**sweep, **contact},
+        "friction": {"cundall-strack-1979": {"kt_over_kn": 0.5}},
+        "design": {"n": 8, "seed": 1},
+    }
+    study = impact.sensitivity(config, of="omega1_post")
+    left, right = impact.plot(study).axes[0].get_xlim()
+    indices = np.stack([study["first"], study["total"]])
+    assert left <= indices.min() < -0.3
+    assert 1.2 < indices.max() <= right
+
+
 def test_a_law_has_no_studies_along_parameters_of_other_laws() -> None:
     config = {
         "models": ["kelvin-voigt", "kuwabara-kono-1987"],

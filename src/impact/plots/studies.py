@@ -230,10 +230,11 @@ class BarData(PlotData):
             axes.set_title(labels.get(panel.law) or pretty_conditions(panel.label), loc="left", fontsize="medium")
             inputs = [labels.get(name) or (symbol(name) if "." not in name else name) for name in self.inputs]
             axes.set_yticks(positions, inputs)
-            axes.set_xlim(left=min(0.0, axes.get_xlim()[0]))
             axes.axvline(0.0, color=tint(1.0), linewidth=0.8)
             axes.grid(visible=False, axis="y")
             number_axis(axes.xaxis)
+        # the panels share their limits, which no longer follow further bars once they are set
+        all_axes[0].set_xlim(left=min(0.0, all_axes[0].get_xlim()[0]))
         all_axes[-1].set_xlabel(axis_text("Sobol index", "index", "1", labels))
         return [(artist, name) for name, artist in entries.items()]
 
