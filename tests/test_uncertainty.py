@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -164,6 +165,19 @@ def test_samples_without_the_output_beside_others_are_counted() -> None:
     sweep = {"v1": 1.0, **balls, "u1": {"empirical": [0.0, 1.0]}, "mu": 0.3}
     config = {"models": "hertz", "frictions": ["coulomb-1785"], "design": {"n": 16}, "sweep": sweep}
     assert 0 < impact.sensitivity(config, of="beta")["failed"].item() < 48
+
+
+def test_a_study_says_how_many_points_a_code_with_fixed_steps_reaches_slowly() -> None:
+    """As a sweep does; e_out of the same impacts has no such limit."""
+    sweep = {"v1": 1.0, "angle": {"uniform": [0.1, 1.2]}, "mu": 0.3, "e": 0.6, "m2": math.inf, "R1": 0.01}
+    config = {"models": "tsuji-1992", "frictions": ["lammps-mindlin"], "sweep": {**sweep, "material": "steel"}}
+    design = {"design": {"n": 16}}
+    slow = int((impact.sweep({**config, **design})["friction_status"] == 4).sum())
+    assert 0 < slow < 16
+    with pytest.warns(impact.ImpactWarning, match=r"^beta of \d+ of 48 points is the limit of small steps"):
+        impact.sensitivities({**config, **design}, ["e_out", "beta"])
+    with warnings.catch_warnings(action="error"):
+        impact.sensitivity({**config, **design}, of="e_out")
 
 
 SIMBODY_ENDS = {"c": (0.01, 3.0), "v1": (0.05, 3.0)}

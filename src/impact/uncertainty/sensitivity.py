@@ -26,7 +26,7 @@ from ..contact.status import FrictionStatus
 from ..contact.variables import OUTPUTS
 from ..engine.plan import Plan
 from ..engine.run import Run
-from ..errors import ConfigError, UsageError, require_known
+from ..errors import ConfigError, UsageError, require_known, warn
 from ..formatting import argument
 from ..results.schema import SENSITIVITY, plan_coordinates, provenance_attributes, scale_of, template
 from ..results.selection import as_keys
@@ -205,6 +205,10 @@ def sensitivity_of(plan: Plan, of: str, swept: xr.Dataset) -> xr.Dataset:
     complete = (FrictionStatus.OK, FrictionStatus.SLOW_LIMIT, FrictionStatus.NOT_COMBINABLE)
     is_lacking = np.isnan(values) & np.isin(read(OUTPUTS[of].status).reshape(shape), complete)
     statistics["failed"][is_lacking.all(axis=(1, 2))] = 0
+    slow = int((read("friction_status") == FrictionStatus.SLOW_LIMIT).sum()) if OUTPUTS[of].of_friction else 0
+    if slow:
+        meaning = FrictionStatus.SLOW_LIMIT.meaning
+        warn(f"{of} of {slow:,} of {values.size:,} points is {meaning}; see impact timestep")
     of_plan, paths = plan_coordinates(plan).variables, [InputName.parse(name).config_key for name in inputs]
     studied = {
         "input": ("input", paths, {"long_name": "uncertain input, by its path in the config"}),
