@@ -53,6 +53,10 @@ def test_a_target_that_only_impacts_of_many_steps_reach_is_attained() -> None:
     problem = impact.prepare(model=model, at=at, outputs="contact_time", overrides=solver)
     assert problem()["contact_time"] == pytest.approx(4e-3, rel=1e-5)
     assert solved.attainable[1] >= 4e-3
+    over = {"v1": [5.0, at["v1"]]}
+    best = impact.solve(model, "eta", {"contact_time": 4e-3}, over=over, overrides=solver).roots[0].value
+    contact_times = problem(eta=best, v1=over["v1"])["contact_time"]
+    assert contact_times == pytest.approx([4e-3, 4e-3], rel=0.01)
 
 
 @pytest.mark.slow

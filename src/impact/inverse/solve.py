@@ -351,6 +351,17 @@ class SolveProblem:
         shape = (values.size, *(axis.size for axis in self.config.axes))
         return {name: array.reshape(shape).copy() for name, array in outputs.items()}
 
+    def scan(self, values: Array, target: float, known: Array, *, with_range: bool = True) -> AnyArray:
+        """Compute the target variable at the values of a scan; `known` are values of it elsewhere."""
+        outputs = self.evaluate(values, is_scan=True)[self.variable]
+        failed = np.isnan(outputs).reshape(values.size, -1).any(axis=1)
+        computed = np.append(known, outputs[~failed])
+        is_beyond = not (computed.size and computed.min() <= target <= computed.max())
+        if with_range and failed.any() and is_beyond and (self.variable != "e_out" or 0.0 <= target <= 1.0):
+            # the scan stops at SCAN_MAX_STEPS: impacts of more steps may attain the target
+            outputs[failed] = self.evaluate(values[failed])[self.variable]
+        return outputs
+
     def answers(self, values: Array) -> dict[str, AnyArray]:
         """Compute the same where the target is reached; warn if no code with a fixed step delivers it."""
         outputs, variable = self.evaluate(values), OUTPUTS[self.variable]
@@ -502,13 +513,7 @@ def _roots_and_values(
         interpolant.resolve()
         known_scan, known_values = interpolant.samples()
         scan = scan[np.isnan(interpolant(scan)[:, 0])]
-    values = problem.evaluate(scan, is_scan=True)[problem.variable] if scan.size else np.zeros(0)
-    failed = np.isnan(values)
-    computed = np.append(known_values, values[~failed])
-    is_beyond = not (computed.size and computed.min() <= target <= computed.max())
-    if with_range and failed.any() and is_beyond and (problem.variable != "e_out" or 0.0 <= target <= 1.0):
-        # the scan stops at SCAN_MAX_STEPS: impacts of more steps may attain the target
-        values[failed] = problem.evaluate(scan[failed])[problem.variable]
+    values = problem.scan(scan, target, known_values, with_range=with_range) if scan.size else np.zeros(0)
     # a value at which the integration fails, often for want of steps, hides no root between its neighbours
     scan, values = scan[~np.isnan(values)], values[~np.isnan(values)]
     if not scan.size + known_scan.size:
@@ -636,7 +641,7 @@ def _best_over_axis(problem: SolveProblem, target: float) -> SolveResult:
         return np.where(np.isnan(distances).any(axis=1), np.inf, distances.max(axis=1))
 
     scan = problem.scan_values()
-    distances = largest_distance(problem.evaluate(scan, is_scan=True)[problem.variable])
+    distances = largest_distance(problem.scan(scan, target, np.zeros(0)))
     is_finite = np.isfinite(distances)
     if not is_finite.any():
         problem.raise_failure()
