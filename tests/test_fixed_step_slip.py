@@ -256,6 +256,18 @@ def test_psi1_does_not_depend_on_the_step_and_psi2_is_the_slip_in_its_unit() -> 
     assert at_step.psi2.item() == pytest.approx(-at_step.beta.item() * at_step.psi1.item(), rel=1e-12)
 
 
+def test_the_steps_for_a_tolerance_are_said_to_be_those_of_e_alone() -> None:
+    """Far from 2 % of beta, and from 0.24, that of the continuous law."""
+    inputs = {"angle": "20 deg", "mu": 0.3, "e": 0.7, "v1": 1.0}
+    result = impact.timestep(
+        "tsuji-1992", at=inputs, friction="lammps-mindlin", tol=0.02, steps_per_contact=[16], phases=8
+    )
+    assert result.needed is not None
+    assert result.needed.steps_per_contact == 16
+    assert result.rows[0].beta_largest < -0.1 < 0.2 < result.beta_continuous
+    assert str(result).splitlines()[-1].startswith("the tolerance is that of e alone")
+
+
 def test_the_restitution_at_a_fixed_step_does_not_depend_on_friction() -> None:
     result = sweep(LINEAR, "cundall-strack-1979", {"k_t": 3e5}, HOOKE | STEP | {"mu": [0.1, 0.5]}, "kick-drift")
     central = impact.sweep(

@@ -71,7 +71,7 @@ def timestep(
         float | None,
         options.number(
             "VALUE",
-            "Find the number of steps per contact with which every phase is within this relative tolerance, "
+            "Find the number of steps per contact with which e is within this relative tolerance at every phase, "
             "such as 0.01 or 1%.",
         ),
     ] = None,

@@ -296,6 +296,8 @@ class TimestepResult(Displayed):
             yield from packing_notes(self.needed.dt, self.rayleigh_time)
         if self.parameter:
             yield str(self.needed_parameter or missing_parameter(self.parameter, self.tol))
+        if self.friction:
+            yield "the tolerance is that of e alone: beta may differ more from that of the continuous law"
 
 
 def timestep(
@@ -328,7 +330,7 @@ def timestep(
     steps_per_contact : contact times of the continuous law over dt; by default 10, 20, 50 and 100
     dt : one or more further time steps [s], or texts such as "2 us"
     phases : number of phases, (i + 1/2)/phases, at most 10,000
-    tol : relative tolerance for which the smallest number of steps per contact is found
+    tol : relative tolerance of e for which the smallest number of steps per contact is found
     parameter : a parameter of the law, "K" or "materials.NAME.E", whose value from which on `tol` holds at the
         only `dt` is found, for a step that cannot be changed; with "drake-sap" and an e also "relaxation_time"
     scheme : its name; by default "drake-tamsi" for the laws of Drake, "kick-drift" for all others
