@@ -125,6 +125,14 @@ def test_at_a_limit_of_the_normal_motion_only_coulomb_has_an_answer() -> None:
     assert values(result, "rebound_angle")[0] == pytest.approx(0.5 * math.pi, rel=1e-15)
 
 
+def test_a_slip_that_is_not_known_has_no_regime() -> None:
+    """With e = 0 this contact is damped critically, and its balls never separate; without a slip it sticks."""
+    result = oblique(e=0.0, u1=[0.0, 0.1, 9.0])
+    assert set(values(result, "friction_status")) == {3}
+    assert np.isnan(values(result, "beta")).all()
+    assert values(result, "contact_regime") == 2 * [1, 0, 0]
+
+
 def test_coulomb_is_its_closed_form() -> None:
     result = oblique(u1=[0.1, 9.0])
     beta = result["beta"].sel(friction="coulomb-1785").values.ravel()

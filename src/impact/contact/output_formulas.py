@@ -172,7 +172,8 @@ def _contact_regime(friction: Friction, friction_status: Int8Array, missed: Mask
     oblique, tangential, kind = friction
     regime = tangential.regime
     if kind == "coulomb":
-        regime = np.where(np.abs(oblique.G0) >= tangential.sliding_impulse, SLIDES, STICKS | SLIDES)
+        impulse = tangential.sliding_impulse
+        regime = np.where(np.abs(oblique.G0) >= impulse, SLIDES, STICKS | SLIDES) * ~np.isnan(impulse)
     regime = replace_where(regime, oblique.mu == 0.0, SLIDES)
     regime = replace_where(regime, without_slip, STICKS)
     return np.where((friction_status >= FIRST_FAILURE) | missed, np.int8(0), regime).astype(np.int8)
