@@ -180,6 +180,19 @@ def test_a_study_says_how_many_points_a_code_with_fixed_steps_reaches_slowly() -
         impact.sensitivity({**config, **design}, of="e_out")
 
 
+def test_a_picture_of_samples_marks_the_limit_of_small_steps() -> None:
+    """As pictures over an angle do; the restitution has no such limit."""
+    sweep = {"v1": 1.0, "angle": {"uniform": [0.1, 1.2]}, "mu": 0.3, "e": 0.6, "m2": math.inf, "R1": 0.01}
+    laws = {"models": ["tsuji-1992", "hunt-crossley-1975"], "frictions": ["lammps-mindlin"]}
+    samples = impact.sweep({**laws, "sweep": {**sweep, "material": "steel"}, "design": {"n": 16}})
+    marked = {}
+    for name in ("beta", "e_out"):
+        texts = impact.plot(samples, variable=name).legends[0].get_texts()
+        marked[name] = [text.get_text().endswith("limit of small steps") for text in texts]
+    assert sorted(marked["beta"]) == [False, True]
+    assert not any(marked["e_out"])
+
+
 SIMBODY_ENDS = {"c": (0.01, 3.0), "v1": (0.05, 3.0)}
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, partial
 from typing import Any
 
@@ -19,6 +19,7 @@ from matplotlib.ticker import Formatter, FuncFormatter, LogLocator, MaxNLocator,
 from ..config.input_names import InputName
 from ..contact.frictions import frictions
 from ..contact.models import catalogue
+from ..contact.status import FrictionStatus
 from ..contact.variables import HISTORY, OUTPUTS
 from ..errors import UsageError
 from ..formatting import (
@@ -232,6 +233,14 @@ class LawPart(NamedLaw):
 
     data: xr.Dataset
     friction: str = ""
+
+
+def mark_slow_limit(pair: LawPart) -> LawPart:
+    """Mark the name of a pair with a point that a code with fixed steps reaches slowly."""
+    # outputs without friction are those of a model alone
+    has_status = pair.friction and "friction_status" in pair.data
+    is_slow = has_status and (pair.data["friction_status"] == FrictionStatus.SLOW_LIMIT).any()
+    return replace(pair, label=pair.label + SLOW_LIMIT) if is_slow else pair
 
 
 def split_by_law(data: xr.Dataset, *, numbered: bool) -> Iterator[LawPart]:

@@ -19,7 +19,7 @@ from ..formatting import argument, number
 from ..results.selection import select
 from .curves import Curve, CurveData, Panel, curve_of, law_curves
 from .kinds import Choice, Kind
-from .labels import SLOW_LIMIT, LawPart, NamedLaw, split_by_law
+from .labels import LawPart, NamedLaw, mark_slow_limit, split_by_law
 from .motions import choose_point, curves_over, motion
 from .restitution import complete
 from .slices import Line, choose_line, read_line
@@ -128,8 +128,7 @@ def _pairs_along(dataset: xr.Dataset, choice: Choice, *names: str) -> tuple[Line
         # the spin of a wall is a number whatever becomes of the ball
         has_failed = statuses.size > 0 and (statuses >= FIRST_FAILURE).all()
         if not has_failed and any(np.isfinite(pair.data.variables[name].values).any() for name in names):
-            is_slow = FrictionStatus.SLOW_LIMIT in statuses
-            pairs.append(replace(pair, label=pair.label + SLOW_LIMIT) if is_slow else pair)
+            pairs.append(mark_slow_limit(pair))
         else:
             failures = [FrictionStatus(int(status)).meaning for status in statuses if status >= FIRST_FAILURE]
             not_drawn.append(f"{pair.law}: {'; '.join(failures) or 'not defined'}")

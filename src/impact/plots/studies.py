@@ -29,6 +29,7 @@ from .kinds import Choice, Kind
 from .labels import (
     NamedLaw,
     axis_text,
+    mark_slow_limit,
     number_axis,
     pretty_conditions,
     split_by_law,
@@ -294,7 +295,7 @@ def uncertainty_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     not_drawn, unit = line.not_drawn, OUTPUTS[name].unit
     meaning = "Delivered restitution" if name == "e_out" else words_of(line.data[name].attrs, name).capitalize()
     curves: list[Curve] = []
-    for law in split_by_law(line.data, numbered=choice.equations):
+    for law in map(mark_slow_limit, split_by_law(line.data, numbered=choice.equations)):
         samples = np.asarray(law.data[name].transpose(..., SAMPLE).values, float)
         if x is None:
             # the distribution function
