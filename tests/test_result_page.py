@@ -295,6 +295,24 @@ def test_pairs_of_a_page_have_the_values_of_the_result(layout: str, tmp_path: Pa
             np.testing.assert_allclose(values, expected.values.ravel() * unit, rtol=1e-15, err_msg=name)
 
 
+def test_a_page_of_a_selected_friction_law_has_its_pairs(tmp_path: Path) -> None:
+    result = impact.sweep(OBLIQUE)
+    impact.save(result.sel(friction="lammps-mindlin"), tmp_path / "mindlin.h5")
+    content = content_of(impact.page(tmp_path / "mindlin.h5"))
+    pairs = [law for law in content["laws"] if law["is_pair"]]
+    assert [pair["key"] for pair in pairs] == [f"{model} with lammps-mindlin" for model in OBLIQUE["models"]]
+    list_page = content_of(impact.page(result.sel(friction=["lammps-mindlin"])))
+    assert [pair["columns"] for pair in pairs] == [law["columns"] for law in list_page["laws"] if law["is_pair"]]
+
+
+def test_a_friction_law_without_its_name_has_no_pairs() -> None:
+    result = impact.sweep(OBLIQUE).isel(friction=0, drop=True)
+    content = content_of(impact.page(result))
+    assert [law["key"] for law in content["laws"]] == OBLIQUE["models"]
+    assert [output["name"] for output in content["outputs"]] == [*OUTPUTS]
+    assert "tsuji-1992" in impact.report(result, sections=["answer"])
+
+
 def test_a_result_without_outputs_of_friction_has_a_page_of_its_models() -> None:
     result = impact.sweep({**OBLIQUE, "output": {"variables": ["e_out"]}})
     content = content_of(impact.page(result))

@@ -116,11 +116,14 @@ def _page_of(dataset: xr.Dataset, models: Sequence[str] | None) -> str:
     if not names:
         raise UsageError(NO_OUTPUT)
     parts = [*split_by_law(dataset[names], numbered=False)]
-    of_pairs = [name for name in SHOWN_OF_PAIRS if name in dataset]
+    of_pairs = [name for name in SHOWN_OF_PAIRS if name in dataset and "friction" in dataset.coords]
     if of_pairs:
         # before they are computed
         _check_size(sum(dataset[name].size for name in of_pairs) * VALUE_BYTES)
-        pairs = [*split_by_law(dataset[of_pairs], numbered=False)]
+        of_friction = dataset[of_pairs]
+        # selected by its key, a friction law is no dimension
+        of_friction = of_friction if "friction" in dataset.dims else of_friction.expand_dims("friction")
+        pairs = [*split_by_law(of_friction, numbered=False)]
         arrays += [_values(pair.data, of_pairs, inputs) for pair in pairs]
         parts, names = [*parts, *pairs], [*names, *of_pairs]
     laws = [{**law, **columns} for law, columns in zip(_laws(parts), arrays, strict=True)]

@@ -465,7 +465,7 @@ def parts_of_laws(
     Each is at the first position along the parameters of other laws: on axes of length one, or with `first` = 0
     without these axes. Without the dimension of models it is all.
     """
-    law_dims = [dim for dim in LAW_DIMS if dim in dims] if "model" in dims else []
+    law_dims = [dim for dim in LAW_DIMS if dim in dims and dim in dataset] if "model" in dims else []
     keys = [np.atleast_1d(dataset[dim].values).tolist() for dim in law_dims]
     columns = {dim: columns_along(dataset, dim) for dim in (dataset.dims if law_dims else ())}
     for place in np.ndindex(*map(len, keys)):
