@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import re
 import shlex
 import subprocess
+import sys
 import time
 from collections.abc import Sequence
 from dataclasses import replace
@@ -1063,13 +1065,8 @@ def test_a_script_that_fails_is_one_line(cli: Run, tmp_path: Path, run: str, mes
     assert done.memory < 500 * 2**20
 
 
-@pytest.mark.slow
-def test_a_script_that_does_not_end_is_stopped(tmp_path: Path) -> None:
-    """With what a wrapper has started."""
-    command = ["/bin/sh", "-c", "sleep 60 & echo $! > pid; wait"]
-    with pytest.raises(subprocess.SubprocessError, match=r"^stopped after 0\.5 s$"):
-        run_program(command, str(tmp_path), 0.5)
-    pid = (tmp_path / "pid").read_text(encoding="utf-8").strip()
+def wait_until_ended(pid: str) -> None:
+    """A killed process ends a moment later."""
     status = Path("/proc", pid, "stat")
 
     def runs() -> bool:
@@ -1078,11 +1075,41 @@ def test_a_script_that_does_not_end_is_stopped(tmp_path: Path) -> None:
         except (FileNotFoundError, ProcessLookupError):
             return False
 
-    # a killed process ends a moment later; it would sleep for a minute
+    # it would sleep for a minute
     end = time.monotonic() + 10.0
     while runs() and time.monotonic() < end:
         time.sleep(0.01)
     assert not runs()
+
+
+@pytest.mark.slow
+def test_a_script_that_does_not_end_is_stopped(tmp_path: Path) -> None:
+    """With what a wrapper has started."""
+    command = ["/bin/sh", "-c", "sleep 60 & echo $! > pid; wait"]
+    with pytest.raises(subprocess.SubprocessError, match=r"^stopped after 0\.5 s$"):
+        run_program(command, str(tmp_path), 0.5)
+    pid = (tmp_path / "pid").read_text(encoding="utf-8").strip()
+    wait_until_ended(pid)
+
+
+@pytest.mark.slow
+def test_a_script_ends_with_the_command_that_is_terminated(tmp_path: Path) -> None:
+    """A script has a session of its own, so that what ends the group of the command does not reach it."""
+    program = write_program(
+        tmp_path / "lmp", RELEASE + f"echo $$ > {tmp_path}/part; mv {tmp_path}/part {tmp_path}/pid; sleep 60"
+    )
+    words = [sys.executable, "-m", "impact", *LAMMPS, str(program)]
+    (tmp_path / "folders").mkdir()
+    env = os.environ | {"TMPDIR": str(tmp_path / "folders")}
+    command = subprocess.Popen(words, env=env, stderr=subprocess.PIPE, text=True)
+    while not (tmp_path / "pid").exists():
+        assert command.poll() is None
+        time.sleep(0.01)
+    command.terminate()
+    _, stderr = command.communicate(timeout=60)
+    assert (command.returncode, stderr) == (143, "terminated; stopped immediately\n")
+    wait_until_ended((tmp_path / "pid").read_text(encoding="utf-8").strip())
+    assert not [*(tmp_path / "folders").iterdir()]
 
 
 @pytest.mark.parametrize("reported", ["31 Feb 2025", "99 Foo 2025"])

@@ -17,7 +17,7 @@ import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import FrameType
-from typing import TextIO
+from typing import NoReturn, TextIO
 
 from typer import TyperException
 
@@ -43,6 +43,11 @@ class Interrupted(Interruption):
         super().__init__(f"{'interrupted' if by_user else 'terminated'}; {done}")
 
 
+def stop(number: int, frame: FrameType | None) -> NoReturn:
+    """Handle a signal by an exception, so that programs that were started end and their folders are removed."""
+    raise Interrupted(number, "stopped immediately")
+
+
 @contextlib.contextmanager
 def catch_signals() -> Iterator[Callable[[], bool]]:
     """Handle SIGINT and SIGTERM by a flag; yields a function that returns whether a signal came.
@@ -55,7 +60,7 @@ def catch_signals() -> Iterator[Callable[[], bool]]:
     def take(number: int, frame: FrameType | None) -> None:
         came.append(number)
         if len(came) > 2:
-            raise Interrupted(number, "stopped immediately")
+            stop(number, frame)
 
     before = {number: signal.signal(number, take) for number in (signal.SIGINT, signal.SIGTERM)}
     try:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import re
+import signal
 import sys
 from functools import partial
 from importlib import import_module
@@ -168,6 +169,7 @@ def main() -> None:
     # imports leave no garbage, and at the end all memory is given back: a short command takes a fifth less time
     # without a search for unused objects
     gc.disable()
+    signal.signal(signal.SIGTERM, exits.stop)
     code = exits.run_command_line(
         partial(app, standalone_mode=False, prog_name="impact"), debug="--debug" in sys.argv
     )
