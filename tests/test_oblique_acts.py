@@ -172,7 +172,7 @@ def test_the_command_runs_an_oblique_impact_without_a_config(cli: Run, tmp_path:
     ("words", "message"),
     [
         (("run", "--friction", "coulom"), 'no friction law "coulom"; did you mean "coulomb-1785"?'),
-        (("run", "--at", "mu=0.3"), "set without a friction law"),
+        (("run", "--at", "mu=0.3"), "sweep.mu: set without a friction law, expected --friction KEY\n"),
         (
             ("run", "--model", "bilinear", "--friction", "lammps-linear-nohistory", "--at", "mu=0.3"),
             "the contact force has no dashpot",

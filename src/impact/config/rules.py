@@ -13,7 +13,8 @@ from ..contact.friction import parameter_problem, required_inputs
 from ..contact.frictions import frictions
 from ..contact.materials import hertz_stiffness
 from ..contact.model import ForceModel, with_base_quantities
-from .draft import Draft, listed_names
+from ..formatting import argument
+from .draft import STARTER, Draft, listed_names
 from .files import as_table
 from .input_names import input_values
 from .quantities import ConfigProblem, KeyPath, Quantity
@@ -247,10 +248,12 @@ def _oblique_problems(draft: Draft) -> Iterable[ConfigProblem]:
     """Check that inputs of oblique impacts have friction laws, and these their inputs."""
     sweep = draft.table("sweep")
     if "frictions" not in draft.data:
-        expected = 'expected frictions as well, such as frictions = ["coulomb-1785"]'
+        expected = 'frictions as well, such as frictions = ["coulomb-1785"]'
+        # an impact without a config has only arguments
+        expected = argument("friction", "KEY") if draft.name == STARTER else expected
         inputs = [("sweep", name) for name in OBLIQUE_INPUTS if name in sweep]
         parameters = [("friction", key) for key in draft.table("friction")]
-        yield from ((path, f"set without a friction law, {expected}") for path in (*inputs, *parameters))
+        yield from ((path, f"set without a friction law, expected {expected}") for path in (*inputs, *parameters))
         return
     if "mu" not in sweep:
         yield ("sweep", "mu"), _missing(SWEEP_QUANTITIES["mu"])
