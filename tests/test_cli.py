@@ -734,6 +734,14 @@ def test_a_style_with_latex_that_is_not_installed_is_reported(cli: Run, stored: 
     [
         ("figure.dpi: -1", "the settings of matplotlib allow no figure: dpi must be positive"),
         ("figure.subplot.left: 2", "the settings of matplotlib allow no figure: left cannot be >= right"),
+        (
+            "axes.prop_cycle: cycler('color', [])",
+            "the settings of matplotlib allow no figure: axes.prop_cycle has no values",
+        ),
+        (
+            "figure.figsize: 0, 5",
+            "figure.figsize: got 0.0, expected a length from 26mm to 60in, such as 84mm, 8.4cm or 3.3in",
+        ),
         ("savefig.dpi: 0", "the picture cannot be drawn as .png: dpi must be positive"),
     ],
 )

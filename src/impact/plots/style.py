@@ -26,7 +26,7 @@ from ..contact.frictions import frictions
 from ..contact.models import catalogue
 from ..errors import UsageError
 from ..formatting import argument, law_keys
-from .kinds import WIDTHS
+from .kinds import WIDTHS, length
 
 # the colours of Okabe and Ito without yellow, which is invisible on white; the number of markers is coprime to
 # that of the colours, so that neighbours in the catalogue differ in both
@@ -57,7 +57,9 @@ def styled(style: str | Path | None = None) -> Iterator[None]:
             if to_rgb(rcParams["grid.color"]) in map(to_rgb, unset):
                 rcParams["grid.color"] = tint(0.1)
             try:
-                # a small one, whatever the size and the format of pictures
+                if not rcParams["axes.prop_cycle"]:
+                    raise ValueError("axes.prop_cycle has no values")
+                # a small figure, whatever the size and the format of pictures
                 Figure(figsize=(1.0, 1.0)).savefig(io.BytesIO(), format="raw", dpi="figure")
             except ValueError as error:
                 raise UsageError(f"the settings of matplotlib allow no figure: {error}") from None
@@ -109,6 +111,9 @@ def default_size() -> tuple[float, float | None]:
     width, height = rcParams["figure.figsize"]
     if [width, height] == list(rcParamsDefault["figure.figsize"]):
         return WIDTHS["double"], None
+    for side in (width, height):
+        # refused where the options refuse it
+        length(side, "figure.figsize")
     return width, height
 
 
