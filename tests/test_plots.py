@@ -321,6 +321,21 @@ def test_an_axis_label_has_one_prefix_of_its_unit(coarse: xr.Dataset) -> None:
     assert {"0", "20", "100"} <= set(ticks)
 
 
+def test_a_stiffness_at_an_axis_has_the_number_of_its_exponent() -> None:
+    laws = {"models": ["hertz", "kelvin-voigt"], "model": {"kelvin-voigt": {"C": 10.0, "K": [1e5, 2e5]}}}
+    sweep = {"v1": 1.0, "m1": 1.0, "m2": 1.0, "e": 0.5, "K": [1e6, 1e8]}
+    result = impact.sweep({**laws, "sweep": sweep, "output": {"variables": ["e_error", "e_out", "stiffness"]}})
+    for x, unit in (("K", "MN/m$^{1.5}$"), ("kelvin-voigt.K", "kN/m")):
+        drawn = result.isel({"K" if x != "K" else "kelvin-voigt.K": 0})
+        assert impact.plot(drawn, kind="error", x=x).axes[-1].get_xlabel().endswith(f"({unit})")
+    of_stiffness = {"kind": "map", "variable": "stiffness", "x": "K", "y": "kelvin-voigt.K"}
+    *_, bar = impact.plot(result, models=["hertz"], **of_stiffness).axes
+    assert bar.get_ylabel().endswith("(MN/m$^{1.5}$)")
+    # the laws have different exponents
+    *_, bar = impact.plot(result, **of_stiffness).axes
+    assert bar.get_ylabel().endswith("(MN/m^n)")
+
+
 def test_numbers_of_a_narrow_axis_are_those_of_its_ticks() -> None:
     """Nearly elastic impacts have restitutions that differ in the sixth digit."""
     result = impact.sweep(models=["hunt-crossley-1975"], e=[0.99999, 0.999993], v1=[1000.001, 1000.002, 1000.003])

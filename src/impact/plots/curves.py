@@ -23,7 +23,7 @@ from ..errors import UsageError
 from ..formatting import NO_BREAK, heading
 from .data import MEASURED, LegendEntries, PlotData, Points, stacked
 from .labels import LawPart, NamedLaw, annotate_right_edge, label_axis, pretty_conditions, symbol, words_of
-from .slices import unit_of
+from .slices import numbered_unit
 from .style import FAINT, SOFT, is_geometric, limits_of, model_styles, tint
 
 # the colour of distances from zero, and its shares in those that are shaded, the widest first, and in lines
@@ -221,13 +221,13 @@ def law_curves(laws: Iterable[LawPart], x: ArrayLike, ends: Mapping[str, str]) -
     return [curve_of(law, x, law.data[name], name, end) for law in laws for name, end in ends.items()]
 
 
-def x_axis_fields(coordinate: xr.DataArray) -> dict[str, Any]:
+def x_axis_fields(dataset: xr.Dataset, name: str) -> dict[str, Any]:
     """Describe the horizontal axis of a panel along a coordinate."""
     return {
-        "x_name": str(coordinate.name),
-        "x_label": words_of(coordinate.attrs, str(coordinate.name)),
-        "x_unit": unit_of(coordinate),
-        "x_log": is_geometric(coordinate.values),
+        "x_name": name,
+        "x_label": words_of(dataset[name].attrs, name),
+        "x_unit": numbered_unit(dataset, name),
+        "x_log": is_geometric(dataset[name].values),
     }
 
 

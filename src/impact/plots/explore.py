@@ -30,7 +30,7 @@ from ..results.sweep import sweep_in_memory
 from ..results.xarray_backend import result_of
 from .draw import plot
 from .kinds import STUDIES, default_kind, find_kind, kinds_of, source_of
-from .slices import choose_line, unit_of
+from .slices import choose_line, numbered_unit
 from .style import DRAWING, is_geometric
 
 if TYPE_CHECKING:
@@ -183,14 +183,14 @@ def _slider(dataset: xr.Dataset, name: str, is_free: bool, value: object) -> Any
     """Make the slider of an axis, of any number in its range with a field or of its values, at a value."""
     import ipywidgets
 
-    values, label = dataset[name].values, axis_label(name, unit_of(dataset[name]))
+    values, label = dataset[name].values, axis_label(name, numbered_unit(dataset, name))
     first = values[0].item() if value is None else in_si(dataset[name], to_plain_value(value))
     if not (is_free and isinstance(first, float | int) and values.min() <= first <= values.max()):
         # one of the grid, or the message that there is no such value
         first = select(dataset, {name: first})[name].values.ravel()[0].item()
     common = {"value": first, "description": label, "continuous_update": False}
     if not is_free:
-        return ipywidgets.SelectionSlider(options=shown_values(dataset[name]), **common)
+        return ipywidgets.SelectionSlider(options=shown_values(dataset, name), **common)
     is_log = is_geometric(np.sort(values))
     least, most = (math.log10(end) if is_log else float(end) for end in (values.min(), values.max()))
     return (ipywidgets.FloatLogSlider if is_log else ipywidgets.FloatSlider)(
@@ -315,8 +315,8 @@ def axes_of(dataset: xr.Dataset) -> list[str]:
     return [str(dim) for dim in dataset.dims if dim not in ("model", "friction", SAMPLE) and dim in dataset.coords]
 
 
-def shown_values(coordinate: xr.DataArray) -> list[tuple[str, Any]]:
+def shown_values(dataset: xr.Dataset, name: str) -> list[tuple[str, Any]]:
     """List the texts and values of the positions of an axis."""
-    word, unit = InputName.parse(coordinate.name).word, unit_of(coordinate)
-    values = coordinate.values.tolist()
+    word, unit = InputName.parse(name).word, numbered_unit(dataset, name)
+    values = dataset[name].values.tolist()
     return [("∞" if value == math.inf else safe_text(prefixed(word(value), unit)), value) for value in values]

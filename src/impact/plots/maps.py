@@ -41,7 +41,7 @@ from .labels import (
     words_of,
 )
 from .layout import Picture
-from .slices import choose_plane, conditions_of, not_a_sweep, read, take_plane, unit_of
+from .slices import choose_plane, conditions_of, not_a_sweep, numbered_unit, read, take_plane
 from .style import is_geometric, limits_of, model_styles, tint
 
 # a value at each y and x
@@ -337,7 +337,7 @@ def _map_data(
     shown: Sequence[NamedLaw] = laws[:max_panels] or [NamedLaw(reference)]
     heading_text = safe_text(str(dataset.attrs.get("title", "")), 140)
     x_label, y_label, label = (words_of(data[name].attrs, name) for name in (x, y, variable))
-    x_unit, y_unit, unit = (unit_of(data[name]) for name in (x, y, variable))
+    x_unit, y_unit, unit = (numbered_unit(data, name) for name in (x, y, variable))
     label = "Error" if variable == "e_error" else label[:1].upper() + label[1:]
     title = safe_text(f"{label if kind == 'map' else 'Closest model'} over {x} and {y}")
     return MapData(

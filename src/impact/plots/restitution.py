@@ -146,7 +146,7 @@ def complete(
     conditions = with_model(conditions, line.data, numbered=choice.equations)
     if heading and title != FIGURE_6:
         heading, conditions = title, ": ".join(filter(None, (heading, conditions)))
-    x_axis = {**x_axis_fields(line.coordinate), "joined": line.is_ordered, **x_axis}
+    x_axis = {**x_axis_fields(line.data, line.x), "joined": line.is_ordered, **x_axis}
     panels = [replace(panel, **x_axis).with_log_axes(choice.log) for panel in panels]
     empty = {c.law: None for panel in panels for c in panel.curves if c.law and not np.isfinite(c.y).any()}
     # unless it is said why

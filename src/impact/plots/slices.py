@@ -223,6 +223,16 @@ def unit_of(coordinate: xr.DataArray | xr.Variable) -> str:
     return safe_text(plain_unit(str(coordinate.attrs.get("units", "1"))))
 
 
+def numbered_unit(dataset: xr.Dataset, name: str) -> str:
+    """Read the unit of an input or a variable, with the number of n if its laws have a single exponent."""
+    unit, law = unit_of(dataset[name]), InputName.parse(name).model
+    n = dataset.coords.get("exponent" if law or name in dataset.data_vars else "n")
+    if law and n is not None and "model" in n.dims:
+        n = n.isel(model=dataset["model"].values == law)
+    numbers = np.unique([] if n is None else n)
+    return with_numbers(unit, {"n": float(numbers[0])}) if names_in(unit) == {"n"} and numbers.size == 1 else unit
+
+
 def conditions_of(dataset: xr.Dataset, *drawn: str) -> str:
     """Write the values of all inputs that are not drawn, without the parameters of laws."""
     inputs = {name: quantity for name, quantity in scalars_of(dataset).items() if name not in drawn}

@@ -101,7 +101,7 @@ def _panels(data: xr.Dataset, name: str, varied: str, choice: Choice) -> tuple[P
         has_band = all(np.isfinite(end).all() for end in band)
         curves.append(curve_of(fitted, grid, y, name, band=band if has_band else ()))
         residuals.append(curve_of(fitted, x, law["residual"] / _deviation(law), f"{name}_residual"))
-    axis = x_axis_fields(data[varied or "point"])
+    axis = x_axis_fields(data, varied or "point")
     axis["x_log"] = bool(varied) and _is_logarithmic(x, grid)
     values = Panel(
         y_label="Delivered restitution" if name == "e_out" else OUTPUTS[name].short_meaning.capitalize(),

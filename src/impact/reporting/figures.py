@@ -20,14 +20,13 @@ from ..config.grid import SAMPLE
 from ..config.input_names import InputName, is_input
 from ..contact.model import ForceModel
 from ..contact.status import FIRST_FAILURE, NO_IMPACT
-from ..contact.units import names_in, with_numbers
 from ..contact.variables import LAW_DIMS
 from ..errors import ImpactError
 from ..formatting import prefixed
 from ..plots.data import PlotData
 from ..plots.draw import draw, get_plot_data
 from ..plots.kinds import STUDIES, Choice, Kind, Look, kinds_of
-from ..plots.slices import numeric_axes, unit_of, varying_inputs
+from ..plots.slices import numbered_unit, numeric_axes, varying_inputs
 from ..plots.style import encoded
 from ..results.provenance import command_start
 from ..results.ranking import MIN_ERROR_FLOOR
@@ -403,13 +402,3 @@ def coordinate_text(dataset: xr.Dataset, name: str) -> str:
     """Write the value of a scalar coordinate with its unit."""
     value = InputName.parse(name).word(dataset[name].values.item())
     return "∞" if value == math.inf else prefixed(value, numbered_unit(dataset, name), 6)
-
-
-def numbered_unit(dataset: xr.Dataset, name: str) -> str:
-    """Read the unit of a coordinate, with the number of the exponent n, of its law, if that has a single value."""
-    unit, law = unit_of(dataset[name]), InputName.parse(name).model
-    n = dataset.coords.get("exponent" if law else "n")
-    if n is not None and "model" in n.dims:
-        n = n.isel(model=dataset["model"].values == law)
-    numbers = np.unique([] if n is None else n)
-    return with_numbers(unit, {"n": float(numbers[0])}) if names_in(unit) == {"n"} and numbers.size == 1 else unit

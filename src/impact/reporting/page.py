@@ -30,7 +30,7 @@ from ..errors import UsageError
 from ..formatting import argument, scaled_unit
 from ..plots.explore import axes_of, axis_label, shown_values
 from ..plots.labels import LawPart, split_by_law, with_model
-from ..plots.slices import conditions_of, unit_of
+from ..plots.slices import conditions_of, numbered_unit
 from ..plots.style import is_geometric, model_styles
 from ..results.layouts import read_inputs
 from ..results.schema import require_axes
@@ -251,13 +251,13 @@ def _axis(dataset: xr.Dataset, axis: Axis) -> dict[str, Any]:
     coordinate, word = dataset[axis.name], InputName.parse(axis.name).word
     has_words = any(isinstance(word(value), str) for value in coordinate.values.tolist())
     numbers = np.arange(coordinate.size, dtype=float) if has_words else np.asarray(coordinate.values, float)
-    is_log, unit = not has_words and is_geometric(np.sort(numbers)), unit_of(coordinate)
+    is_log, unit = not has_words and is_geometric(np.sort(numbers)), numbered_unit(dataset, axis.name)
     # of the unit of the picture, without a prefix beside powers of ten
     size, shown = scaled_unit(unit, 1.0 if is_log else max(map(abs, filter(math.isfinite, numbers)), default=1.0))
-    texts = [text for text, _ in shown_values(coordinate)]
+    texts = [text for text, _ in shown_values(dataset, axis.name)]
     for name in axis.columns:
         if name != axis.name:
-            along = [f"{axis_label(name)} = {text}" for text, _ in shown_values(dataset[name])]
+            along = [f"{axis_label(name)} = {text}" for text, _ in shown_values(dataset, name)]
             texts = [f"{text}, {other}" for text, other in zip(texts, along, strict=True)]
     return {
         "name": axis.name,

@@ -32,7 +32,7 @@ from ..engine.plan import Plan
 from ..engine.plugins import read_plugins
 from ..errors import ImpactError, UsageError, require_known
 from ..formatting import argument, law_name, number, prefixed, safe_text, scaled_unit, with_year
-from ..plots.slices import varying_inputs
+from ..plots.slices import numbered_unit, varying_inputs
 from ..results.attributes import read_attribute
 from ..results.board import BOARD_HEADINGS, Board, board_rows, check_rows, engine_headline, failure_lines
 from ..results.calibration import calibration_title, describe_data, fit_notes, fit_table
@@ -44,7 +44,7 @@ from ..results.sensitivity import INDEX_HEADINGS, describe_design, study_texts
 from ..results.slabs import MAX_SUMMARY_POINTS, is_large
 from ..results.summary import Summary, extremes_of, input_notes, inputs_of, result_notes, summarize, with_depths
 from ..results.xarray_backend import result_to_show
-from .figures import Drawing, Figure, at_text, coordinate_text, numbered_unit
+from .figures import Drawing, Figure, at_text, coordinate_text
 
 # the most that is shown: letters of a text and of a line of the config, values of an axis, failed points
 MAX_TEXT_LETTERS, MAX_LINE_LETTERS, MAX_VALUES, MAX_FAILED = 2000, 100_000, 8, 20
