@@ -206,7 +206,7 @@ def board_rows(engines: Sequence[Mapping[str, Any]]) -> list[tuple[str, ...]]:
         mark = " ✗" if "fail" in statuses else ""
         return f"{statuses.count('pass')}/{judged}{mark}" if judged else "–"
 
-    facts = [(key, *(engine[key] for engine in engines)) for key in ("version", "kind")]
+    facts = [(key, *(engine[key] or "–" for engine in engines)) for key in ("version", "kind")]
     by_engine = [dict(_checks_by_name(engine)) for engine in engines]
     return facts + [(name, *(cell(checks.get(name, ())) for checks in by_engine)) for name in by_engine[0]]
 

@@ -169,7 +169,7 @@ def _values_text(dataset: xr.Dataset, name: str) -> str:
     distinct = list(dict.fromkeys(array.tolist()))
     if array.dtype.kind in "fi" and len(distinct) > MAX_LISTED_NUMBERS:
         return f"{number(array.min())} … {number(array.max())}, {array.size} values{suffix}"
-    return ", ".join(number(InputName.parse(name).word(value), None) for value in distinct) + suffix
+    return ", ".join(number(InputName.parse(name).word(value), None) or "–" for value in distinct) + suffix
 
 
 def describe(
