@@ -98,6 +98,12 @@ def test_the_limit_of_small_steps_is_named_beside_the_law_that_reaches_it_slowly
     for legend in ("full", "short", "keys"):
         names = impact.plot(result, kind="beta", legend=legend).legends[0].get_texts()
         assert ["limit" in name.get_text() for name in names] == [False, True]
+    assert re.findall('"label":"LAMMPS ([a-z]*)[^"]*, limit of small steps"', impact.page(result)) == ["mindlin"]
+    with pytest.warns(
+        UserWarning, match=f"^{TSUJI} with lammps-mindlin: beta is the limit of small steps"
+    ) as warned:
+        impact.recommend(result, target={"beta": 0.1})
+    assert len(warned) == 1
 
 
 @pytest.mark.parametrize("kind", SHOWN)

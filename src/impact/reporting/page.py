@@ -29,7 +29,7 @@ from ..engine.inputs import Inputs, build_impacts, input_at
 from ..errors import UsageError
 from ..formatting import argument, scaled_unit
 from ..plots.explore import axes_of, axis_label, shown_values
-from ..plots.labels import LawPart, split_by_law, with_model
+from ..plots.labels import LawPart, mark_slow_limit, split_by_law, with_model
 from ..plots.slices import conditions_of, numbered_unit
 from ..plots.style import is_geometric, model_styles
 from ..results.layouts import read_inputs
@@ -120,10 +120,10 @@ def _page_of(dataset: xr.Dataset, models: Sequence[str] | None) -> str:
     if of_pairs:
         # before they are computed
         _check_size(sum(dataset[name].size for name in of_pairs) * VALUE_BYTES)
-        of_friction = dataset[of_pairs]
+        of_friction = dataset[[name for name in (*of_pairs, "friction_status") if name in dataset]]
         # selected by its key, a friction law is no dimension
         of_friction = of_friction if "friction" in dataset.dims else of_friction.expand_dims("friction")
-        pairs = [*split_by_law(of_friction, numbered=False)]
+        pairs = [*map(mark_slow_limit, split_by_law(of_friction, numbered=False))]
         arrays += [_values(pair.data, of_pairs, inputs) for pair in pairs]
         parts, names = [*parts, *pairs], [*names, *of_pairs]
     laws = [{**law, **columns} for law, columns in zip(_laws(parts), arrays, strict=True)]

@@ -22,7 +22,7 @@ from ..contact.status import FIRST_FAILURE, FrictionStatus, Status
 from ..contact.units import names_in, with_numbers
 from ..contact.variables import OUTPUTS
 from ..display import Block, Displayed, Table, html_of
-from ..errors import UsageError, did_you_mean
+from ..errors import UsageError, did_you_mean, warn
 from ..formatting import argument, law_name, percentage, prefixed, safe_text
 from .provenance import describe_point
 from .schema import columns_along, parts_of_laws, plain_unit, require_axes, require_sweep
@@ -463,7 +463,11 @@ def _judged_slabs(
         else:
             # an answer without this output, such as beta without a slip, has no target
             output, error = values, values - criterion.target
-            has_target = ~(np.isnan(values) & np.isin(status, (FrictionStatus.OK, FrictionStatus.SLOW_LIMIT)))
+            is_slow = status == FrictionStatus.SLOW_LIMIT
+            has_target = ~(np.isnan(values) & ((status == FrictionStatus.OK) | is_slow))
+            if is_slow.any():
+                laws, meaning = law_name(*_keys(evaluated)), FrictionStatus.SLOW_LIMIT.meaning
+                warn(f"{laws}: {criterion.output} is {meaning}; see impact timestep")
         distance = np.abs(error)
         judged = has_target & (status != Status.NO_IMPACT)
         failed = judged & (status >= FIRST_FAILURE)
