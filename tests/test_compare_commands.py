@@ -422,6 +422,15 @@ def test_a_picture_of_differences_has_degrees_and_words() -> None:
     assert [label.get_text() for label in beta.get_xticklabels()] == ["abs", "positive"]
 
 
+def test_no_symbol_is_on_the_texts_of_limits(wide: xr.Dataset) -> None:
+    moved = wide.assign(v1_post=wide["v1_post"] * 1.001, e_out=wide["e_out"] * np.nan)
+    figure = draw_differences(difference_data(impact.compare(moved, wide)))
+    figure.draw_without_rendering()
+    for axes in figure.axes:
+        assert {text.get_text().split(":")[0] for text in axes.texts} == {"tolerance", "above"}
+        assert min(text.get_window_extent().x0 for text in axes.texts) > axes.bbox.x1
+
+
 def test_numbers_of_cases_are_whole_ones_where_differences_are_drawn() -> None:
     sweep = {"cases": {"e": [0.2, 0.9, 0.5, 0.7]}, "v1": 1.0, "m1": 1.0, "m2": 1.0, "K": 1e6}
     result = impact.sweep({"models": ["hertz"], "sweep": sweep})

@@ -176,7 +176,7 @@ def _draw_panel(
         height = top / NO_NUMBER_BAND ** ((index + 1) / (len(names) + 1))
         axes.plot(shifted, np.where(np.isinf(ratio), height, np.nan), linestyle="", **style)
     if any(np.isinf(row).any() for row in panel.ratios.values()):
-        _draw_limit(axes, top / NO_NUMBER_BAND, "above: no number", linewidth=0.6, linestyle=":")
+        _draw_limit(axes, top / NO_NUMBER_BAND, "above:\nno number", linewidth=0.6, linestyle=":")
     axes.set_yscale("log")
     axes.set_ylim(bottom, top)
     axes.set_xlabel(panel.label)
@@ -197,7 +197,7 @@ def _draw_panel(
 
 def _draw_limit(axes: Axes, height: float, name: str, **style: Any) -> None:
     axes.axhline(height, color=tint(1.0), **style)
-    annotate_right_edge(axes, name, height, -2, -3, ha="right", va="top")
+    annotate_right_edge(axes, name, height, 3)
 
 
 def _label_ticks(axes: Axes, panel: DifferencePanel, x: np.ndarray) -> None:
