@@ -265,6 +265,9 @@ def test_inputs_and_titles_that_became_variables_are_taken_for_coordinates() -> 
     names = [name for name in result.coords if name not in result.dims]
     for show in (impact.page, impact.report, impact.info):
         assert str(show(result.reset_coords(names))) == str(show(result))
+    # v1 is an input, and a variable over time
+    lines = str(impact.info(impact.run(model="hertz", at={"e": 0.5}).history)).splitlines()
+    assert any(line.startswith("v1 ") and " t " in line for line in lines)
 
 
 def test_a_result_of_which_no_values_are_left_is_refused() -> None:

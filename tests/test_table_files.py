@@ -87,6 +87,19 @@ def test_all_numbers_of_a_picture_have_the_comma(stored: Path) -> None:
     assert any("1,5" in text for text in texts)
 
 
+def test_a_table_without_headings_is_not_printed_in_parts() -> None:
+    stream = io.StringIO()
+    print_blocks([Table([["name", 30 * "a", 30 * "b"]])], stream, 40)
+    assert stream.getvalue().count("name") == 1
+
+
+def test_the_name_of_a_panel_has_the_comma() -> None:
+    sweep = {"v1": [1.0, 2.0], "m1": [1.0, 2.0], "m2": 1.0, "e": 0.5, "K": 1e6}
+    models = {"models": ["hertz", "kuwabara-kono-1987"], "model": {"kuwabara-kono-1987": {"A": 2.5e-6}}}
+    figure = impact.plot(impact.sweep({**models, "sweep": sweep}), kind="map", x="v1", y="m1", decimal="comma")
+    assert figure.axes[1].get_title(loc="left").endswith("\N{NO-BREAK SPACE}2,5\N{NO-BREAK SPACE}µs")
+
+
 def test_texts_of_the_user_keep_their_points_beside_numbers_with_commas(stored: Path) -> None:
     _, ax = plt.subplots()
     ax.set_title("Version 1.5")
@@ -204,12 +217,13 @@ def test_a_table_without_room_is_folded_at_spaces_and_the_widest_column_first() 
         assert words <= {word for line in lines[width] for word in line.split()}
     # numbers keep their line as long as texts give way
     assert any("0.0967 to 0.1033" in line for line in lines[66])
-    # where the words of all columns have no room, each part has the law and a column
+    # where the words of all columns do not fit, each part has the law and a column, and a line is between parts
+    assert lines[46].count("") == 2
     assert [line.split() for line in lines[46] if line.startswith("law")] == [
         ["law", "parameter"],
         ["law", "95", "%"],
         ["law", "chi2/dof"],
     ]
-    # where even those of two columns have none they are broken, and all characters are there
+    # where even those of two columns do not fit they are broken, and all characters are there
     repeated = 2 * f"law{pair}".replace(" ", "")
     assert sorted("".join(lines[24]).replace(" ", "")) == sorted("".join(lines[100]).replace(" ", "") + repeated)
