@@ -111,7 +111,9 @@ def _command(adapter: object) -> list[str]:
     if not isinstance(adapter, str | Sequence) or not "".join(map(str, adapter)).strip():
         raise AdapterError(f'got {adapter!r}, expected FILE.py:FUNCTION or "PROGRAM ARGUMENTS"')
     try:
-        words = shlex.split(adapter) if isinstance(adapter, str) else [str(word) for word in adapter]
+        # a backslash separates folders on Windows, and escapes nothing
+        text = str(adapter).replace("\\", r"\\") if os.name == "nt" else str(adapter)
+        words = shlex.split(text) if isinstance(adapter, str) else [str(word) for word in adapter]
     except ValueError as error:
         raise AdapterError(f"{adapter}: {error}") from None
     program = find_program(words[0], None)

@@ -7,6 +7,7 @@ import multiprocessing
 import multiprocessing.connection
 import os
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
@@ -89,8 +90,9 @@ class _ProcessPool(ProcessPoolExecutor):
 
 @contextlib.contextmanager
 def _process_pool(jobs: int) -> Iterator[Executor]:
-    # a semaphore counts no further
-    pool = _ProcessPool(min(jobs, 2**30), multiprocessing.get_context("spawn"), _initialize_worker)
+    # a semaphore counts no further, and Windows waits for at most 63 handles, two of which are not of processes
+    most = 61 if sys.platform == "win32" else 2**30
+    pool = _ProcessPool(min(jobs, most), multiprocessing.get_context("spawn"), _initialize_worker)
     try:
         yield pool
     except BaseException as error:
