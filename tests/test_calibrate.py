@@ -545,9 +545,9 @@ def test_only_what_the_data_determine_of_parameters_counts() -> None:
     e, sigma = np.array([0.48, 0.5, 0.51, 0.49, 0.53]), 0.01
     sweep = {**LINEAR["sweep"], "K": {"fit": [1e4, 1e8]}}
     squares, half = 4.0 * e.var(ddof=1), stats.t.ppf(0.975, 4) * e.std(ddof=1) / math.sqrt(5.0)
-    given = {"columns": {"e_out": e.tolist(), "sigma": [sigma] * 5}}
+    data = {"columns": {"e_out": e.tolist(), "sigma": [sigma] * 5}}
     of_spring = {"sweep": {**sweep, "e": 0.5}, "model": {"kelvin-voigt": {"C": {"fit": [1.0, 1e5]}}}}
-    fit = impact.calibrate({"models": "kelvin-voigt", **of_spring, "data": given})
+    fit = impact.calibrate({"models": "kelvin-voigt", **of_spring, "data": data})
     assert fit["identifiable"].values.tolist() == [[0, 0]]
     assert fit["chi2_reduced"].item() == pytest.approx(squares / sigma**2 / 4.0, rel=1e-7)
     assert fit["p_value"].item() == pytest.approx(stats.chi2.sf(squares / sigma**2, 4), rel=1e-7)

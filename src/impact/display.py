@@ -100,7 +100,7 @@ class Table:
             console.print(table)
 
     def _parts(self, columns: Sequence[Sequence[str]], width: int) -> Iterator[Sequence[int]]:
-        """Split columns under headings whose words have no room, as pandas does; each part has the first one."""
+        """Split columns under headings that do not fit the width, as pandas does; the first is in each part."""
         from rich.cells import cell_len
 
         if not self.headings or None not in self._widths(columns, range(len(columns)), width):
@@ -116,7 +116,7 @@ class Table:
         yield part
 
     def _widths(self, columns: Sequence[Sequence[str]], part: Sequence[int], width: int) -> Sequence[int | None]:
-        """Choose the widths of columns that fold at spaces, the widest first; None where words have no room."""
+        """Choose the widths of columns that fold at spaces, the widest first; None where words do not fit."""
         from rich.cells import cell_len
 
         texts = [columns[i] for i in part]

@@ -112,7 +112,7 @@ def default_size() -> tuple[float, float | None]:
     if [width, height] == list(rcParamsDefault["figure.figsize"]):
         return WIDTHS["double"], None
     for side in (width, height):
-        # refused where the options refuse it
+        # the limits are those of the options
         length(side, "figure.figsize")
     return width, height
 

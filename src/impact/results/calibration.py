@@ -91,9 +91,9 @@ def fit_rows(dataset: xr.Dataset) -> list[tuple[str, ...]]:
 
 
 def fit_table(dataset: xr.Dataset) -> tuple[list[str], list[list[str]]]:
-    """Write the headings and rows of the table of a calibration; without p where no law has one."""
+    """Write the headings and rows of the table of a calibration; without p where no law has a p-value."""
     rows, p = fit_rows(dataset), FIT_HEADINGS.index("p")
-    # no law has one without a stated noise, or in a file of version 1.0.0
+    # only the noise "given" has a p-value, which a file of version 1.0.0 lacks
     shown = [i for i in range(len(FIT_HEADINGS)) if i != p or {row[p] for row in rows} - {"", "–"}]
     return [FIT_HEADINGS[i] for i in shown], [[row[i] for i in shown] for row in rows]
 
