@@ -246,7 +246,8 @@ def read_csv(
 def _split(path: Path, numbered: Sequence[tuple[int, str]], separator: str) -> dict[int, list[str]]:
     """Split lines into cells, by the number of the line."""
     # csv knows spaces before a quoted cell, and none after it
-    lines = (re.sub(rf'(?<!")" +(?={separator}|$)', '"', line) for _, line in numbered)
+    space = re.compile(rf'(?<!")" +(?={separator}|$)')
+    lines = (space.sub('"', line) if '"' in line else line for _, line in numbered)
     if separator == " ":
         lines = (" ".join(_words(line)) for _, line in numbered)
     reader = csv.reader(lines, delimiter=separator, strict=True, skipinitialspace=separator != "\t")
@@ -268,7 +269,8 @@ def _find_separator(path: Path, numbered: Sequence[tuple[int, str]], is_looked_f
     """Recognise the separator by the header: it separates all rows alike, and names that are looked for."""
     readings: dict[str, list[list[str]]] = {}
     errors: dict[str, ConfigError] = {}
-    for mark in SEPARATORS:
+    # a sign that the header lacks is no separator, and a long file takes a second to split
+    for mark in filter(numbered[0][1].count, SEPARATORS):
         try:
             readings[mark] = list(_split(path, numbered, mark).values())
         except ConfigError as error:
