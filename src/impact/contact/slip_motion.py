@@ -59,8 +59,8 @@ MIN_REACH = 1e-2
 ORDER_TOLERANCE = 1e-6
 # steps of the central difference quotients for the rate of N and the rate of the slip that it determines
 RATE_OF_LIMIT_STEP, RATE_OF_SLIP_STEP = 1e-5, 1e-3
-# error of the slip by rounding, relative to the two terms of it: some five times what impacts have
-SLIP_ROUNDING = 1e-10
+# bound on rounding errors of the normal force over K x^n, from which damping takes: four times the largest seen
+FORCE_ROUNDING = 4e-15
 # s at which leading powers of x are compared at first contact, and their rates; and the least s for what
 # is singular at s = 0
 START_S, RATE_S, LEAST_S = 1e-7, 1e-4, 1e-10
@@ -600,10 +600,12 @@ class SlipPhase:
         y = np.array([np.where(np.abs(y[0]) < self.end, self.end, y[0]), *y[1:]])
         k, columns = self.rates(y, params), self.columns(params)
         N, dN = columns.share * k[-1], columns.share * self._rate_of_force(y, k, params)
-        s, growth = self.whole(y[0], columns)
+        (s, growth), p = self.whole(y[0], columns), self.law.model.coordinate_power
         stiffness = self._times(columns.root * columns.root * k[TIME_ROW], s, self.stiffness_power)
         fading = self.memory * self.stiffness_power * (growth * k[0]) / _away_from_zero(s) * N
-        error = SLIP_ROUNDING * (np.abs(dN) + np.abs(fading)) / stiffness
+        spring = np.abs(columns.share) * power(integer_power(np.abs(y[0]), p), self.law.n)
+        step = RATE_OF_LIMIT_STEP * np.clip(np.abs(y[0]), MIN_REACH, 1.0)
+        error = FORCE_ROUNDING * np.maximum(np.abs(N), spring) / (step * stiffness)
         return direction * (dN - fading) / stiffness, error, N
 
     def _held_force(self, y: Array, params: Params, direction: Array) -> tuple[Array, Array]:
