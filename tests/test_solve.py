@@ -8,6 +8,8 @@ import re
 import shlex
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -409,3 +411,23 @@ def test_a_given_value_that_changes_nothing_is_noted(name: str, at: dict[str, fl
     with pytest.warns(impact.ImpactWarning, match=re.escape(note)):
         result = impact.solve("kelvin-voigt", name, {"e_out": 0.6}, at=at)
     assert result.roots == without.roots
+
+
+@pytest.mark.parametrize("joint", ["zip", "cases"])
+def test_a_parameter_that_varies_with_another_input_is_solved_for_at_its_value(joint: str, tmp_path: Path) -> None:
+    """The value that stands in for the unknown is none of the joint values, and selects none of them."""
+    law, m1, A = "kuwabara-kono-1987", [0.1, 0.2], [1e-6, 2e-6]
+    fixed = {"m2": math.inf, "K": 1e9, "v1": 1.0}
+    config: dict[str, Any] = {"models": [law], "sweep": {**fixed, "m1": m1, "zip": [["m1", f"{law}.A"]]}}
+    config["model"] = {law: {"A": A}}
+    if joint == "cases":
+        path = tmp_path / "cases.csv"
+        path.write_text("\n".join(["m1,kuwabara-kono-1987.A", *map("{},{}".format, m1, A)]))
+        config = {"models": [law], "sweep": {**fixed, "cases": str(path)}}
+    [root] = impact.solve(law, "A", {"e_out": 0.7}, source=config, at={"m1": 0.2}).roots
+    alone = {"models": [law], "sweep": {**fixed, "m1": 0.2}}
+    [expected] = impact.solve(law, "A", {"e_out": 0.7}, source=alone).roots
+    assert root == expected
+    # also where a law without an e gets its damping
+    step = impact.timestep(law, source=config, at={"m1": 0.2, "e": 0.7})
+    assert step.solved == pytest.approx({"A": expected.value}, rel=1e-9)

@@ -44,7 +44,7 @@ from ..engine.plugins import read_plugins
 from ..errors import UsageError, did_you_mean, require_known, warn
 from ..formatting import argument, law_name, number, prefixed, quantity, safe_text
 from ..results.ranking import only_target, target_value
-from ..results.single_impact import ignores_e, input_name, open_source, single_point
+from ..results.single_impact import PointSource, ignores_e, input_name, joint_inputs, open_source, single_point
 from .prepared import outputs_at, trial_inputs
 
 # values that are tried before roots are refined: powers of ten times the contact's own unit of the parameter
@@ -211,7 +211,7 @@ def solve(
     for key in at or {}:
         if {config_name(law, unknown), unknown.name} & {key, str(input_name(key, law, friction_law))}:
             warn(f"{argument('at', key=key)}: {name} is solved for, and this value changes nothing")
-    inputs = {**placeholder(law, unknown), **(at or {})}
+    inputs = {**placeholder(law, unknown, point_source), **(at or {})}
     config, _ = single_point(point_source, model, inputs, over, friction=friction)
     if "e" in (at or {}) and ignores_e(config):
         warn(f"{argument('at', key='e')}: e is not an input of {law.key}, and changes nothing")
@@ -271,12 +271,16 @@ def config_name(model: ForceModel, unknown: Parameter) -> str:
     return name if is_shared or name.startswith("friction.") else f"{model.key}.{name}"
 
 
-def placeholder(model: ForceModel, unknown: Parameter) -> dict[str, float]:
-    """Give the unknown a valid value by its config name, so that the config needs none."""
-    if unknown.name == "K":
+def placeholder(model: ForceModel, unknown: Parameter, source: PointSource) -> dict[str, float]:
+    """Give the unknown a valid value by its config name, so that the config needs none.
+
+    Where it varies together with others the config has values, and another one would select none of them.
+    """
+    name = config_name(model, unknown)
+    if unknown.name == "K" or name in joint_inputs(source.draft(model.key)):
         return {}
     value = next((v for v in (unknown.default, unknown.typical) if v is not None), 1.0)
-    return {config_name(model, unknown): min(max(value, unknown.least), unknown.most)}
+    return {name: min(max(value, unknown.least), unknown.most)}
 
 
 def solve_damping(config: Config, e: float) -> Config:

@@ -774,7 +774,7 @@ def law_at_point(
             raise UsageError(f"{argument('at', key='e')}: {model.key} has no e, and no parameter that sets it")
         if not {model.damping, f"{model.key}.{model.damping}"}.isdisjoint(at):
             raise UsageError(f"{argument('at')}: got e and {model.damping}, expected one of the two")
-        at = {**at, **placeholder(model, unknown_of(model, model.damping))}
+        at = {**at, **placeholder(model, unknown_of(model, model.damping), source)}
     config, defaulted_axes = single_point(source, model.key, at, friction=friction)
     values = with_words(config.scalars)
     first = {name: prefixed(values[name], InputName.parse(name).unit, FIRST_DIGITS) for name in defaulted_axes}

@@ -636,12 +636,9 @@ def single_point(
     ]
     is_uncertain = bool(paths_with(draft.data, DISTRIBUTION_FORMS))
     draft = draft.with_settings(settings)
-    if isinstance(draft.table("sweep").get("cases"), str):
-        # the inputs that vary together are the columns of the file
-        draft = inline_files(draft)
     if source.is_starter:
         draft = without_replaced_inputs(draft, fixed)
-    joint = _joint_inputs(draft)
+    joint = joint_inputs(draft)
     varying = {str(name) for name, value in input_values(draft.data) if isinstance(value, list | dict)}
     labels = {name: value for name, value in source.labels.items() if name in varying | joint or is_case(name)}
     # `impact plot --sel` takes no other settings
@@ -684,8 +681,11 @@ def input_name(name: str, model: ForceModel | None, friction: FrictionLaw | None
     return parsed
 
 
-def _joint_inputs(draft: Draft) -> set[str]:
+def joint_inputs(draft: Draft) -> set[str]:
     """Name the inputs that vary together: in zip groups and in a table of cases."""
+    if isinstance(draft.table("sweep").get("cases"), str):
+        # its columns are those of a file
+        draft = inline_files(draft)
     zipped = [name for group in draft.zip_groups for name in group]
     return {str(InputName.parse(name)) for name in (*zipped, *as_table(draft.table("sweep").get("cases")))}
 
@@ -702,7 +702,7 @@ def _has_input(draft: Draft, name: InputName) -> bool:
 
 def _unknown_input(draft: Draft, name: str, at: Mapping[str, object]) -> UsageError:
     names = {*draft.input_names, *SWEEP_DEFAULTS, *(str(parameter) for parameter, _ in draft.parameters)}
-    choices = {choice for choice in names if _has_input(draft, InputName.parse(choice))} | _joint_inputs(draft)
+    choices = {choice for choice in names if _has_input(draft, InputName.parse(choice))} | joint_inputs(draft)
     parsed = InputName.parse(name)
     if name in at and parsed.table in ("sweep", "materials") and parsed.key in MATERIAL_QUANTITIES:
         hint = _property_hint(draft, parsed, at, choices)
