@@ -50,6 +50,7 @@ DIALECTS = {
     "slash and no brackets": PLAIN.replace(" [cm/s]", "/cm/s"),
     "word before a unit": PLAIN.replace("[cm/s]", "in cm/s"),
     "spaces": PLAIN.replace(",", "  "),
+    "line break in the first cell": PLAIN.replace("v1 [cm/s]", '"v1\n[cm/s]"'),
 }
 
 

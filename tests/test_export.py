@@ -1112,6 +1112,27 @@ def test_a_script_ends_with_the_command_that_is_terminated(tmp_path: Path) -> No
     assert not [*(tmp_path / "folders").iterdir()]
 
 
+def test_a_signal_that_the_caller_ignores_stays_ignored_and_another_thread_handles_none() -> None:
+    program = """
+import contextlib, signal, sys, threading
+from impact.cli.main import main
+sys.argv = ["impact", "--version"]
+def run():
+    with contextlib.suppress(SystemExit):
+        main()
+thread = threading.Thread(target=run)
+thread.start()
+thread.join()
+assert signal.getsignal(signal.SIGTERM) == signal.SIG_DFL
+signal.signal(signal.SIGTERM, signal.SIG_IGN)
+run()
+assert signal.getsignal(signal.SIGTERM) == signal.SIG_IGN
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.count("impact") == 2
+
+
 @pytest.mark.parametrize("reported", ["31 Feb 2025", "99 Foo 2025"])
 def test_a_program_that_reports_no_release_is_one_line(cli: Run, tmp_path: Path, reported: str) -> None:
     lmp = write_program(tmp_path / "lmp", f'echo "Parallel Simulator - {reported}"')

@@ -59,6 +59,11 @@ def test_a_target_that_only_impacts_of_many_steps_reach_is_attained() -> None:
     best = impact.solve(model, "eta", {"contact_time": 4e-3}, over=over, overrides=solver).roots[0].value
     contact_times = problem(eta=best, v1=over["v1"])["contact_time"]
     assert contact_times == pytest.approx([4e-3, 4e-3], rel=0.01)
+    # at 0.5 m/s impacts of few steps attain the target, too; what is too long there and too short here balances
+    over = {"v1": [0.5, 5.7]}
+    best = impact.solve(model, "eta", {"contact_time": 3.2e-3}, over=over, overrides=solver).roots[0].value
+    longer, shorter = problem(eta=best, v1=over["v1"])["contact_time"]
+    assert longer - 3.2e-3 == pytest.approx(3.2e-3 - shorter, rel=1e-3)
 
 
 @pytest.mark.slow

@@ -45,6 +45,8 @@ class Interrupted(Interruption):
 
 def stop(number: int, frame: FrameType | None) -> NoReturn:
     """Handle a signal by an exception, so that programs that were started end and their folders are removed."""
+    # another signal would interrupt that
+    signal.signal(number, signal.SIG_IGN)
     raise Interrupted(number, "stopped immediately")
 
 

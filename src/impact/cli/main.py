@@ -6,6 +6,7 @@ import gc
 import re
 import signal
 import sys
+import threading
 from functools import partial
 from importlib import import_module
 from typing import Annotated, Any
@@ -169,7 +170,10 @@ def main() -> None:
     # imports leave no garbage, and at the end all memory is given back: a short command takes a fifth less time
     # without a search for unused objects
     gc.disable()
-    signal.signal(signal.SIGTERM, exits.stop)
+    # a signal that the caller ignores stays ignored; only the main thread may handle signals
+    is_main = threading.current_thread() is threading.main_thread()
+    if is_main and signal.getsignal(signal.SIGTERM) == signal.SIG_DFL:
+        signal.signal(signal.SIGTERM, exits.stop)
     code = exits.run_command_line(
         partial(app, standalone_mode=False, prog_name="impact"), debug="--debug" in sys.argv
     )

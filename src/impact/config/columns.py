@@ -269,15 +269,17 @@ def _find_separator(path: Path, numbered: Sequence[tuple[int, str]], is_looked_f
     """Recognise the separator by the header: it separates all rows alike, and names that are looked for."""
     readings: dict[str, list[list[str]]] = {}
     errors: dict[str, ConfigError] = {}
-    # a sign that the header lacks is no separator, and a long file takes a second to split
-    for mark in filter(numbered[0][1].count, SEPARATORS):
+    first_line = numbered[0][1]
+    # a sign that the header lacks is no separator, and a long file takes a second to split; a header with an open
+    # quote goes on in the next line
+    for mark in SEPARATORS if first_line.count('"') % 2 else filter(first_line.count, SEPARATORS):
         try:
             readings[mark] = list(_split(path, numbered, mark).values())
         except ConfigError as error:
             errors[mark] = error
     readings = {mark: rows for mark, rows in readings.items() if len(rows[0]) > 1}
     if errors and not readings:
-        raise errors[max(errors, key=numbered[0][1].count)]
+        raise errors[max(errors, key=first_line.count)]
     regular = {mark: rows for mark, rows in readings.items() if len({*map(len, rows)}) == 1} or readings
     readings = {mark: rows for mark, rows in regular.items() if any(map(is_looked_for, rows[0]))} or regular
     if len(readings) > 1 and any(is_looked_for(header) for rows in readings.values() for header in rows[0]):

@@ -622,7 +622,7 @@ class SlipPhase:
     def _held_margin(self, y: Array, params: Params, direction: Array) -> tuple[Array, Mask]:
         """Compute a margin, positive while the force is between slip and stick, and where it is nearer to slip.
 
-        It is negative by no more than errors, which exceed the force near the end of the contact.
+        The rounding error of the force is added: near the end of the contact it exceeds the force.
         """
         columns, y = self.columns(params), y[:N_COMPONENTS]
         slip, _, N = self._held_slip(y, params, direction)

@@ -359,8 +359,9 @@ class SolveProblem:
         """Compute the target variable at the values of a scan; `known` are values of it elsewhere."""
         outputs = self.evaluate(values, is_scan=True)[self.variable]
         failed = np.isnan(outputs).reshape(values.size, -1).any(axis=1)
-        computed = np.append(known, outputs[~failed])
-        is_beyond = not (computed.size and computed.min() <= target <= computed.max())
+        # those of each condition
+        computed = [np.append(known, column) for column in outputs.reshape(values.size, -1)[~failed].T]
+        is_beyond = not all(each.size and each.min() <= target <= each.max() for each in computed)
         if with_range and failed.any() and is_beyond and (self.variable != "e_out" or 0.0 <= target <= 1.0):
             # the scan stops at SCAN_MAX_STEPS: impacts of more steps may attain the target
             outputs[failed] = self.evaluate(values[failed])[self.variable]
