@@ -1094,7 +1094,7 @@ def test_a_script_that_does_not_end_is_stopped(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_a_script_ends_with_the_command_that_is_terminated(tmp_path: Path) -> None:
-    """A script has a session of its own, so that what ends the group of the command does not reach it."""
+    """A script runs in another session, which a signal to the group of the command does not reach."""
     program = write_program(
         tmp_path / "lmp", RELEASE + f"echo $$ > {tmp_path}/part; mv {tmp_path}/part {tmp_path}/pid; sleep 60"
     )

@@ -271,7 +271,7 @@ def _find_separator(path: Path, numbered: Sequence[tuple[int, str]], is_looked_f
     errors: dict[str, ConfigError] = {}
     first_line = numbered[0][1]
     # a sign that the header lacks is no separator, and a long file takes a second to split; a header with an open
-    # quote goes on in the next line
+    # quote continues in the next line
     for mark in SEPARATORS if first_line.count('"') % 2 else filter(first_line.count, SEPARATORS):
         try:
             readings[mark] = list(_split(path, numbered, mark).values())

@@ -359,7 +359,7 @@ class SolveProblem:
         """Compute the target variable at the values of a scan; `known` are values of it elsewhere."""
         outputs = self.evaluate(values, is_scan=True)[self.variable]
         failed = np.isnan(outputs).reshape(values.size, -1).any(axis=1)
-        # those of each condition
+        # at each condition
         computed = [np.append(known, column) for column in outputs.reshape(values.size, -1)[~failed].T]
         is_beyond = not all(each.size and each.min() <= target <= each.max() for each in computed)
         if with_range and failed.any() and is_beyond and (self.variable != "e_out" or 0.0 <= target <= 1.0):

@@ -636,6 +636,7 @@ def single_point(
     ]
     is_uncertain = bool(paths_with(draft.data, DISTRIBUTION_FORMS))
     draft = draft.with_settings(settings)
+    draft = _with_cases(draft)
     if source.is_starter:
         draft = without_replaced_inputs(draft, fixed)
     joint = joint_inputs(draft)
@@ -681,13 +682,16 @@ def input_name(name: str, model: ForceModel | None, friction: FrictionLaw | None
     return parsed
 
 
+def _with_cases(draft: Draft) -> Draft:
+    """Read the columns of cases, if they are those of a file."""
+    return inline_files(draft) if isinstance(draft.table("sweep").get("cases"), str) else draft
+
+
 def joint_inputs(draft: Draft) -> set[str]:
     """Name the inputs that vary together: in zip groups and in a table of cases."""
-    if isinstance(draft.table("sweep").get("cases"), str):
-        # its columns are those of a file
-        draft = inline_files(draft)
     zipped = [name for group in draft.zip_groups for name in group]
-    return {str(InputName.parse(name)) for name in (*zipped, *as_table(draft.table("sweep").get("cases")))}
+    cases = as_table(_with_cases(draft).table("sweep").get("cases"))
+    return {str(InputName.parse(name)) for name in (*zipped, *cases)}
 
 
 def _has_input(draft: Draft, name: InputName) -> bool:
