@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import subprocess
 import sys
 from importlib import metadata
 from importlib.util import find_spec
@@ -38,6 +39,13 @@ def test_the_text_has_parts_for_the_program_its_packages_the_compiled_core_and_t
     assert [line.startswith("compiled core: ") for line in core] == [True]
     assert codes[0] == "code version program"
     assert any(line.startswith("lammps ") for line in codes)
+
+
+def test_a_source_tree_that_is_not_installed_has_versions_too() -> None:
+    # without the folders of packages there is no metadata, as if only the sources were on the path
+    words = "import sys, impact; doctor = impact.doctor; sys.path[:] = []; print(doctor().impact)"
+    done = subprocess.run([sys.executable, "-c", words], capture_output=True, text=True, encoding="utf-8")
+    assert done.stdout.strip() == impact.__version__, done.stderr
 
 
 @pytest.mark.slow

@@ -69,7 +69,9 @@ def doctor() -> Environment:
     >>> found.impact == impact.__version__ and found.packages["numpy"] is not None
     True
     """
-    required = map(PACKAGE.match, metadata.requires(DISTRIBUTION) or ())
+    # a source tree that is not installed is no distribution, and requires nothing
+    installed = metadata.distributions(name=DISTRIBUTION)
+    required = (PACKAGE.match(words) for distribution in installed for words in distribution.requires or ())
     packages = {name[1]: package_version(name[1]) for name in required if name}
     codes = []
     for code in CODES.values():
