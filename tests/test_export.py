@@ -576,6 +576,10 @@ def test_every_law_of_a_code_is_in_the_list(cli: Run) -> None:
         ),
         (("--to", "liggghts", "--at", "e=0.01"), "e: got 0.01, expected 0.05 < e <= 1"),
         (
+            ("--to", "lammps", "--model", "tsuji-1992-no-tension", "--code-version", "22Jul2025", "--at", "e=0"),
+            "e: got 0, expected e > 0: LAMMPS takes its logarithm",
+        ),
+        (
             ("--to", "liggghts", "--model", "liggghts-hooke", "--at", "e=0.5", "--at", "vc=0.005"),
             "vc: got 0.005, expected 0.01 m/s or more",
         ),

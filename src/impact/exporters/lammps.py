@@ -146,7 +146,9 @@ def law_for_version(key: str, version: str) -> str:
 
 def parameters(collision: Collision) -> dict[str, float | str]:
     """Write the numbers of pair_coeff; of hertz, k_n is K/√R*."""
-    spring, _, _ = OPTIONS[collision.model.key]
+    spring, option, _ = OPTIONS[collision.model.key]
+    if option == "coeff_restitution" and collision["e"] == 0.0:
+        raise UsageError("e: got 0, expected e > 0: LAMMPS takes its logarithm, and all velocities become NaN")
     damping = collision.model.damping
     # LAMMPS names every damping constant eta_n0
     strength: dict[str, float | str] = {"eta_n0": collision[damping]} if damping else {"e": collision["e"]}
