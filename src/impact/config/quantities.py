@@ -549,18 +549,6 @@ class Quantity:
         return factor
 
 
-def number_in(unit: str, text: str) -> float | None:
-    """Convert a text with a unit to a number in an SI unit; None if it is not one.
-
-    >>> number_in("m", "35 mm"), number_in("m", "35"), number_in("m", "35 kg")
-    (0.035, None, None)
-    """
-    try:
-        return Quantity(unit, "").read(text)
-    except PydanticCustomError:
-        return None
-
-
 def is_unit(text: str) -> bool:
     """Check whether a text is a unit of any quantity."""
     return _si_scale(text) is not None

@@ -124,15 +124,14 @@ def length(size: str | float | None, origin: str) -> float | None:
     (3.3071, 3.5, 7.1)
     """
     from ..config.files import to_plain_value
-    from ..config.quantities import number_in
+    from ..config.quantities import Quantity
 
     plain = to_plain_value(size)
     if plain is None:
         return None
     if isinstance(plain, str) and plain in WIDTHS:
         return WIDTHS[plain]
-    meters = number_in("m", plain) if isinstance(plain, str) else None
-    inches = plain if meters is None else meters / METERS_PER_INCH
+    inches = Quantity("m", "").read_or_nan(plain) / METERS_PER_INCH if isinstance(plain, str) else plain
     if not isinstance(inches, float | int) or not MIN_SIZE_INCHES <= inches <= MAX_SIZE_INCHES:
         expected = f"a length from 26mm to {MAX_SIZE_INCHES:g}in, such as 84mm, 8.4cm or 3.3in"
         names = f", or {' or '.join(WIDTHS)}" if origin.endswith("width") else ""

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..array_types import Mask
 from ..config.files import to_plain_data, to_plain_value
 from ..config.input_names import InputName
-from ..config.quantities import number_in
+from ..config.quantities import Quantity
 from ..config.tables import SWEEP_QUANTITIES
 from ..contact.variables import LAW_DIMS, OUTPUTS
 from ..errors import UsageError, did_you_mean, require_known
@@ -125,8 +125,8 @@ def in_si(coordinate: xr.DataArray, value: float | str) -> float | str:
         return float(words.index(str(value)))
     if not isinstance(value, str) or unit is None:
         return value
-    number = number_in(plain_unit(str(unit)), value)
-    return value if number is None else number
+    number = Quantity(plain_unit(str(unit)), "").read_or_nan(value)
+    return value if np.isnan(number) else number
 
 
 def _nearest_values(coordinate: xr.DataArray, value: float | str) -> str:
