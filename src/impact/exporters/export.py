@@ -289,10 +289,7 @@ def export_codes() -> list[dict[str, Any]]:
 def _warnings(problem: ExportProblem, collision: Collision, row: timestep.TimestepRow) -> Iterator[str]:
     """List what a user has to know before using the lines."""
     yield from problem.code.warnings(collision)
-    if problem.other_law:
-        yield problem.other_law
-    if problem.better_fit:
-        yield problem.better_fit
+    yield from filter(None, (problem.other_law, problem.better_fit))
     if abs(problem.e_continuous - problem.law.target_e) > ASKED_TOL:
         key, requested = problem.model.key, number(problem.law.target_e)
         yield (
