@@ -226,8 +226,7 @@ def encode_frame(frame: pd.DataFrame, suffix: str, form: TableForm | None = None
     if suffix == ".tex":
         return _latex(frame, form).encode()
     if form.digits is not None:
-        digits = form.digits
-        frame = frame.map(lambda cell: float(f"{cell:.{digits}g}") if isinstance(cell, float) else cell)
+        frame = frame.map(lambda cell: float(f"{cell:.{form.digits}g}") if isinstance(cell, float) else cell)
     if suffix == ".parquet":
         try:
             return bytes(frame.to_parquet(index=False, engine="pyarrow"))

@@ -434,8 +434,7 @@ def solve_phases(
             at_limit &= motion.may_be_overdamped(back.model) | np.broadcast_to(never_separates, n)[rows]
             velocity[at_limit], ended[at_limit] = 0.0, LIMIT
         e_out[rows], status[rows] = velocity, ended
-    both_params = params, back_params
-    return Phases(law, both_params, approach, restitution, rows, peak, at_peak, residual, e_out, status)
+    return Phases(law, (params, back_params), approach, restitution, rows, peak, at_peak, residual, e_out, status)
 
 
 def _end_at_zero_force(phases: Phases) -> None:

@@ -516,13 +516,12 @@ def compensated_e(law: FixedStepLaw, dt: Array) -> Array:
     """Find the e to ask for at steps dt [s], so that the mean over the phases is e; NaN where there is none."""
     if not law.has_e:
         return np.full(dt.size, np.nan)
-    target = law.e
 
     def distance(e: Array, steps: Array) -> Array:
         e, steps = np.broadcast_arrays(e, steps)
         (delivered,) = law.outputs(steps.ravel(), "e_out", e=e.ravel())
         means: Array = delivered.mean(axis=1)
-        return means.reshape(e.shape) - target
+        return means.reshape(e.shape) - law.e
 
     scan = np.linspace(MIN_E, 1.0, N_SCAN)
     distances = distance(scan, dt[:, None])
@@ -542,14 +541,13 @@ def needed_steps(
 
     The search begins at the number that a similar law needs. That every larger number is enough is tried for many.
     """
-    e_continuous = law.continuous["e_out"]
     target = law.target_e
     if not target > 0.0:
         raise UsageError(f"{argument('tol')} is relative to e, expected e > 0")
     # the surfaces of an overdamped contact part later than a collision at a step is followed
     is_overdamped = law.continuous["separation_time"] > MAX_CONTACTS * law.contact_time
     # no step does what the continuous law does not
-    room = tol * target - abs(e_continuous - target)
+    room = tol * target - abs(law.continuous["e_out"] - target)
     if room <= 0.0 or is_overdamped:
         return None
     judged, allowed = replace(law, phases=JUDGED_PHASES), tol * target - (1.0 - FOUND_SHARE) * room

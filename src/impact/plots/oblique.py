@@ -93,8 +93,7 @@ def psi_curves(dataset: xr.Dataset, choice: Choice) -> CurveData:
     along = np.array([min(shown), max(shown)])
     guides = [_guide(along, along, "smooth"), _guide(along, 0.0, "sticks")]
     panel = Panel("", "Slip after the impact", (*guides, *curves), y_name="psi2")
-    x_label = "Slip before the impact"
-    x_axis: dict[str, Any] = {"x_name": "psi1", "x_label": x_label, "x_unit": "1", "x_log": False}
+    x_axis: dict[str, Any] = {"x_name": "psi1", "x_label": "Slip before the impact", "x_unit": "1", "x_log": False}
     return complete(line, "Slip after over slip before the impact", [panel], choice, **x_axis)
 
 

@@ -156,12 +156,11 @@ def _tables(result: xr.Dataset, name: str, description: Mapping[str, Any]) -> li
 def _values_text(dataset: xr.Dataset, name: str) -> str:
     """List the values of a coordinate with its unit; of many numbers the range and the number."""
     coordinate = dataset[name]
-    values = coordinate.variable
     unit = plain_unit(str(coordinate.attrs.get("units", "1")))
     suffix = "" if unit == "1" else f" [{unit}]"
     if name == "n" and coordinate.ndim == 0 and (exponents := exponents_of(dataset)):
         return exponents + suffix
-    if is_large(values):
+    if is_large(coordinate.variable):
         extremes = extremes_of(dataset, name)
         ends = f"{number(extremes.smallest)} … {number(extremes.largest)}, " if extremes else ""
         return f"{ends}{coordinate.size} values{suffix}"
