@@ -188,8 +188,7 @@ function draw() {
     add(svg, "text", {x: at, y: bottom + 18, "text-anchor": "middle"}, text);
   }
   add(svg, "path", {d: `M${left} ${top}V${bottom}H${right}`, class: "frame"});
-  const name = add(svg, "text", {x: (left + right) / 2, y: height - 8, "text-anchor": "middle"});
-  name.textContent = heading(axis.label, xUnit);
+  add(svg, "text", {x: (left + right) / 2, y: height - 8, "text-anchor": "middle"}, heading(axis.label, xUnit));
   const beside = `translate(14 ${(top + bottom) / 2}) rotate(-90)`;
   add(svg, "text", {transform: beside, "text-anchor": "middle"}, heading(output.label, unit));
 
