@@ -180,6 +180,20 @@ def test_a_study_says_how_many_points_a_code_with_fixed_steps_reaches_slowly() -
         impact.sensitivity({**config, **design}, of="e_out")
 
 
+def test_an_angle_of_a_study_is_in_degrees() -> None:
+    """As in the config and in tables of other commands; the dataset is in rad."""
+    balls = {"m1": 1.0, "m2": math.inf, "R1": 0.1, "K": 1e6}
+    sweep = {"v1": 1.0, "angle": {"uniform": ["20 deg", "40 deg"]}, "mu": 0.3, **balls}
+    config = {"models": "hertz", "frictions": ["coulomb-1785"], "design": {"n": 64}, "sweep": sweep}
+    study = impact.sensitivity(config, of="rebound_angle")
+    assert study["mean"].attrs["units"] == "rad"
+    mean, sd = (math.degrees(study[name].item()) for name in ("mean", "sd"))
+    low, *_, high = np.degrees(study["quantiles"].values.ravel())
+    text = str(impact.describe(study))
+    assert f"rebound_angle: mean {mean:.6g}°, sd {sd:.3g}, 5 % {low:.6g}, 50 % " in text
+    assert f", 95 % {high:.6g}" in text
+
+
 def test_a_picture_of_samples_marks_the_limit_of_small_steps() -> None:
     """As pictures over an angle do; the restitution has no such limit."""
     sweep = {"v1": 1.0, "angle": {"uniform": [0.1, 1.2]}, "mu": 0.3, "e": 0.6, "m2": math.inf, "R1": 0.01}

@@ -158,11 +158,11 @@ def rounded(value: float, digits: int, *, up: bool) -> float:
 def quantity(value: object, unit: str = "1", digits: int = 6) -> str:
     """Format a value with its unit, if it has one.
 
-    >>> quantity(0.5, "m/s"), quantity(1.5), quantity(float("nan"), "N")
-    ('0.5 m/s', '1.5', '–')
+    >>> quantity(0.5, "m/s"), quantity(1.5), quantity(float("nan"), "N"), quantity(30.0, "°")
+    ('0.5 m/s', '1.5', '–', '30°')
     """
     text = number(value, digits)
-    return text if unit in ("", "1") or text == "–" else f"{text} {unit}"
+    return text if unit in ("", "1") or text == "–" else f"{text}{'' if unit == '°' else ' '}{unit}"
 
 
 def prefixed(value: object, unit: str = "1", digits: int | None = None) -> str:

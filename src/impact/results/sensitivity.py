@@ -107,14 +107,16 @@ def _describe_study(study: Mapping[str, Any]) -> str:
         # a study has no status of its points
         or_pair = ", or the friction law is not combinable with the model" if OUTPUTS[of].of_friction else ""
         return f"{of}: the law has none{or_pair}"
-    mean_text, totals = quantity(mean, OUTPUTS[of].unit), {row["input"]: row["total"] for row in study["indices"]}
+    # degrees for rad; no prefix for others
+    size, unit = scaled_unit(OUTPUTS[of].unit, 1.0)
+    mean_text, totals = quantity(mean / size, unit), {row["input"]: row["total"] for row in study["indices"]}
     if not any(map(math.isfinite, totals.values())):
         return f"{of}: {mean_text}; it does not depend on the uncertain inputs"
-    text = f"{of}: mean {mean_text}, sd {number(study['sd'], 3)}"
+    text = f"{of}: mean {mean_text}, sd {number(study['sd'] / size, 3)}"
     for probability in (0.05, 0.5, 0.95):
         # a part of a study may lack some
         if f"{probability:g}" in study["quantiles"]:
-            text += f", {100 * probability:g} % {number(study['quantiles'][f'{probability:g}'])}"
+            text += f", {100 * probability:g} % {number(study['quantiles'][f'{probability:g}'] / size)}"
     irrelevant = [name for name, total in totals.items() if total == 0.0]
     if irrelevant:
         text += f"; it does not depend on {', '.join(irrelevant)}"
