@@ -422,6 +422,21 @@ def test_a_picture_of_differences_has_degrees_and_words() -> None:
     assert [label.get_text() for label in beta.get_xticklabels()] == ["abs", "positive"]
 
 
+def test_a_stiffness_in_a_picture_of_differences_has_the_number_of_n() -> None:
+    """In words that do not end in a formula; the label of the other axis of a low picture is one line."""
+    balls = {"v1": 1.0, "e": 0.5, "m1": 1.0, "m2": 1.0, "n": 1.5}
+    result = impact.sweep({"models": "tsuji-1992", "sweep": {"K": [1e6, 1.5e6], **balls}})
+    verdict = impact.compare(result.assign(e_out=result["e_out"] + 1e-3), result)
+    assert verdict.worst_along["K"].sizes == {"K": 2}
+    assert result["K"].attrs["units"] == "N m-n"
+    (axes,) = draw_differences(difference_data(verdict)).axes
+    figure = axes.figure
+    assert axes.get_xlabel() == "Stiffness of the contact $K$\xa0(N/m$^{1.5}$)"
+    (label,) = [text.get_text() for text in figure.texts if "tolerance" in text.get_text()]
+    assert "\n" not in label
+    assert "1e+06, 1.5e+06 [N/m^1.5]" in str(impact.info(result))
+
+
 def test_no_symbol_is_on_the_texts_of_limits(wide: xr.Dataset) -> None:
     moved = wide.assign(v1_post=wide["v1_post"] * 1.001, e_out=wide["e_out"] * np.nan)
     figure = draw_differences(difference_data(impact.compare(moved, wide)))

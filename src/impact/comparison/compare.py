@@ -23,7 +23,16 @@ from ..errors import ResultError, UsageError, did_you_mean
 from ..formatting import argument, number, safe_text
 from ..results.attributes import read_attribute
 from ..results.provenance import command_start
-from ..results.schema import DEFAULT_RTOL_FACTOR, MODEL_METADATA, SCHEMA, SCHEMA_VERSION, kind_of, require_sweep
+from ..results.schema import (
+    DEFAULT_RTOL_FACTOR,
+    MODEL_METADATA,
+    SCHEMA,
+    SCHEMA_VERSION,
+    kind_of,
+    numbered_unit,
+    require_sweep,
+    unit_of,
+)
 from ..results.xarray_backend import load, result_of
 from .align import Alignment, align_boards, align_calibrations, align_sweeps, changed_config, unknown_variables
 from .values import compare_values, group_size, representative_regions
@@ -150,6 +159,9 @@ def _along_axes(largest: Mapping[str, Mapping[str, np.ndarray]], baseline: xr.Da
         # a group of neighbours has the label of the first
         first = {axis: slice(None, None, group_size(baseline.sizes[axis]))}
         labels = {n: v.isel(first) for n, v in baseline.coords.variables.items() if v.dims == (axis,)}
+        # n is not among the labels
+        if axis in labels and (unit := numbered_unit(baseline, axis)) != unit_of(labels[axis]):
+            labels[axis].attrs["units"] = unit
         along[axis] = xr.Dataset(columns, labels)
     return along
 

@@ -177,7 +177,7 @@ class Sweep(Table):
     inertia_factor1: Annotated[Numbers | None, Quantity("1", f"{INERTIA} 1", 0, above=True, infinite=True)] = None
     inertia_factor2: Annotated[Numbers | None, Quantity("1", f"{INERTIA} 2", 0, above=True, infinite=True)] = None
     mu: Annotated[Numbers | None, Quantity("1", "coefficient of friction", 0)] = None
-    K: Annotated[Numbers | None, Quantity("N/m^n", "stiffness of the contact, F = K x^n", 0, above=True)] = None
+    K: Annotated[Numbers | None, Quantity("N/m^n", "stiffness of the contact; F = K x^n", 0, above=True)] = None
     n: Annotated[Numbers, Quantity("1", "compliance exponent", least=1, most=10)] = 1.5
     steps_per_contact: Annotated[
         Numbers | None,

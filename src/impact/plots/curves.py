@@ -21,9 +21,9 @@ from numpy.typing import ArrayLike
 from ..config.measurements import SIGMA
 from ..errors import UsageError
 from ..formatting import NO_BREAK, heading
+from ..results.schema import numbered_unit
 from .data import MEASURED, LegendEntries, PlotData, Points, stacked
 from .labels import LawPart, NamedLaw, annotate_right_edge, label_axis, pretty_conditions, symbol, words_of
-from .slices import numbered_unit
 from .style import FAINT, SOFT, is_geometric, limits_of, model_styles, tint
 
 # the colour of distances from zero, and its shares in those that are shaded, the widest first, and in lines

@@ -16,10 +16,9 @@ from ..comparison.verdict import Verdict
 from ..config.input_names import InputName
 from ..errors import UsageError
 from ..formatting import number, safe_text, scaled_unit
-from ..results.schema import SCHEMA
+from ..results.schema import SCHEMA, unit_of
 from .labels import annotate_right_edge, axis_text, escape_mathtext, is_whole, number_axis, words_of
 from .layout import Picture
-from .slices import unit_of
 from .style import COLOURS, MARKERS, default_size, is_geometric, styled, tint
 
 # height of a row of panels [in]
@@ -113,7 +112,7 @@ def draw_differences(plot_data: DifferenceData) -> Figure:
         entries: dict[str, Artist] = {}
         for index, axes in figure.subplot_mosaic(rows).items():
             entries = {**_draw_panel(axes, plot_data.panels[index], names, ends), **entries}
-        figure.share_labels("", "Largest |new − baseline| over the tolerance")
+        figure.share_labels("", "Largest difference / tolerance")
         if plot_data.not_shown:
             entries[f"and {plot_data.not_shown} more"] = Line2D([], [], linestyle="")
         figure.add_legend(

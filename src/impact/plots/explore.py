@@ -24,13 +24,13 @@ from ..engine.plugins import Plugins, read_plugins
 from ..errors import ImpactError, UsageError, require_known
 from ..formatting import prefixed, safe_text
 from ..results.provenance import changed_plugins, config_of_part, stored_config
-from ..results.schema import kind_of, require_axes
+from ..results.schema import kind_of, numbered_unit, require_axes
 from ..results.selection import chosen_laws, in_si, select, select_laws
 from ..results.sweep import sweep_in_memory
 from ..results.xarray_backend import result_of
 from .draw import plot
 from .kinds import STUDIES, default_kind, find_kind, kinds_of, source_of
-from .slices import choose_line, numbered_unit
+from .slices import choose_line
 from .style import DRAWING, is_geometric
 
 if TYPE_CHECKING:

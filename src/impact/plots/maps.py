@@ -25,6 +25,7 @@ from ..array_types import Array, Mask
 from ..errors import UsageError, did_you_mean
 from ..formatting import argument, heading, percentage, safe_text
 from ..results.ranking import error_floor
+from ..results.schema import numbered_unit
 from .data import LegendEntries, PlotData, Points, stacked
 from .kinds import Choice, Kind
 from .labels import (
@@ -41,7 +42,7 @@ from .labels import (
     words_of,
 )
 from .layout import Picture
-from .slices import choose_plane, conditions_of, not_a_sweep, numbered_unit, read, take_plane
+from .slices import choose_plane, conditions_of, not_a_sweep, read, take_plane
 from .style import is_geometric, limits_of, model_styles, tint
 
 # a value at each y and x

@@ -17,13 +17,13 @@ from ..config.input_names import InputName
 from ..contact.models import catalogue
 from ..formatting import law_name, safe_text
 from ..results.attributes import read_attribute
-from ..results.schema import exponent_text
+from ..results.schema import exponent_text, unit_of
 from .curves import Curve, CurveData, Mark, Panel, curve_of
 from .data import LegendEntries, Points
 from .kinds import Choice, Kind
 from .labels import REFERENCE, LawPart, NamedLaw, friction_text, label_axis, law_text, words_of
 from .layout import Picture
-from .slices import Inputs, choose_line, described_inputs, parameter_text, unit_of
+from .slices import Inputs, choose_line, described_inputs, parameter_text
 from .style import tint
 
 # a permanent indentation is marked above this fraction of the largest one

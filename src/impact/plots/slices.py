@@ -15,7 +15,7 @@ from ..config.tables import OBLIQUE_DEFAULTS
 from ..contact.units import names_in, with_numbers
 from ..errors import UsageError, did_you_mean
 from ..formatting import NO_BREAK, argument, prefixed, safe_text
-from ..results.schema import exponents_of, plain_unit
+from ..results.schema import exponents_of, unit_of
 from ..results.selection import require_outputs, select, select_laws
 from .kinds import Choice
 
@@ -216,21 +216,6 @@ def x_axis(dataset: xr.Dataset, x: str | None) -> str:
         "this result has no numeric axis left to draw over; sweep one, such as e, or draw a point with "
         f"{argument('kind', 'loop')}"
     )
-
-
-def unit_of(coordinate: xr.DataArray | xr.Variable) -> str:
-    """Read the unit of a coordinate; "1" if it has none."""
-    return safe_text(plain_unit(str(coordinate.attrs.get("units", "1"))))
-
-
-def numbered_unit(dataset: xr.Dataset, name: str) -> str:
-    """Read the unit of an input or a variable, with the number of n if its laws have a single exponent."""
-    unit, law = unit_of(dataset[name]), InputName.parse(name).model
-    n = dataset.coords.get("exponent" if law or name in dataset.data_vars else "n")
-    if law and n is not None and "model" in n.dims:
-        n = n.isel(model=dataset["model"].values == law)
-    numbers = np.unique([] if n is None else n)
-    return with_numbers(unit, {"n": float(numbers[0])}) if names_in(unit) == {"n"} and numbers.size == 1 else unit
 
 
 def conditions_of(dataset: xr.Dataset, *drawn: str) -> str:

@@ -26,11 +26,11 @@ from ..formatting import prefixed
 from ..plots.data import PlotData
 from ..plots.draw import draw, get_plot_data
 from ..plots.kinds import STUDIES, Choice, Kind, Look, kinds_of
-from ..plots.slices import numbered_unit, numeric_axes, varying_inputs
+from ..plots.slices import numeric_axes, varying_inputs
 from ..plots.style import encoded
 from ..results.provenance import command_start
 from ..results.ranking import MIN_ERROR_FLOOR
-from ..results.schema import columns_along
+from ..results.schema import columns_along, numbered_unit
 from ..results.selection import law_positions
 from ..results.slabs import distinct_points, is_computed, slabs
 

@@ -30,10 +30,10 @@ from ..errors import UsageError
 from ..formatting import argument, scaled_unit
 from ..plots.explore import axes_of, axis_label, shown_values
 from ..plots.labels import LawPart, mark_slow_limit, split_by_law, with_model
-from ..plots.slices import conditions_of, numbered_unit
+from ..plots.slices import conditions_of
 from ..plots.style import is_geometric, model_styles
 from ..results.layouts import read_inputs
-from ..results.schema import require_axes
+from ..results.schema import numbered_unit, require_axes
 from ..results.selection import law_positions
 from ..results.trajectory_table import TrajectoryTable, table_of_result
 from ..results.xarray_backend import open_result, result_of

@@ -32,13 +32,21 @@ from ..engine.plan import Plan
 from ..engine.plugins import read_plugins
 from ..errors import ImpactError, UsageError, require_known
 from ..formatting import argument, law_name, number, prefixed, safe_text, scaled_unit, with_year
-from ..plots.slices import numbered_unit, varying_inputs
+from ..plots.slices import varying_inputs
 from ..results.attributes import read_attribute
 from ..results.board import BOARD_HEADINGS, Board, board_rows, check_rows, engine_headline, failure_lines
 from ..results.calibration import calibration_title, describe_data, fit_notes, fit_table
 from ..results.provenance import stored_config
 from ..results.ranking import DEFAULT_TOL, Ranking, rank_laws
-from ..results.schema import FIT_STATUSES, MODEL_METADATA, count_points, exponents_of, kind_of, require_axes
+from ..results.schema import (
+    FIT_STATUSES,
+    MODEL_METADATA,
+    count_points,
+    exponents_of,
+    kind_of,
+    numbered_unit,
+    require_axes,
+)
 from ..results.selection import select_laws
 from ..results.sensitivity import INDEX_HEADINGS, describe_design, study_texts
 from ..results.slabs import MAX_SUMMARY_POINTS, is_large

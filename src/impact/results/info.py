@@ -19,7 +19,7 @@ from ..formatting import number
 from .attributes import read_attribute
 from .board import Board
 from .calibration import Fits
-from .schema import MODEL_METADATA, count_points, exponents_of, kind_of, plain_unit
+from .schema import MODEL_METADATA, count_points, exponents_of, kind_of, numbered_unit
 from .sensitivity import Studies
 from .slabs import is_large
 from .summary import Extremes, Summary, error_table, extremes_of, summarize
@@ -156,7 +156,7 @@ def _tables(result: xr.Dataset, name: str, description: Mapping[str, Any]) -> li
 def _values_text(dataset: xr.Dataset, name: str) -> str:
     """List the values of a coordinate with its unit; of many numbers the range and the number."""
     coordinate = dataset[name]
-    unit = plain_unit(str(coordinate.attrs.get("units", "1")))
+    unit = numbered_unit(dataset, name)
     suffix = "" if unit == "1" else f" [{unit}]"
     if name == "n" and coordinate.ndim == 0 and (exponents := exponents_of(dataset)):
         return exponents + suffix

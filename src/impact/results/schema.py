@@ -24,6 +24,7 @@ from ..config.tables import MATERIAL_KEYS
 from ..contact.fixed_step import EXACT
 from ..contact.history import History
 from ..contact.materials import effective_mass
+from ..contact.units import names_in, with_numbers
 from ..contact.variables import AXES, HISTORY, LAW_DIMS, OUTPUTS, Variable, by_name, default_variables
 from ..engine.inputs import input_at
 from ..engine.plan import Plan
@@ -408,6 +409,21 @@ def plain_unit(unit: str) -> str:
     ('m/s', 'N/m^1.5', 'kg')
     """
     return re.sub(r" ([A-Za-z]+)-(\S+)", lambda match: f"/{match[1]}" + f"^{match[2]}" * (match[2] != "1"), unit)
+
+
+def unit_of(coordinate: xr.DataArray | xr.Variable) -> str:
+    """Read the unit of a coordinate; "1" if it has none."""
+    return safe_text(plain_unit(str(coordinate.attrs.get("units", "1"))))
+
+
+def numbered_unit(dataset: xr.Dataset, name: str) -> str:
+    """Read the unit of an input or a variable, with the number of n if its laws have a single exponent."""
+    unit, law = unit_of(dataset[name]), InputName.parse(name).model
+    n = dataset.coords.get("exponent" if law or name in dataset.data_vars else "n")
+    if law and n is not None and "model" in n.dims:
+        n = n.isel(model=dataset["model"].values == law)
+    numbers = np.unique([] if n is None else n)
+    return with_numbers(unit, {"n": float(numbers[0])}) if names_in(unit) == {"n"} and numbers.size == 1 else unit
 
 
 def exponent_text(by_model: Mapping[str, float]) -> str:
