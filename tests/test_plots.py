@@ -994,6 +994,15 @@ def test_wrong_points_are_an_error_of_one_line(
 # the command
 
 
+def test_the_title_of_axes_of_a_user_has_decimal_commas(speeds: xr.Dataset) -> None:
+    """As the title of a picture of its own has; it is that of the user."""
+    for decimal, title in (("comma", "tempered at 2,5 K"), ("point", "tempered at 2.5 K")):
+        axes = Figure().subplots()
+        look: dict[str, Any] = {"kind": "restitution", "title": True, "decimal": decimal}
+        impact.plot(speeds, ax=axes, labels={"title": "tempered at 2.5 K"}, **look)
+        assert axes.get_title() == title
+
+
 @pytest.mark.slow
 def test_the_table_of_a_plot_has_a_column_for_each_curve(cli: Run, coarse_file: Path, tmp_path: Path) -> None:
     words = ("plot", coarse_file, "--model", "gharib-hurmuzlu-2012", "--model", "lankarani-nikravesh-1990")

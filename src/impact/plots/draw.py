@@ -177,7 +177,7 @@ def draw(
     if all_axes:
         entries = _draw_panels(plot_data, all_axes, labels, points, look)
         if look.title:
-            all_axes[0].set_title(labels["title"])
+            all_axes[0].set_title((with_comma if look.decimal == "comma" else str)(labels["title"]))
         if entries and look.legend != "none":
             # outside of the layout, in which it would take room from the axes
             all_axes[0].legend(*zip(*entries, strict=True), fontsize="small").set_in_layout(False)
