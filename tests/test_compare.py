@@ -615,6 +615,14 @@ def test_nans_in_both_results_are_equal_if_the_statuses_are(figure6: xr.Dataset)
     assert (figure6["status"].sel(model="lankarani-nikravesh-1994", e=0.5) == 1).all()
 
 
+def test_points_that_were_left_out_of_both_results_are_equal(figure6: xr.Dataset) -> None:
+    """`where` leaves NaN in every variable, also in the status."""
+    part = figure6.where(figure6["e"] > 0.5)
+    assert impact.compare(part, part).equal
+    verdict = impact.compare(part, figure6)
+    assert "status" in {variable.name for variable in verdict.differing}
+
+
 # tolerances
 
 

@@ -214,7 +214,8 @@ def _may_be_missing(variable: Variable, aligned: Alignment, region: Region) -> N
     if not variable.per_model or not all(variable.status in result for result in results):
         return True
     new, baseline = (slabs.read_slab(result, variable.status, region) for result in results)
-    is_explained = (new == baseline) & (baseline != Status.OK)
+    # a point that xarray left out, such as by `where`, has no status
+    is_explained = (new == baseline) & (baseline != Status.OK) | np.isnan(new) & np.isnan(baseline)
     return np.asarray(is_explained | (variable.may_be_nan & (np.maximum(new, baseline) < FIRST_FAILURE)))
 
 
