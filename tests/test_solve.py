@@ -433,6 +433,8 @@ def test_a_parameter_that_varies_with_another_input_is_solved_for_at_its_value(j
     alone = {"models": [law], "sweep": {**fixed, "m1": 0.2}}
     [expected] = impact.solve(law, "A", {"e_out": 0.7}, source=alone).roots
     assert root == expected
+    with pytest.warns(impact.ImpactWarning, match="A is solved for, and this value changes nothing"):
+        assert impact.solve(law, "A", {"e_out": 0.7}, source=config, at={"m1": 0.2, "A": 3.0}).roots == (root,)
     # also where a law without an e gets its damping
     step = impact.timestep(law, source=config, at={"m1": 0.2, "e": 0.7})
     assert step.solved == pytest.approx({"A": expected.value}, rel=1e-9)

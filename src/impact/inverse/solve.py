@@ -208,12 +208,14 @@ def solve(
         find_friction(friction) if friction is not None else next(iter(point_source.draft(model).frictions), None)
     )
     unknown = unknown_of(law, name, friction_law)
-    for key in at or {}:
+    at = dict(at or {})
+    for key in [*at]:
         if {config_name(law, unknown), unknown.name} & {key, str(input_name(key, law, friction_law))}:
             warn(f"{argument('at', key=key)}: {name} is solved for, and this value changes nothing")
-    inputs = {**placeholder(law, unknown, point_source), **(at or {})}
+            del at[key]
+    inputs = {**placeholder(law, unknown, point_source), **at}
     config, _ = single_point(point_source, model, inputs, over, friction=friction)
-    if "e" in (at or {}) and ignores_e(config):
+    if "e" in at and ignores_e(config):
         warn(f"{argument('at', key='e')}: e is not an input of {law.key}, and changes nothing")
     for over_name, values in (over or {}).items():
         if not isinstance(to_plain_data(values)[0], list | dict):
