@@ -421,6 +421,37 @@ def test_the_unit_of_a_horizontal_axis_has_the_prefix_that_its_slider_has(browse
 
 
 @pytest.mark.slow
+def test_a_page_goes_from_case_to_case_and_names_their_inputs(browser: Page, tmp_path: Path) -> None:
+    cases = tmp_path / "cases.csv"
+    cases.write_text("v1,e\n1.0,0.5\n2.0,0.7\n0.5,0.9\n", encoding="utf-8")
+    sweep = {"cases": str(cases), "m1": 1.0, "m2": 1.0, "K": 1e6}
+    show(browser, impact.sweep({"models": "tsuji-1992", "sweep": sweep}), tmp_path / "page.html")
+    browser.evaluate(
+        "(c => point({clientX: c.left + picture.left + 0.35 * (picture.right - picture.left)}))"
+        "(byId('picture').getBoundingClientRect())"
+    )
+    note = browser.evaluate("byId('note').textContent")
+    assert note == "at case = 1, v1 = 2 m/s, e = 0.7"
+    assert '"1, v1 = 2 m/s, e = 0.7",' in browser.evaluate("csv()")
+    texts = browser.evaluate("[...document.querySelectorAll('svg text')].map(text => text.textContent)")
+    assert {"0", "1", "2"} <= {*texts}
+    # a name may have a comma
+    glass = {"E": 70e9, "nu": 0.2, "rho": 2500.0}
+    sweep = {
+        "material1": ["glass, hard", "glass, soft"],
+        "material2": "glass, hard",
+        "R1": 0.01,
+        "R2": 0.01,
+        "v1": 1.0,
+    }
+    materials = {"glass, hard": glass, "glass, soft": {**glass, "E": 10e9}}
+    named = impact.sweep({"models": "tsuji-1992", "sweep": {**sweep, "e": 0.8}, "materials": materials})
+    show(browser, named, tmp_path / "page.html")
+    texts = browser.evaluate("[...document.querySelectorAll('svg text')].map(text => text.textContent)")
+    assert {*materials} <= {*texts}
+
+
+@pytest.mark.slow
 def test_the_name_of_an_output_stands_beside_numbers_of_many_digits(browser: Page, tmp_path: Path) -> None:
     sweep = {"e": 0.8, "v1": [1.0, 2.0, 3.0], "m1": 1.0, "m2": 1.0, "K": 1e9}
     show(browser, impact.sweep({"models": "lammps-tsuji", "sweep": sweep}), tmp_path / "page.html")

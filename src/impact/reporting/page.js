@@ -182,8 +182,9 @@ function draw() {
     add(svg, "line", {x1: left, x2: right, y1: y, y2: y, class: "grid"});
     add(svg, "text", {x: left - 8, y: y + 4, "text-anchor": "end"}, digits(number));
   }
-  for (const number of hasWords ? x : ticks(first * xFactor, last * xFactor, isLog, width / 90)) {
-    const at = toX(hasWords ? number : number / xFactor), text = hasWords ? axis.texts[number] : digits(number);
+  const every = Math.ceil(x.length * 90 / width), words = x.filter((_, index) => index % every === 0);
+  for (const number of hasWords ? words : ticks(first * xFactor, last * xFactor, isLog, width / 90)) {
+    const at = toX(hasWords ? number : number / xFactor), text = hasWords ? axis.names[number] : digits(number);
     add(svg, "line", {x1: at, x2: at, y1: top, y2: bottom, class: "grid"});
     add(svg, "text", {x: at, y: bottom + 18, "text-anchor": "middle"}, text);
   }

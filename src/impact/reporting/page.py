@@ -33,7 +33,7 @@ from ..plots.labels import LawPart, mark_slow_limit, split_by_law, with_model
 from ..plots.slices import conditions_of
 from ..plots.style import is_geometric, model_styles
 from ..results.layouts import read_inputs
-from ..results.schema import numbered_unit, require_axes
+from ..results.schema import is_case, numbered_unit, require_axes
 from ..results.selection import law_positions
 from ..results.trajectory_table import TrajectoryTable, table_of_result
 from ..results.xarray_backend import open_result, result_of
@@ -249,12 +249,14 @@ def _output(name: str) -> dict[str, Any]:
 def _axis(dataset: xr.Dataset, axis: Axis) -> dict[str, Any]:
     """Describe an axis of the grid: its values, null where infinite, and their texts with the other columns."""
     coordinate, word = dataset[axis.name], InputName.parse(axis.name).word
-    has_words = any(isinstance(word(value), str) for value in coordinate.values.tolist())
+    # a number of a case is a name: nothing lies between two cases
+    has_words = is_case(axis.name) or any(isinstance(word(value), str) for value in coordinate.values.tolist())
     numbers = np.arange(coordinate.size, dtype=float) if has_words else np.asarray(coordinate.values, float)
     is_log, unit = not has_words and is_geometric(np.sort(numbers)), numbered_unit(dataset, axis.name)
     # of the unit of the picture, without a prefix beside powers of ten
     size, shown = scaled_unit(unit, 1.0 if is_log else max(map(abs, filter(math.isfinite, numbers)), default=1.0))
-    texts = [text for text, _ in shown_values(dataset, axis.name)]
+    names = [text for text, _ in shown_values(dataset, axis.name)]
+    texts = names
     for name in axis.columns:
         if name != axis.name:
             along = [f"{axis_label(name)} = {text}" for text, _ in shown_values(dataset, name)]
@@ -265,6 +267,7 @@ def _axis(dataset: xr.Dataset, axis: Axis) -> dict[str, Any]:
         "unit": unit,
         "scaled": (size, "" if unit == "1" else shown),
         "values": [value if math.isfinite(value) else None for value in numbers.tolist()],
+        "names": names,
         "texts": texts,
         "has_words": has_words,
         "is_log": is_log,
