@@ -110,6 +110,15 @@ def test_texts_of_the_user_keep_their_points_beside_numbers_with_commas(stored: 
     plt.close(ax.figure)
 
 
+def test_the_version_of_a_code_in_a_legend_keeps_its_points() -> None:
+    models = ["mujoco-solref", "yade-en-clamped"]
+    sweep = {"e": [0.1, 0.5], "v1": 1.0, "m1": 1.0, "m2": 1.0, "material": "steel"}
+    figure = impact.plot(impact.sweep({"models": models, "sweep": sweep}), kind="restitution", decimal="comma")
+    names = " ".join(text.get_text() for text in figure.legends[0].get_texts())
+    for version in ("since 2.1", "to 2022.01a"):
+        assert version in " ".join(names.split())
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="the locale is not that of the environment")
 def test_the_locale_chooses_the_decimal_separator_and_is_not_changed(monkeypatch: pytest.MonkeyPatch) -> None:
     for name, decimal in (("C", "point"), ("no_SUCH.locale", "point"), ("de_DE.utf8", "comma")):

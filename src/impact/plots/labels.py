@@ -37,6 +37,8 @@ from ..results.schema import is_case
 from .slices import Inputs, parameter_text, scalars_of
 from .style import SOFT, tint
 
+# in a number with one point that is not the version of a code
+DECIMAL_POINT = r"(?<!\bsince )(?<!\bv)(?<![\d.])(\d+)\.(?=\d+(?!\.?\d|a\b))"
 GREEK = "alpha|beta|gamma|delta|epsilon|zeta|eta|theta|kappa|lambda|mu|nu|xi|rho|sigma|tau|phi|chi|psi|omega"
 # symbols of the paper for names that are words; v_post and abs_e_error are each a label of several variables
 MATH_SYMBOLS = {
@@ -345,8 +347,12 @@ def _tick_text(value: float, position: int, *, size: float, powers: bool) -> str
 def with_comma(text: str) -> str:
     r"""Write the numbers of a text with decimal commas; exponents in mathtext need no space after the comma.
 
+    The version of a code, as in the names of laws, keeps its points.
+
     >>> with_comma("e = 0.5, n = 1.5"), with_comma("N/m$^{1.5}$")
     ('e = 0,5, n = 1,5', 'N/m$^{1{,}5}$')
+    >>> with_comma("δ^0.65 (since 2.1, v0.6 to 2022.01a)")
+    'δ^0,65 (since 2.1, v0.6 to 2022.01a)'
     >>> with_comma(f"normal(1,{NO_BREAK}0.1)").replace(NO_BREAK, " ")
     'normal(1; 0,1)'
     """
@@ -354,7 +360,7 @@ def with_comma(text: str) -> str:
     text = re.sub(rf"(?<=[\d⁰¹²³⁴⁵⁶⁷⁸⁹]),(?={NO_BREAK}[\d−-])", ";", text)
     parts = text.split("$")
     commas = (",", "{,}")
-    return "$".join(re.sub(r"(?<=\d)\.(?=\d)", commas[index % 2], part) for index, part in enumerate(parts))
+    return "$".join(re.sub(DECIMAL_POINT, rf"\1{commas[index % 2]}", part) for index, part in enumerate(parts))
 
 
 def tick_with_comma(formatter: Formatter, value: float, position: int) -> str:
