@@ -211,6 +211,17 @@ def test_labels_name_what_differs(beads: xr.Dataset) -> None:
     assert "angle = 1°" in conditions_of(curves_of(beads, "beta", x="mu"))
 
 
+def test_the_spin_of_an_axis_that_is_not_drawn_is_named_although_it_is_zero() -> None:
+    laws = CONFIG | {"models": [TSUJI], "frictions": [COULOMB], "friction": {}}
+    sweep = BALLS | {"angle": ["10 deg", "40 deg"], "omega2": 0.0}
+    spinning = impact.sweep(laws | {"sweep": sweep | {"omega1": [0.0, 100.0]}})
+    for kind, choice in (("beta", Choice()), ("map", Choice(x="mu", y="angle"))):
+        conditions = get_plot_data(spinning, kind, choice).conditions
+        assert "omega1 = 0 rad/s" in conditions.replace("\N{NO-BREAK SPACE}", " ")
+        assert "omega2" not in conditions
+    assert "omega" not in conditions_of(curves_of(spinning, "beta", x="omega1"))
+
+
 def test_the_spins_of_both_balls_are_drawn_where_both_turn(beads: xr.Dataset) -> None:
     both = curves_of(beads, "spin", models=[TSUJI], frictions=[COULOMB])
     assert [(curve.variable, curve.end) for curve in of_pairs(both)] == [

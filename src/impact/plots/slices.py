@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -154,8 +154,11 @@ def _select(dataset: xr.Dataset, choice: Choice) -> xr.Dataset:
 
 
 def _drop_other_axes(dataset: xr.Dataset, dims: Sequence[object]) -> xr.Dataset:
-    """Reduce a result to the first value of every axis that is not drawn."""
-    return dataset.isel({dim: 0 for dim in dataset.sizes if dim != "model" and dim not in dims})
+    """Reduce a result to the first value of every axis that is not drawn; inputs of `UNSAID` there are marked."""
+    others = {dim: 0 for dim in dataset.sizes if dim != "model" and dim not in dims}
+    line = dataset.isel(others)
+    varied = [name for name in UNSAID if name in dataset.coords and dataset[name].size > line[name].size]
+    return line.assign_coords({name: line[name].assign_attrs(chosen=1) for name in varied})
 
 
 def _sorted_along(dataset: xr.Dataset, name: str) -> tuple[xr.Dataset, tuple[str, ...]]:
@@ -221,7 +224,8 @@ def x_axis(dataset: xr.Dataset, x: str | None) -> str:
 def conditions_of(dataset: xr.Dataset, *drawn: str) -> str:
     """Write the values of all inputs that are not drawn, without the parameters of laws."""
     inputs = {name: quantity for name, quantity in scalars_of(dataset).items() if name not in drawn}
-    return described_inputs(inputs, exponents_of(dataset))
+    chosen = [name for name in UNSAID if name in inputs and "chosen" in dataset.variables[name].attrs]
+    return described_inputs(inputs, exponents_of(dataset), chosen)
 
 
 def scalars_of(dataset: xr.Dataset, start: str = "") -> dict[str, tuple[object, str]]:
@@ -232,10 +236,11 @@ def scalars_of(dataset: xr.Dataset, start: str = "") -> dict[str, tuple[object, 
     return {name: (each.values.item(), unit_of(each)) for name, each in variables.items() if each.ndim == 0}
 
 
-def described_inputs(inputs: Inputs, exponent: str | None = None) -> str:
+def described_inputs(inputs: Inputs, exponent: str | None = None, chosen: Collection[str] = ()) -> str:
     """Write inputs with their units; `exponent` is the text for n if the laws shown fix their exponent.
 
-    Values of `UNSAID` and unknown ones are left out; inputs of one quantity stand before their common value.
+    Unknown values and those of `UNSAID` are left out, but for inputs of `chosen`; inputs of one quantity stand
+    before their common value.
 
     >>> inputs = {"m1": (2e-4, "kg"), "m2": (2e-4, "kg"), "e": (0.5, "1"), "R2": (math.inf, "m")}
     >>> described_inputs(inputs).replace(NO_BREAK, " ")
@@ -244,7 +249,7 @@ def described_inputs(inputs: Inputs, exponent: str | None = None) -> str:
     names: dict[tuple[str, str], list[str]] = {}
     n, _ = inputs.get("n", (None, ""))
     for name, (value, unit) in inputs.items():
-        is_said = value == value and value != UNSAID.get(name)
+        is_said = value == value and (name in chosen or value != UNSAID.get(name))
         if is_said and InputName.parse(name).table in ("sweep", "materials"):
             unit = with_numbers(unit, {"n": n}) if isinstance(n, float) else unit
             text = "∞" if value == math.inf else prefixed(value, unit, 6)
