@@ -340,6 +340,11 @@ def test_words_and_laws_are_selected_and_what_is_missing_is_named() -> None:
         select(result, {"v1": 3.4})
     with pytest.raises(UsageError, match='no axis "model" in this result'):
         select(result, {"model": "hertz"})
+    # a stiffness has the unit that belongs to n
+    stiff = impact.sweep(models=["hertz"], K=[1e6, 1e8], e=0.5, v1=1.0, m1=1.0, m2=1.0)
+    assert select(stiff, {"K": "1000 kN/m^1.5"})["K"].item() == 1e6
+    with pytest.raises(UsageError, match=r"no K = 1000 kN/m in this result; K is 1e\+06, 1e\+08"):
+        select(stiff, {"K": "1000 kN/m"})
     assert select_laws(result, ["tsuji-1992", "tsuji-1992"]).sizes["model"] == 1
     # the law of a part is no dimension
     part = result.isel(model=0)

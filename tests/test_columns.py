@@ -546,6 +546,21 @@ def test_heights_and_times_that_are_not_of_a_falling_ball_are_refused(
     assert line.startswith(f"a.csv:1: {message}"), line
 
 
+def test_points_have_the_unit_of_a_stiffness_that_data_of_the_picture_have(folder: Path) -> None:
+    sweep = {"K": [1e6, 1e8], "e": 0.5, "v1": 1.0, "m1": 1.0, "m2": 1.0}
+    impact.sweep({"models": ["hertz"], "sweep": sweep}, output="r.h5")
+    impact.plot_to_files("r.h5", "p.png", kinds=["final-velocities"], data="d.csv")
+    heading = Path("d.csv").read_text(encoding="utf-8").partition(",")[0]
+    assert heading == "K [N/m^1.5]"
+    for unit, size in ((heading, 1.0), ("K [kN/m^1.5]", 1e3)):
+        points = {unit: [1e6 / size, 1e8 / size], "v1_post": [0.3, 0.4]}
+        (axes,) = impact.plot("r.h5", kind="final-velocities", points=points).axes
+        np.testing.assert_allclose(np.asarray(axes.lines[-1].get_xdata(), float), [1e6, 1e8], rtol=1e-15)
+    points = {"K [N/mm]": [1e3, 1e5], "v1_post": [0.3, 0.4]}
+    with pytest.raises(ConfigError, match=r"K: got \[N/mm\], expected a unit of N/m\^n with n = 1\.5"):
+        impact.plot("r.h5", kind="final-velocities", points=points)
+
+
 def test_points_of_a_laboratory_table_are_drawn_with_a_note_of_what_is_left_out(folder: Path) -> None:
     text = "Nr;v1 [cm/s];e_out [%];sigma_e_out [%]\n1;50;90;1\n2;100;;1\n"
     (folder / "a.csv").write_text(text, encoding="utf-8")

@@ -547,10 +547,10 @@ def needed_steps(
     # the surfaces of an overdamped contact part later than a collision at a step is followed
     is_overdamped = law.continuous["separation_time"] > MAX_CONTACTS * law.contact_time
     # no step does what the continuous law does not
-    room = tol * target - abs(law.continuous["e_out"] - target)
-    if room <= 0.0 or is_overdamped:
+    margin = tol * target - abs(law.continuous["e_out"] - target)
+    if margin <= 0.0 or is_overdamped:
         return None
-    judged, allowed = replace(law, phases=JUDGED_PHASES), tol * target - (1.0 - FOUND_SHARE) * room
+    judged, allowed = replace(law, phases=JUDGED_PHASES), tol * target - (1.0 - FOUND_SHARE) * margin
 
     @cache
     def log_error(steps: int) -> float:

@@ -86,13 +86,16 @@ class Points:
     columns: Mapping[str, tuple[float, ...]]
 
 
-def read_points(points: str | Path | Mapping[str, Sequence[object]] | pd.DataFrame | xr.Dataset) -> Points:
+def read_points(
+    points: str | Path | Mapping[str, Sequence[object]] | pd.DataFrame | xr.Dataset, n: float | None = None
+) -> Points:
     """Read measured points of a CSV file, a mapping of lists, or a table of pandas or xarray.
 
     The names of the columns are those of inputs and variables, with their units in brackets: "v1 [mm/s]". Without
     a unit a column is in SI. `sigma` is the standard deviation of the variable in the column before it, by default
-    in its unit, `sigma_NAME` that of a variable. Heights and times of flight are taken as in [data]. Warnings name
-    other columns, and count the rows in which a value is missing, which are left out.
+    in its unit, `sigma_NAME` that of a variable. The unit of K is that for the exponent n of the result. Heights
+    and times of flight are taken as in [data]. Warnings name other columns, and count the rows in which a value is
+    missing, which are left out.
     """
     quantities = _column_quantities()
     if isinstance(points, str | Path):
@@ -128,7 +131,7 @@ def read_points(points: str | Path | Mapping[str, Sequence[object]] | pd.DataFra
             quantity = replace(quantity, unit=quantities[measured].unit) if measured else quantity
         has_unit, measured_as = columns.units[name] or unit, MEASURED_OUTPUTS.get(name)
         problem = None if has_unit else percent_problem(columns.cells[name], measured_as, name)
-        numbers, wrong = ([], [problem]) if problem else columns.read(name, quantity, None, unit)
+        numbers, wrong = ([], [problem]) if problem else columns.read(name, quantity, n, unit)
         if wrong:
             raise columns.error(wrong)
         values[name] = tuple(map(float, numbers))

@@ -24,6 +24,7 @@ from ..display import TableForm, check_suffix, encode_frame
 from ..engine.plugins import read_plugins
 from ..errors import UsageError
 from ..formatting import argument
+from ..results.schema import shared_exponent
 from ..results.single_impact import Impact, histories
 from ..results.xarray_backend import load, result_to_show
 from .curves import CurveData
@@ -129,7 +130,7 @@ def plot(
         check_choice(choice, [find_kind(kind)])
         plot_data = get_plot_data(result, kind, choice, plugins)
     _check_shown(choice, look, [plot_data])
-    return draw(plot_data, look, None if points is None else read_points(points), ax)
+    return draw(plot_data, look, None if points is None else read_points(points, shared_exponent(result)), ax)
 
 
 def get_plot_data(dataset: xr.Dataset, kind: str, choice: Choice, plugins: Plugins = ()) -> PlotData:
@@ -361,8 +362,8 @@ def plot_to_files(
     # the default kind depends on the result, which is read after the paths are checked
     targets = [_with_kind(path, kind, kinds) for path in (output, table) if path for kind in kinds or [""]]
     check_outputs(targets, [result, points], overwrite=overwrite)
-    measured = None if points is None else read_points(points)
     dataset = load(result)
+    measured = None if points is None else read_points(points, shared_exponent(dataset))
     kinds = kinds or [default_kind(dataset).name]
     check_choice(choice, [find_kind(kind) for kind in kinds])
     if output.suffix.lower() == ".gif" and set(kinds) != {"animation"}:

@@ -184,7 +184,7 @@ def _slider(dataset: xr.Dataset, name: str, is_free: bool, value: object) -> Any
     import ipywidgets
 
     values, label = dataset[name].values, axis_label(name, numbered_unit(dataset, name))
-    first = values[0].item() if value is None else in_si(dataset[name], to_plain_value(value))
+    first = values[0].item() if value is None else in_si(dataset, name, to_plain_value(value))
     if not (is_free and isinstance(first, float | int) and values.min() <= first <= values.max()):
         # one of the grid, or the message that there is no such value
         first = select(dataset, {name: first})[name].values.ravel()[0].item()

@@ -422,8 +422,18 @@ def numbered_unit(dataset: xr.Dataset, name: str) -> str:
     n = dataset.coords.get("exponent" if law or name in dataset.data_vars else "n")
     if law and n is not None and "model" in n.dims:
         n = n.isel(model=dataset["model"].values == law)
-    numbers = np.unique([] if n is None else n)
-    return with_numbers(unit, {"n": float(numbers[0])}) if names_in(unit) == {"n"} and numbers.size == 1 else unit
+    exponent = _only_number(n)
+    return unit if exponent is None or names_in(unit) != {"n"} else with_numbers(unit, {"n": exponent})
+
+
+def shared_exponent(dataset: xr.Dataset) -> float | None:
+    """Read the n of the inputs that laws share, such as K; None if it varies or is unknown."""
+    return _only_number(dataset.coords.get("n"))
+
+
+def _only_number(values: xr.DataArray | None) -> float | None:
+    numbers = np.unique([] if values is None else values)
+    return float(numbers[0]) if numbers.size == 1 else None
 
 
 def exponent_text(by_model: Mapping[str, float]) -> str:

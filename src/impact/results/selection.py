@@ -17,7 +17,7 @@ from ..config.tables import SWEEP_QUANTITIES
 from ..contact.variables import LAW_DIMS, OUTPUTS
 from ..errors import UsageError, did_you_mean, require_known
 from ..formatting import argument, prefixed, safe_text
-from .schema import plain_unit
+from .schema import numbered_unit
 
 # relative tolerance by which a value from a user matches a computed label
 SELECTION_RTOL = 1e-9
@@ -94,7 +94,7 @@ def select(dataset: xr.Dataset, sel: Mapping[str, object]) -> xr.Dataset:
         plain = to_plain_value(value)
         if not isinstance(plain, float | int | str):
             raise UsageError(f"{argument('sel', {name: plain})}: got no single value, expected one")
-        number = in_si(dataset[name], plain)
+        number = in_si(dataset, name, plain)
         if values.dtype.kind in NUMBER_DTYPE_KINDS:
             same = np.isclose(values, _as_number(number), rtol=SELECTION_RTOL, atol=0.0)
         else:
@@ -118,14 +118,14 @@ def select(dataset: xr.Dataset, sel: Mapping[str, object]) -> xr.Dataset:
     return dataset.isel(positions)
 
 
-def in_si(coordinate: xr.DataArray, value: float | str) -> float | str:
+def in_si(dataset: xr.Dataset, name: str, value: float | str) -> float | str:
     """Convert a text with a unit, such as "30 deg", to that of a coordinate, and a word to its number."""
-    words, unit = InputName.parse(coordinate.name).words, coordinate.attrs.get("units")
+    words = InputName.parse(name).words
     if value in words:
         return float(words.index(str(value)))
-    if not isinstance(value, str) or unit is None:
+    if not isinstance(value, str):
         return value
-    number = Quantity(plain_unit(str(unit)), "").read_or_nan(value)
+    number = Quantity(numbered_unit(dataset, name), "").read_or_nan(value)
     return value if np.isnan(number) else number
 
 
