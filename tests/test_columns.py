@@ -149,6 +149,17 @@ def test_every_reader_of_columns_knows_the_dialects(folder: Path) -> None:
         read_points({"v1": [1.0, 2.0], "e_out": [0.5]})
 
 
+def test_a_data_frame_with_two_columns_of_one_name_is_refused() -> None:
+    frame = pd.DataFrame([[1.0, 2.0, 0.5]], columns=["v1", "v1", "e_out"])
+    balls = {"m1": 1.0, "m2": 1.0, "K": 1e6, "e": 0.5}
+    with pytest.raises(ConfigError, match='cases: got the column "v1" twice, expected each once'):
+        read_config({"models": "hertz", "sweep": {**balls, "cases": frame[["v1"]]}})
+    with pytest.raises(ConfigError, match='points: got "v1" twice, expected each column once'):
+        read_points(frame)
+    with pytest.raises(impact.UsageError, match="v1: got a table, expected a finite number of m/s"):
+        impact.prepare(model="hertz")(frame[["v1"]])
+
+
 def test_a_column_of_a_file_leaves_out_rows_without_a_value_and_counts_them(folder: Path) -> None:
     """Axes that vary together have the values of the same rows, so that none is left out."""
     (folder / "a.csv").write_text("v1 [cm/s];e\n10;0,9\n20;\n;0,7\n30;0,6\n", encoding="utf-8")

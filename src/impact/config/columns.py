@@ -424,9 +424,10 @@ def columns_of_table(table: Any, source: str) -> Columns:
     if hasattr(table, "data_vars"):
         units = {str(name): str(variable.attrs.get("units", "")) for name, variable in table.variables.items()}
         table = table.to_dataframe().reset_index()
+    headers = [split_header(str(header)) for header in table]
     cells = {
-        split_header(str(header)): getattr(values, "tolist", lambda v=values: v)()
-        for header, values in table.items()
+        header: getattr(values, "tolist", lambda v=values: v)()
+        for header, (_, values) in zip(headers, table.items(), strict=True)
     }
     columns = Columns(
         source,
@@ -436,7 +437,7 @@ def columns_of_table(table: Any, source: str) -> Columns:
         {name: values for (name, _), values in cells.items()},
         is_text=False,
     )
-    twice = next((name for name, count in Counter(name for name, _ in cells).items() if count > 1), None)
+    twice = next((name for name, count in Counter(name for name, _ in headers).items() if count > 1), None)
     if twice is not None:
         raise ConfigError(columns.problem(f"got {as_text(twice)} twice, expected each column once"))
     return columns

@@ -150,6 +150,10 @@ def to_plain_data(value: Any, path: KeyPath = ()) -> tuple[Any, list[ConfigProbl
     """
     if type(value) in (float, int, bool):
         return value, []
+    columns: Any = getattr(value, "columns", None)
+    if not getattr(columns, "is_unique", True):
+        twice = as_text(columns[columns.duplicated()][0])
+        return dict.fromkeys(columns), [(path, f"got the column {twice} twice, expected each once")]
     value = _from_library(value)
     if isinstance(value, str) and not _is_storable(value):
         return value, [(path, f"got {as_text(value)}, expected text without NUL and lone surrogates")]
