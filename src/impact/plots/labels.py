@@ -37,7 +37,7 @@ from ..results.schema import is_case
 from .slices import Inputs, parameter_text, scalars_of
 from .style import SOFT, tint
 
-# in a number with one point that is not the version of a code
+# not a point in the version of a code: since 2.1, v0.6, 3.8.0, 2022.01a
 DECIMAL_POINT = r"(?<!\bsince )(?<!\bv)(?<![\d.])(\d+)\.(?=\d+(?!\.?\d|a\b))"
 GREEK = "alpha|beta|gamma|delta|epsilon|zeta|eta|theta|kappa|lambda|mu|nu|xi|rho|sigma|tau|phi|chi|psi|omega"
 # symbols of the paper for names that are words; v_post and abs_e_error are each a label of several variables
