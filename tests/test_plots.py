@@ -1003,6 +1003,13 @@ def test_the_title_of_axes_of_a_user_has_decimal_commas(speeds: xr.Dataset) -> N
         assert axes.get_title() == title
 
 
+def test_the_unit_at_an_axis_has_decimal_commas() -> None:
+    result = impact.sweep(models=["hertz"], m1=1.0, m2=1.0, v1=1.0, v2=0.0, e=1.0, K=[1e6, 2e6], n=1.5)
+    for decimal, unit in (("comma", "$^{1{,}5}$"), ("point", "$^{1.5}$")):
+        (axes,) = impact.plot(result, kind="final-velocities", decimal=decimal).axes
+        assert unit in axes.get_xlabel()
+
+
 @pytest.mark.slow
 def test_the_table_of_a_plot_has_a_column_for_each_curve(cli: Run, coarse_file: Path, tmp_path: Path) -> None:
     words = ("plot", coarse_file, "--model", "gharib-hurmuzlu-2012", "--model", "lankarani-nikravesh-1990")

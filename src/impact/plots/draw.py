@@ -245,21 +245,26 @@ def _new_picture(plot_data: PlotData, look: Look, points: Points | None, *, lege
     return picture
 
 
+def _texts(axes: Axes) -> list[Text]:
+    """Find the texts of axes, without the numbers at their ticks."""
+    return [*(child for child in axes.get_children() if isinstance(child, Text)), axes.xaxis.label, axes.yaxis.label]
+
+
 def _draw_panels(
     plot_data: PlotData, all_axes: Sequence[Axes], labels: Mapping[str, str], points: Points | None, look: Look
 ) -> LegendEntries:
     """Draw the panels, with the decimal separator of the look; returns handles and names of the legend."""
     before = list(all_axes[0].figure.axes)
     # texts of the axes of a user keep their points
-    texts = {text: text.get_text() for axes in all_axes for text in axes.get_children() if isinstance(text, Text)}
+    texts = {text: text.get_text() for axes in all_axes for text in _texts(axes)}
     entries = plot_data.draw(all_axes, labels, points)
     if look.decimal == "point":
         return entries
     colour_bars = [axes for axes in all_axes[0].figure.axes if axes not in before]
     for axes in (*all_axes, *colour_bars):
-        # names of panels as well
-        for text in axes.get_children():
-            if isinstance(text, Text) and text.get_text() != texts.get(text):
+        # names of panels, and units with an exponent, as well
+        for text in _texts(axes):
+            if text.get_text() != texts.get(text):
                 text.set_text(with_comma(text.get_text()))
         for axis in (axes.xaxis, axes.yaxis):
             axis.set_major_formatter(FuncFormatter(partial(tick_with_comma, axis.get_major_formatter())))
