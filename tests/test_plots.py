@@ -1004,10 +1004,14 @@ def test_the_title_of_axes_of_a_user_has_decimal_commas(speeds: xr.Dataset) -> N
 
 
 def test_the_unit_at_an_axis_has_decimal_commas() -> None:
-    result = impact.sweep(models=["hertz"], m1=1.0, m2=1.0, v1=1.0, v2=0.0, e=1.0, K=[1e6, 2e6], n=1.5)
+    models = ["hertz", "hunt-crossley-1975"]
+    result = impact.sweep(models=models, m1=1.0, m2=1.0, v1=1.0, v2=0.0, e=[0.5, 1.0], K=[1e6, 2e6], n=1.5)
     for decimal, unit in (("comma", "$^{1{,}5}$"), ("point", "$^{1.5}$")):
-        (axes,) = impact.plot(result, kind="final-velocities", decimal=decimal).axes
+        (axes,) = impact.plot(result, kind="final-velocities", x="K", decimal=decimal).axes
         assert unit in axes.get_xlabel()
+        # the panels of a map share their labels
+        *_, label = impact.plot(result, kind="map", decimal=decimal).texts
+        assert unit in label.get_text()
 
 
 @pytest.mark.slow

@@ -245,30 +245,25 @@ def _new_picture(plot_data: PlotData, look: Look, points: Points | None, *, lege
     return picture
 
 
-def _texts(axes: Axes) -> list[Text]:
-    """Find the texts of axes, without the numbers at their ticks."""
-    return [*(child for child in axes.get_children() if isinstance(child, Text)), axes.xaxis.label, axes.yaxis.label]
-
-
 def _draw_panels(
     plot_data: PlotData, all_axes: Sequence[Axes], labels: Mapping[str, str], points: Points | None, look: Look
 ) -> LegendEntries:
     """Draw the panels, with the decimal separator of the look; returns handles and names of the legend."""
-    before = list(all_axes[0].figure.axes)
-    # texts of the axes of a user keep their points
-    texts = {text: text.get_text() for axes in all_axes for text in _texts(axes)}
+    figure = all_axes[0].figure
+    before = list(figure.axes)
+    # texts of the figure of a user keep their points
+    texts = {text: text.get_text() for text in figure.findobj(Text)}
     entries = plot_data.draw(all_axes, labels, points)
     if look.decimal == "point":
         return entries
-    colour_bars = [axes for axes in all_axes[0].figure.axes if axes not in before]
+    # names of panels, and units with an exponent, as well
+    for text in figure.findobj(Text):
+        if text.get_text() != texts.get(text):
+            text.set_text(with_comma(text.get_text()))
+    colour_bars = [axes for axes in figure.axes if axes not in before]
     for axes in (*all_axes, *colour_bars):
-        # names of panels, and units with an exponent, as well
-        for text in _texts(axes):
-            if text.get_text() != texts.get(text):
-                text.set_text(with_comma(text.get_text()))
         for axis in (axes.xaxis, axes.yaxis):
             axis.set_major_formatter(FuncFormatter(partial(tick_with_comma, axis.get_major_formatter())))
-    figure = all_axes[0].figure
     if isinstance(figure, Picture):
         figure.short_names = {text: [*map(with_comma, names)] for text, names in figure.short_names.items()}
     return [(artist, with_comma(name)) for artist, name in entries]
