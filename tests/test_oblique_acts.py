@@ -251,6 +251,7 @@ def test_solve_warns_of_a_limit_that_no_time_step_delivers(xt: float) -> None:
             "K": 1e9,
         },
         "friction": {"lammps-mindlin": {"kt_over_kn": 0.8, "xt": xt}},
+        "solver": {"rtol": 1e-6},
     }
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")

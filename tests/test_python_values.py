@@ -238,8 +238,13 @@ def test_a_data_array_of_long_doubles_or_texts_with_a_unit_is_read() -> None:
         assert swept["v1"].values.tolist() == [0.1, 0.2]
 
 
-def test_a_result_that_was_changed_is_taken_where_it_can_be_read_and_else_refused() -> None:
-    fits = impact.calibrate(ROOT / "docs" / "calibrate" / "drops.toml", overrides={"models": ["kelvin-voigt"]})
+@pytest.fixture(scope="module")
+def fits() -> xr.Dataset:
+    changes = {"models": ["kelvin-voigt"], "solver.rtol": 1e-6}
+    return impact.calibrate(ROOT / "docs" / "calibrate" / "drops.toml", overrides=changes)
+
+
+def test_a_result_that_was_changed_is_taken_where_it_can_be_read_and_else_refused(fits: xr.Dataset) -> None:
     sweep = impact.sweep({**BASE, "models": ["hertz", "tsuji-1992"]})
     halves = [sweep.isel(model=[number]) for number in range(2)]
     show = (impact.info, impact.plot, impact.report)
@@ -270,12 +275,11 @@ def test_inputs_and_titles_that_became_variables_are_taken_for_coordinates() -> 
     assert any(line.startswith("v1 ") and " t " in line for line in lines)
 
 
-def test_a_result_of_which_no_values_are_left_is_refused() -> None:
+def test_a_result_of_which_no_values_are_left_is_refused(fits: xr.Dataset) -> None:
     result = impact.sweep(BASE)
     for function in (impact.info, impact.report, impact.page, impact.plot, impact.run):
         with pytest.raises(impact.UsageError, match="this result has no values along model"):
             function(result.isel(model=slice(0, 0)))
-    fits = impact.calibrate(ROOT / "docs" / "calibrate" / "drops.toml", overrides={"models": ["kelvin-voigt"]})
     with pytest.raises(impact.UsageError, match="this result has no values along model"):
         impact.describe(fits.isel(model=slice(0, 0)))
 
@@ -287,8 +291,9 @@ def test_one_law_of_a_calibration_or_of_a_study_may_be_selected() -> None:
     pairs = {"frictions": ["coulomb-1785"], "sweep": {**sweep, "R1": 0.01, "R2": 0.01, "mu": {"fit": [0.01, 1.0]}}}
     columns = {"v1": [1.0, 2.0, 3.0], "u1": [2.0, 4.0, 7.0], "beta": [-0.5, -0.5, -0.6]}
     study = {"sweep": {**sweep, "v1": 1.0, "e": {"uniform": [0.5, 0.9]}}, "design": {"n": 16}}
-    fits = impact.calibrate(law | pairs | {"data": {"columns": columns, "sigma": 0.1}})
-    for result in (fits, impact.sensitivity(law | study)):
+    quick = law | {"solver": {"rtol": 1e-6}}
+    fits = impact.calibrate(quick | pairs | {"data": {"columns": columns, "sigma": 0.1}})
+    for result in (fits, impact.sensitivity(quick | study)):
         text = str(impact.describe(result.isel(model=[0])))
         law_alone = result.isel(model=0)
         assert str(impact.describe(law_alone)) == text
