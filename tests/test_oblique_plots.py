@@ -215,7 +215,8 @@ def test_the_spin_of_an_axis_that_is_not_drawn_is_named_although_it_is_zero() ->
     laws = CONFIG | {"models": [TSUJI], "frictions": [COULOMB], "friction": {}}
     sweep = BALLS | {"angle": ["10 deg", "40 deg"], "omega2": 0.0}
     spinning = impact.sweep(laws | {"sweep": sweep | {"omega1": [0.0, 100.0]}})
-    for kind, choice in (("beta", Choice()), ("map", Choice(x="mu", y="angle"))):
+    at_zero = Choice(sel={"omega1": 0})
+    for kind, choice in (("beta", Choice()), ("map", Choice(x="mu", y="angle")), ("spin", at_zero)):
         conditions = get_plot_data(spinning, kind, choice).conditions
         assert "omega1 = 0 rad/s" in conditions.replace("\N{NO-BREAK SPACE}", " ")
         assert "omega2" not in conditions

@@ -150,15 +150,19 @@ def _select(dataset: xr.Dataset, choice: Choice) -> xr.Dataset:
     """Select the chosen models, friction laws and values of a result."""
     if "model" not in dataset.dims:
         raise not_a_sweep()
-    return select(select_laws(dataset, choice.models, choice.frictions), choice.sel or {})
+    return _marked(select(select_laws(dataset, choice.models, choice.frictions), choice.sel or {}), dataset)
 
 
 def _drop_other_axes(dataset: xr.Dataset, dims: Sequence[object]) -> xr.Dataset:
-    """Reduce a result to the first value of every axis that is not drawn; inputs of `UNSAID` there are marked."""
+    """Reduce a result to the first value of every axis that is not drawn."""
     others = {dim: 0 for dim in dataset.sizes if dim != "model" and dim not in dims}
-    line = dataset.isel(others)
-    varied = [name for name in UNSAID if name in dataset.coords and dataset[name].size > line[name].size]
-    return line.assign_coords({name: line[name].assign_attrs(chosen=1) for name in varied})
+    return _marked(dataset.isel(others), dataset)
+
+
+def _marked(part: xr.Dataset, whole: xr.Dataset) -> xr.Dataset:
+    """Mark the inputs of `UNSAID` of which a part has fewer values than the whole."""
+    chosen = [name for name in UNSAID if name in whole.coords and whole[name].size > part[name].size]
+    return part.assign_coords({name: part[name].assign_attrs(chosen=1) for name in chosen})
 
 
 def _sorted_along(dataset: xr.Dataset, name: str) -> tuple[xr.Dataset, tuple[str, ...]]:
