@@ -249,13 +249,13 @@ def _draw_panels(
     plot_data: PlotData, all_axes: Sequence[Axes], labels: Mapping[str, str], points: Points | None, look: Look
 ) -> LegendEntries:
     """Draw the panels, with the decimal separator of the look; returns handles and names of the legend."""
+    if look.decimal == "point":
+        return plot_data.draw(all_axes, labels, points)
     figure = all_axes[0].figure
     before = list(figure.axes)
     # texts of the figure of a user keep their points
     texts = {text: text.get_text() for text in figure.findobj(Text)}
     entries = plot_data.draw(all_axes, labels, points)
-    if look.decimal == "point":
-        return entries
     # names of panels, and units with an exponent, as well
     for text in figure.findobj(Text):
         if text.get_text() != texts.get(text):
