@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import warnings
 from typing import Any
 
 import numpy as np
@@ -266,6 +267,16 @@ def test_the_steps_for_a_tolerance_are_said_to_be_those_of_e_alone() -> None:
     assert result.needed.steps_per_contact == 16
     assert result.rows[0].beta_largest < -0.1 < 0.2 < result.beta_continuous
     assert str(result).splitlines()[-1].startswith("the tolerance is that of e alone")
+
+
+@pytest.mark.parametrize(("friction", "notes"), [("lammps-mindlin", 1), ("lammps-mindlin-force", 0)])
+def test_timestep_notes_a_limit_that_fixed_steps_reach_slowly(friction: str, notes: int) -> None:
+    inputs = {"angle": "20 deg", "mu": 0.3, "e": 0.7, "v1": 1.0}
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        impact.timestep("tsuji-1992", at=inputs, friction=friction, steps_per_contact=[16], phases=1)
+    note = "beta is the limit of small steps, which a code with fixed steps reaches slowly"
+    assert [str(warning.message) for warning in caught] == [f"tsuji-1992 with {friction}: {note}"] * notes
 
 
 def test_the_restitution_at_a_fixed_step_does_not_depend_on_friction() -> None:
