@@ -277,7 +277,7 @@ def test_of_extensions_at_the_same_time_none_that_succeeds_is_lost(stored_sweep:
             return None
         return speed
 
-    for round in range(2):
+    for round in range(4):
         with ThreadPoolExecutor() as pool:
             kept |= {*pool.map(extend, (3.0 + round + n / 4 for n in range(4)))} - {None}
         assert {*impact.load(path)["v1"].values.tolist()} == kept

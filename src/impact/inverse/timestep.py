@@ -371,7 +371,7 @@ def timestep(
     point_source = replace(opened, config_draft=replace(opened.config_draft, has_own_scheme=True))
     law = law_at_point(point_source, find(model, plugin_set.models), at or {}, phases, scheme, friction)
     if law.continuous.get("friction_status") == FrictionStatus.SLOW_LIMIT:
-        warn(f"{law_name(model, law.friction)}: beta is {FrictionStatus.SLOW_LIMIT.meaning}")
+        warn(f"{law_name(law.model.key, law.friction)}: beta is {FrictionStatus.SLOW_LIMIT.meaning}")
     steps = time_steps(law.contact_time, counts or (() if given else STEPS_PER_CONTACT), given)
     needed, found = None, None
     if tol is not None:

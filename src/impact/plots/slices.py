@@ -160,7 +160,7 @@ def _drop_other_axes(dataset: xr.Dataset, dims: Sequence[object]) -> xr.Dataset:
 
 
 def _marked(part: xr.Dataset, whole: xr.Dataset) -> xr.Dataset:
-    """Mark the inputs of `UNSAID` of which a part has fewer values than the whole."""
+    """Mark inputs of `UNSAID` of which a part has fewer values than the whole, so that a picture names them."""
     chosen = [name for name in UNSAID if name in whole.coords and whole[name].size > part[name].size]
     return part.assign_coords({name: part[name].assign_attrs(chosen=1) for name in chosen})
 
